@@ -34,22 +34,22 @@ def main():
     holds = True
     print("fault  predicted mean  found mean (standard error)  predicted 90 %  runs within  right fault named")
     for connection, name in fault_of.items():
-        own = [run for run in runs if run["fault.connection"] == connection]
-        delays = np.array([run["delay"] for run in own])
+        group = [run for run in runs if run["fault.connection"] == connection]
+        delays = np.array([run["delay"] for run in group])
         (fault,) = (fault for fault in report["faults"] if fault["fault"] == name)
         mean, error = delays.mean(), delays.std(ddof=1) / np.sqrt(len(delays))
         soon = int((delays <= fault["delay_90"]).sum())
-        right = sum(run["isolated"] == names.index(name) + 1 for run in own)
-        holds &= abs(mean - fault["delay"]) < 3 * error + 3 and within(soon, len(own), 0.9)
+        right = sum(run["isolated"] == names.index(name) + 1 for run in group)
+        holds &= abs(mean - fault["delay"]) < 3 * error + 3 and within(soon, len(group), 0.9)
         print(
-            f"{name}  {fault['delay']:.1f} s  {mean:.1f} s ({error:.1f} s)  {fault['delay_90']:.0f} s  {soon} of {len(own)}  "
-            f"{right} of {len(own)}"
+            f"{name}  {fault['delay']:.1f} s  {mean:.1f} s ({error:.1f} s)  {fault['delay_90']:.0f} s  {soon} of {len(group)}  "
+            f"{right} of {len(group)}"
         )
-    own = [run for run in runs if run["fault.connection"] is None]
-    alarms = int(sum(run["alarm"] for run in own))
+    group = [run for run in runs if run["fault.connection"] is None]
+    alarms = int(sum(run["alarm"] for run in group))
     predicted = 1 - np.exp(-DURATION / report["false_alarm_interval"])
-    holds &= within(alarms, len(own), predicted)
-    print(f"without a fault: a false alarm within {DURATION:.0f} s in {alarms} of {len(own)} runs, predicted {predicted:.1%}")
+    holds &= within(alarms, len(group), predicted)
+    print(f"without a fault: a false alarm within {DURATION:.0f} s in {alarms} of {len(group)} runs, predicted {predicted:.1%}")
     return 0 if holds else 1
 
 

@@ -41,27 +41,27 @@ def design(plant: object, **entries: Any) -> Design:
     Raises:
         DesignError: an entry is wrong, or no gain meets the requirements.
 
-    >>> made = design((A, B, C), actuator_faults="all")  # doctest: +SKIP
+    >>> result = design((A, B, C), actuator_faults="all")  # doctest: +SKIP
     """
     folder = os.getcwd()
     if isinstance(plant, (str, os.PathLike)):
         path = os.path.abspath(os.fspath(plant))
         if path.lower().endswith((".npz", ".mat")):
-            own = _plant.of_file(path)
+            content = _plant.of_file(path)
         elif not entries:
             return Design(_core.design_file(os.fspath(plant)), path)
         else:
             try:
                 with open(path, encoding="utf-8") as file:
-                    own = _core.parse_toml(file.read())
+                    content = _core.parse_toml(file.read())
             except OSError as error:
                 raise DesignError(f"cannot read {path}: {error.strerror}", "File", {"path": path}) from None
             folder = os.path.dirname(path)
     elif isinstance(plant, Mapping):
-        own = dict(plant)
+        content = dict(plant)
     else:
-        own = _plant.of_system(plant)
-    return _of_entries({**own, **entries}, os.path.join(folder, "plant.toml"))
+        content = _plant.of_system(plant)
+    return _of_entries({**content, **entries}, os.path.join(folder, "plant.toml"))
 
 
 def _of_entries(entries: Mapping[str, Any], path: str) -> Design:
@@ -111,7 +111,7 @@ class Design:
         """The matrices of the controller by name: ``K_x`` (m, n), ``K_f``, ``L_x`` (n, p), ``L_f``, ..."""
         import numpy
 
-        return {own["name"]: numpy.array(own["values"], dtype=float) for own in self.report["gains"]}
+        return {gain["name"]: numpy.array(gain["values"], dtype=float) for gain in self.report["gains"]}
 
     @property
     def K_x(self) -> NDArray[Any]:
@@ -135,8 +135,8 @@ class Design:
         """The eigenvalues of ``feedback`` (A + B K_x) and ``observer`` (A_0 - L C_0), complex; of a sample if sampled."""
         import numpy
 
-        found = {part: self.report[part]["eigenvalues"] for part in ("feedback", "observer")}
-        return {part: numpy.array([complex(*value) for value in values]) for part, values in found.items()}
+        pairs = {part: self.report[part]["eigenvalues"] for part in ("feedback", "observer")}
+        return {part: numpy.array([complex(*value) for value in values]) for part, values in pairs.items()}
 
     @property
     def margins(self) -> list[dict[str, Any]]:
@@ -279,7 +279,7 @@ class Design:
         return self._designed.page()
 
     def _repr_html_(self) -> str:
-        rows = [("yes" if own["holds"] else "no", own["condition"]) for own in self.checks]
+        rows = [("yes" if check["holds"] else "no", check["condition"]) for check in self.checks]
         return page(f"{self.report['description']}: {self.verdict}", ("holds", "condition"), rows)
 
     def __str__(self) -> str:
@@ -296,7 +296,7 @@ class Design:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        held = sum(own["holds"] for own in self.checks)
+        held = sum(check["holds"] for check in self.checks)
         return f"<Design: {', '.join(self.gains)}; {held} of {len(self.checks)} checks hold; {self.verdict}>"
 
 

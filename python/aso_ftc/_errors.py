@@ -100,10 +100,10 @@ class RunError(Error, RuntimeError):
 
     def __init__(self, message: str, kind: str = "Other", fields: dict[str, Any] | None = None) -> None:
         super().__init__(message, kind, fields)
-        own = self.fields
-        self.time, self.fmu = own.get("time"), own.get("fmu")
-        self.function, self.status = own.get("function"), own.get("status")
-        self.messages = list(own.get("messages", ()))
+        entries = self.fields
+        self.time, self.fmu = entries.get("time"), entries.get("fmu")
+        self.function, self.status = entries.get("function"), entries.get("status")
+        self.messages = list(entries.get("messages", ()))
 
 
 class TimeLimitError(RunError, TimeoutError):

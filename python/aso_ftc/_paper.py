@@ -24,10 +24,10 @@ _PRINTED_L = (
 
 def fmus() -> dict[str, Path]:
     """Return the FMUs of this package by name: ``FrictionPendulum``, ``AsoController``, ..."""
-    found = sorted((Path(__file__).parent / "fmus").glob("*.fmu"))
-    if not found:
+    paths = sorted((Path(__file__).parent / "fmus").glob("*.fmu"))
+    if not paths:
         raise Error("this installation of aso_ftc has no FMUs", "NoFmus")
-    return {path.stem: path for path in found}
+    return {path.stem: path for path in paths}
 
 
 def paper(
@@ -40,8 +40,8 @@ def paper(
             linearised plant from the paper's x(0) = [1.1, -1.1, 0, 0]; ``"printed-gains"``: the paper's
             printed L with two signs corrected, which loses the nonlinear plant.
     """
-    own = fmus()
-    system = System().add("plant", own["FrictionPendulum"]).add("controller", own["AsoController"])
+    files = fmus()
+    system = System().add("plant", files["FrictionPendulum"]).add("controller", files["AsoController"])
     system.algorithm["step"] = 0.001
     system.experiment["stop-time"] = 100.0
     system.results["every"] = 0.01

@@ -33,18 +33,18 @@ def stated(value: Any, entry: str) -> Any:
 def _pairs(values: Any, entry: str) -> list[Any]:
     """Return real numbers, and one ``{"re": ..., "im": ...}`` for each pair of complex ones."""
     rest = [complex(value) for value in values]
-    found: list[Any] = []
+    eigenvalues: list[Any] = []
     while rest:
         value = rest.pop(0)
         if value.imag == 0.0:
-            found.append(value.real)
+            eigenvalues.append(value.real)
             continue
         nearest = min(rest, key=lambda other: abs(other - value.conjugate()), default=None)
         if nearest is None or abs(nearest - value.conjugate()) > _ROUNDING * abs(value):
             raise DesignError(f"{entry}: {value} stands without its conjugate {value.conjugate()}", "Eigenvalues")
         rest.remove(nearest)
-        found.append({"re": value.real, "im": abs(value.imag)})
-    return found
+        eigenvalues.append({"re": value.real, "im": abs(value.imag)})
+    return eigenvalues
 
 
 def with_names(entries: Mapping[str, Any]) -> dict[str, Any]:

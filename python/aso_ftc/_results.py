@@ -178,7 +178,7 @@ class Results(Mapping[str, "NDArray[Any]"]):
         import numpy
 
         columns = {name: self[name] for name in self.names}
-        array = numpy.empty(len(self._table), dtype=[(name, own.dtype) for name, own in columns.items()])
+        array = numpy.empty(len(self._table), dtype=[(name, column.dtype) for name, column in columns.items()])
         for name, column in columns.items():
             array[name] = column
         return array
@@ -258,8 +258,8 @@ class Results(Mapping[str, "NDArray[Any]"]):
         count = max(len(panels), 1)
         options = {"sharex": True, "squeeze": False, "figsize": (8, 1.5 + 2 * count), **options}
         figure, axes = pyplot.subplots(count, 1, **options)
-        for own, (unit, members) in zip(axes[:, 0], panels.items()):
-            self._draw(own, members, unit)
+        for panel, (unit, members) in zip(axes[:, 0], panels.items()):
+            self._draw(panel, members, unit)
         axes[-1, 0].set_xlabel("time in s")
         figure.tight_layout()
         return figure

@@ -108,11 +108,11 @@ def _start_values(system: System, name: str, values: Mapping[str, Any]) -> dict[
         for variable, value in values.items()
         if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str) and not isinstance(value[0], str)
     }
-    for own in _variables(system, name, None) if with_units else []:
-        variable = own.name if own.name in with_units else own.name.rpartition("[")[0]
-        _, stated = with_units.get(variable, (None, own.unit))
-        if stated != own.unit:
-            sentence = f"start_values: expected {variable} in {own.unit or 'no unit'}, found {stated}"
+    for scalar in _variables(system, name, None) if with_units else []:
+        variable = scalar.name if scalar.name in with_units else scalar.name.rpartition("[")[0]
+        _, stated = with_units.get(variable, (None, scalar.unit))
+        if stated != scalar.unit:
+            sentence = f"start_values: expected {variable} in {scalar.unit or 'no unit'}, found {stated}"
             raise ConfigurationError(sentence, "Unit", {"name": variable})
     return {f"{name}.{variable}": with_units.get(variable, (value,))[0] for variable, value in values.items()}
 
@@ -120,17 +120,17 @@ def _start_values(system: System, name: str, values: Mapping[str, Any]) -> dict[
 def _variables(system: System, name: str, values: Mapping[str, Any] | None) -> list[Variable]:
     """Return the variables of the FMU with its own names, in the sizes that the start values give to arrays."""
     known = system._study().check(_changes(start_values=values), quiet=True)
-    return [Variable(**{**own, "name": own["name"].removeprefix(f"{name}.")}) for own in known]
+    return [Variable(**{**entry, "name": entry["name"].removeprefix(f"{name}.")}) for entry in known]
 
 
 def _recorded(name: str, variables: list[Variable], output: Iterable[str] | None) -> list[str] | None:
     """Return what is recorded: outputs by default; ``None``, which records more, without outputs."""
     if output is None:
-        return [f"{name}.{own.name}" for own in variables if own.causality == "output"] or None
+        return [f"{name}.{variable.name}" for variable in variables if variable.causality == "output"] or None
     if isinstance(output, str):
         raise TypeError(f"output is a list of names, found the text {output!r}")
-    known = arrays(own.name for own in variables)
-    return [f"{name}.{element}" for own in output for element in (known[own].elements if own in known else [own])]
+    known = arrays(variable.name for variable in variables)
+    return [f"{name}.{element}" for signal in output for element in (known[signal].elements if signal in known else [signal])]
 
 
 @dataclass(frozen=True)
@@ -150,14 +150,14 @@ class CheckReport:
         return self.ok
 
     def __str__(self) -> str:
-        lines = [f"{own.get('severity', 'note')}: {own.get('what', own)}" for own in self.findings]
+        lines = [f"{finding.get('severity', 'note')}: {finding.get('what', finding)}" for finding in self.findings]
         return "\n".join([*lines, self._counts()])
 
     def _counts(self) -> str:
         return f"errors {self.errors}, warnings {self.warnings}, notes {self.notes}"
 
     def _repr_html_(self) -> str:
-        rows = [(own.get("severity", "note"), own.get("what", own)) for own in self.findings]
+        rows = [(finding.get("severity", "note"), finding.get("what", finding)) for finding in self.findings]
         return page(self._counts(), ("severity", "finding"), rows)
 
 

@@ -113,11 +113,11 @@ class System:
         folder: PathLike | None = None,
     ) -> None:
         self._folder = os.path.abspath(os.fspath(folder) if folder is not None else os.getcwd())
-        own = {} if description is None else description
-        if not isinstance(own, (str, Mapping)):
-            kind = type(own).__name__
+        config = {} if description is None else description
+        if not isinstance(config, (str, Mapping)):
+            kind = type(config).__name__
             raise TypeError(f"expected the text of a system.toml or a dict, found {kind}")
-        self._adopt(_core.check_configuration(own, self._folder))
+        self._adopt(_core.check_configuration(config, self._folder))
         self._slaves: dict[str, Slave] = {}
         self._cache: tuple[dict[str, Any], dict[str, Slave], _core.Study] | None = None
 
@@ -135,9 +135,9 @@ class System:
             ConfigurationError: with ``path``, ``line`` and ``column``.
         """
         config = _core.read_configuration(os.fspath(path))
-        own = cls(folder=os.path.dirname(os.path.abspath(os.fspath(path))))
-        own._adopt(config)
-        return own
+        system = cls(folder=os.path.dirname(os.path.abspath(os.fspath(path))))
+        system._adopt(config)
+        return system
 
     @classmethod
     def from_ssp(cls, path: PathLike) -> System:
@@ -287,10 +287,10 @@ class System:
         return state
 
     def __deepcopy__(self, memo: dict[int, Any]) -> System:
-        own = type(self).__new__(type(self))
-        memo[id(self)] = own
-        own.__dict__.update(copy.deepcopy(self.__getstate__(), memo))
-        return own
+        system = type(self).__new__(type(self))
+        memo[id(self)] = system
+        system.__dict__.update(copy.deepcopy(self.__getstate__(), memo))
+        return system
 
     def __repr__(self) -> str:
         names = [*self._rest.get("fmus", {}), *self._slaves]
@@ -328,8 +328,8 @@ class System:
     def with_files(self, paths: Mapping[str, PathLike]) -> System:
         """Return a copy that reads other files: absolute path to new path, as for :meth:`files`."""
         replaced = {os.path.abspath(old): os.path.abspath(os.fspath(new)) for old, new in paths.items()}
-        own = self.copy()
-        config = own.to_dict()
+        system = self.copy()
+        config = system.to_dict()
 
         def swap(path: str) -> str:
             return replaced.get(path, path)
@@ -344,8 +344,8 @@ class System:
         for entry in scenario.get("signal", []):
             if "csv" in entry:
                 entry["csv"]["file"] = swap(entry["csv"]["file"])
-        own._adopt(config)
-        return own
+        system._adopt(config)
+        return system
 
     def _study(self) -> _core.Study:
         config = self._config()
@@ -370,7 +370,7 @@ class System:
 
     def variables(self) -> list[Variable]:
         """Return the variables of all FMUs, with names ``"fmu.variable"``."""
-        return [Variable(**own) for own in self._study().check({}, quiet=True)]
+        return [Variable(**entry) for entry in self._study().check({}, quiet=True)]
 
     @keywords(_FMPY)
     def run(
@@ -581,8 +581,8 @@ class Simulation:
     def set(self, name: str, value: object) -> None:
         """Set an input without a connection or a tunable parameter, from the next step on."""
         known = {} if name in self._names else self._arrays
-        for own, element in spread({name: value}, known):
-            self._stepper.set(own, element)
+        for variable, element in spread({name: value}, known):
+            self._stepper.set(variable, element)
 
     def save(self) -> bytes:
         """Return the state of all FMUs and connections.
@@ -687,7 +687,7 @@ def _changes(
     }
     changes: dict[str, Any] = {}
     for name, table in tables_of.items():
-        stated = {} if table is None else {key: own for key, own in table.items() if own is not None}
+        stated = {} if table is None else {key: value for key, value in table.items() if value is not None}
         if stated:
             changes[name] = stated
     return changes

@@ -43,7 +43,7 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
     names, values = list(grid), [list(tried) for tried in grid.values()]
     combinations = [dict(zip(names, chosen)) for chosen in itertools.product(*values)]
 
-    def made(combination: dict[str, Any]) -> Design | DesignError:
+    def design_or_error(combination: dict[str, Any]) -> Design | DesignError:
         changed = dict(entries)
         for name, value in combination.items():
             _set(changed, name.split("."), value)
@@ -53,8 +53,8 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
             return error
 
     with ThreadPoolExecutor() as threads:
-        designs = list(threads.map(made, combinations))
-    refused = [found for found in designs if isinstance(found, DesignError)]
+        designs = list(threads.map(design_or_error, combinations))
+    refused = [result for result in designs if isinstance(result, DesignError)]
     if len(refused) == len(designs):
         raise refused[0] if refused else DesignError("the grid has no combination", "Grid")
     return TradeOff(combinations, designs)
@@ -68,7 +68,7 @@ def _set(entries: dict[str, Any], place: list[str], value: Any) -> None:
     entries[place[-1]] = value
 
 
-def measures(made: Design) -> dict[str, float]:
+def measures(result: Design) -> dict[str, float]:
     """Return what is compared; a measure that a design does not have is NaN.
 
     ``speed`` and ``observer_speed``: the decay rates of the slowest eigenvalues in 1/s; ``peak_of_S``: the larger of
@@ -79,21 +79,21 @@ def measures(made: Design) -> dict[str, float]:
     """
     import numpy
 
-    report = made.report
+    report = result.report
     robustness = report["robustness"]
     period = (report["sampling"] or {}).get("sample_time")
     nan = float("nan")
 
     def slowest(part: str) -> float:
-        values = made.eigenvalues[part]
+        values = result.eigenvalues[part]
         if period is None:
             return float(-values.real.max())
         with numpy.errstate(divide="ignore"):
             return float(-numpy.log(numpy.abs(values)).max() / period)
 
     commands = {signal["name"] for signal in report["plant"]["actuators"]}
-    noise = [own["value"] for own in robustness["noise_together"] if own["name"] in commands] if robustness else []
-    ramps = [own["ramp"] for own in report["estimation"]["errors"] if own["ramp"] is not None]
+    noise = [signal["value"] for signal in robustness["noise_together"] if signal["name"] in commands] if robustness else []
+    ramps = [error["ramp"] for error in report["estimation"]["errors"] if error["ramp"] is not None]
     delay = robustness["delay_margin"] if robustness else None
     return {
         "speed": slowest("feedback"),
@@ -111,11 +111,11 @@ class TradeOff:
     def __init__(self, combinations: list[dict[str, Any]], designs: list[Design | DesignError]) -> None:
         self.designs = designs
         self.rows: list[dict[str, Any]] = []
-        for combination, found in zip(combinations, designs):
-            if isinstance(found, Design):
-                row = {**combination, "verdict": found.verdict, **measures(found), "error": None}
+        for combination, result in zip(combinations, designs):
+            if isinstance(result, Design):
+                row = {**combination, "verdict": result.verdict, **measures(result), "error": None}
             else:
-                row = {**combination, "verdict": "refused", **dict.fromkeys(_MEASURES, float("nan")), "error": str(found)}
+                row = {**combination, "verdict": "refused", **dict.fromkeys(_MEASURES, float("nan")), "error": str(result)}
             self.rows.append(row)
 
     def __len__(self) -> int:

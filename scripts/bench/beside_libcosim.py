@@ -71,15 +71,15 @@ def main():
     arguments, options = parser.parse_known_args()
     path = arguments.system.resolve()
     expected = by_libcosim(path, arguments.step, arguments.stop_time)
-    found = by_aso_ftc(arguments.command, path, arguments.step, arguments.stop_time, options)
+    outputs = by_aso_ftc(arguments.command, path, arguments.step, arguments.stop_time, options)
     differing = 0
     for name, value in sorted(expected.items()):
-        own = float(found.get(name) or "nan")
+        output = float(outputs.get(name) or "nan")
         # libcosim writes six digits; half a unit of the last digit may be rounding.
-        agrees = abs(own - value) <= 0.5 * 10 ** (1 - arguments.digits) * max(abs(own), abs(value))
+        agrees = abs(output - value) <= 0.5 * 10 ** (1 - arguments.digits) * max(abs(output), abs(value))
         if not agrees:
             differing += 1
-            print(f"{name}: {own!r}, libcosim {value!r}")
+            print(f"{name}: {output!r}, libcosim {value!r}")
     print(f"{path.name}: {len(expected)} outputs, {differing} differ in {arguments.digits} digits")
     # libcosim may crash when Python exits.
     sys.stdout.flush()

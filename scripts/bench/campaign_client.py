@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=40_000)
     parser.add_argument("--runs-per-task", type=int, default=40)
     parser.add_argument("--seconds", type=float, default=0.1, help="time of a run")
-    own = parser.parse_args()
+    options = parser.parse_args()
 
     class Runner:
         """A worker without FMUs."""
@@ -63,25 +63,25 @@ def main() -> None:
         def runs(self, numbers, values, cases):
             """Sleep, and return a row for each run."""
             del values, cases
-            time.sleep(own.seconds * len(numbers))
-            return [_worker.Row(run, {"peak": 0.1, "last": 0.1}, seconds=own.seconds) for run in numbers]
+            time.sleep(options.seconds * len(numbers))
+            return [_worker.Row(run, {"peak": 0.1, "last": 0.1}, seconds=options.seconds) for run in numbers]
 
     _worker.Job.unpack = lambda job, folder: Runner()
     with (
         dask.config.set(QUIET),
         tempfile.TemporaryDirectory() as folder,
         LocalCluster(
-            n_workers=own.workers, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=":0",
+            n_workers=options.workers, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=":0",
             local_directory=folder, silence_logs=logging.CRITICAL,
         ) as cluster,
     ):
-        words = [sys.executable, "-c", CLIENT, f"{folder}/out", cluster.scheduler_address, str(own.runs), str(own.runs_per_task)]
+        words = [sys.executable, "-c", CLIENT, f"{folder}/out", cluster.scheduler_address, str(options.runs), str(options.runs_per_task)]
         client = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True)
     processor, wall = map(float, client.stdout.split())
-    tasks = -(-own.runs // own.runs_per_task)
+    tasks = -(-options.runs // options.runs_per_task)
     print(
-        f"{own.workers} workers, {own.runs} runs of {own.seconds} s in {tasks} tasks: {wall:.1f} s; client "
-        f"{processor:.2f} s: {1e6 * processor / own.runs:.0f} us for a run, {1e3 * processor / tasks:.1f} ms for a task"
+        f"{options.workers} workers, {options.runs} runs of {options.seconds} s in {tasks} tasks: {wall:.1f} s; client "
+        f"{processor:.2f} s: {1e6 * processor / options.runs:.0f} us for a run, {1e3 * processor / tasks:.1f} ms for a task"
     )
 
 

@@ -102,12 +102,12 @@ PARTS = {
 
 def program(header, names):
     """A program that takes the samples with all arguments of the controller with this header."""
-    own = [part for kind, part in PARTS.items() if f"}} {names['name']}_{kind};" in header]
+    parts = [part for kind, part in PARTS.items() if f"}} {names['name']}_{kind};" in header]
     text = " ".join(header.replace("\n *", "").split())
-    found = re.search(r"points from (\S+) to (\S+), and change", text)
+    match = re.search(r"points from (\S+) to (\S+), and change", text)
     suffix = "F" if names["real"] == "float" else ""
-    ends = dict(zip(("first", "last"), (f"{end}{suffix}" for end in found.groups()))) if found else {}
-    variables, inputs, before, reset, after = ([part[k] for part in own] for k in range(5))
+    ends = dict(zip(("first", "last"), (f"{end}{suffix}" for end in match.groups()))) if match else {}
+    variables, inputs, before, reset, after = ([part[k] for part in parts] for k in range(5))
     joined = {"variables": "\n".join(variables), "inputs": "\n".join(inputs)}
     joined |= {"before": "".join(before), "reset": "".join(reset), "after": "".join(after)}
     return MAIN % {**names, **{key: value % {**names, **ends} for key, value in joined.items()}}
@@ -120,7 +120,7 @@ def run(*command, **options):
     return done.stdout
 
 
-def cycles(mnemonic, operands, taken):
+def cycles(mnemonic, operands, jump):
     """Cycles of an instruction of the Cortex-M4."""
     several = operands.count(",") + 1 if "{" in operands else 0
     spans = sum(int(b) - int(a) for a, b in re.findall(r"[rsd](\d+)-[rsd](\d+)", operands))
@@ -137,7 +137,7 @@ def cycles(mnemonic, operands, taken):
         return 3
     if re.match(r"(sdiv|udiv)", mnemonic):
         return 12
-    if taken:
+    if jump:
         return 3
     return 1
 
@@ -172,8 +172,8 @@ def main():
         listing = run("arm-none-eabi-objdump", "-d", "--no-show-raw-insn", home / "own.elf")
     code, first = {}, None
     for line in listing.splitlines():
-        if found := re.match(r"\s*([0-9a-f]+):\t(\S+)\s*(.*)", line):
-            code[int(found[1], 16)] = found[2], found[3]
+        if match := re.match(r"\s*([0-9a-f]+):\t(\S+)\s*(.*)", line):
+            code[int(match[1], 16)] = match[2], match[3]
         elif line.endswith(f"<{source.stem}_step>:"):
             first = int(line.split()[0], 16)
     order = sorted(code)
@@ -191,13 +191,13 @@ def main():
             count = cycles(mnemonic, operands.split(";")[0], trace[at + 1] != after.get(pc))
             samples[-1].update({"instructions": 1, "cycles": count})
             kinds[mnemonic.split(".")[0]] += 1
-            samples[-1].update(own for own, pattern in ARITHMETIC.items() if re.match(pattern, mnemonic))
+            samples[-1].update(kind for kind, pattern in ARITHMETIC.items() if re.match(pattern, mnemonic))
     assert len(samples) == SAMPLES, f"{len(samples)} samples in the trace"
-    most = max(samples, key=lambda own: own["cycles"])
+    most = max(samples, key=lambda sample: sample["cycles"])
     print(f"{source.stem}, {names['real']}, {options.cpu}: program and constants {size} bytes")
     estimate = f", about {most['cycles']} cycles, {1e6 * most['cycles'] / 168e6:.1f} us at 168 MHz"
     print(f"a sample: at most {most['instructions']} instructions{'' if options.cpu == 'cortex-m7' else estimate}")
-    counts = {kind: max(own[kind] for own in samples) for kind in ARITHMETIC}
+    counts = {kind: max(sample[kind] for sample in samples) for kind in ARITHMETIC}
     if any(counts.values()):
         print("of them, at most: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     print("most frequent: " + ", ".join(f"{name} {count // SAMPLES}" for name, count in kinds.most_common(8)))

@@ -50,15 +50,15 @@ def fmpy_loop():
         path = str(af.fmus()[name])
         description, folder = fmpy.read_model_description(path), fmpy.extract(path)
         identifier = description.coSimulation.modelIdentifier
-        own = FMU2Slave(
+        slave = FMU2Slave(
             guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name
         )
-        own.instantiate()
-        own.setupExperiment(startTime=0.0, stopTime=STOP)
-        own.enterInitializationMode()
-        own.exitInitializationMode()
+        slave.instantiate()
+        slave.setupExperiment(startTime=0.0, stopTime=STOP)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
         names = {variable.name: variable.valueReference for variable in description.modelVariables}
-        slaves.append((own, names))
+        slaves.append((slave, names))
         folders.append(folder)
     (plant, p), (controller, c) = slaves
     outputs, inputs = [p["x_p"], p["theta"]], [c["x_p"], c["theta"]]
@@ -72,9 +72,9 @@ def fmpy_loop():
         if k % 10 == 9:
             rows.append(plant.getReal(list(range(len(p)))[:8]))
     seconds = time.perf_counter() - start
-    for own, _ in slaves:
-        own.terminate()
-        own.freeInstance()
+    for slave, _ in slaves:
+        slave.terminate()
+        slave.freeInstance()
     for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)
     return seconds

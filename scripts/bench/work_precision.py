@@ -32,12 +32,12 @@ TITLES = {
 
 def curves():
     """For each problem, for each step control: steps and errors."""
-    found = defaultdict(lambda: defaultdict(list))
+    points = defaultdict(lambda: defaultdict(list))
     with STEM.with_suffix(".csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             point = (float(row["steps"]), float(row["largest error"]))
-            found[row["problem"]][row["step control"]].append(point)
-    return found
+            points[row["problem"]][row["step control"]].append(point)
+    return points
 
 
 def text(x, y, words, anchor="start", size=14, turned=""):

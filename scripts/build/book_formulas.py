@@ -8,10 +8,10 @@ from latex2mathml.converter import convert
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
 
-def mathml(found):
+def mathml(match):
     """The formula as MathML, inline or as a separate paragraph."""
-    display = "block" if found[2] == "[" else "inline"
-    return convert(html.unescape(found[3]), display=display)
+    display = "block" if match[2] == "[" else "inline"
+    return convert(html.unescape(match[3]), display=display)
 
 
 def on_page_content(content, **_):

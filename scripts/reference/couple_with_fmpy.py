@@ -80,16 +80,16 @@ def split(text):
 
 def links(source, target, stated):
     """Outputs of `source` and the inputs of `target` connected to them, in two lists."""
-    found = {name: name for name in target.inputs if name in source.outputs}
+    pairs = {name: name for name in target.inputs if name in source.outputs}
     for text in stated:
-        (begin, output), (end, own) = map(split, text.rsplit("=", 1))
+        (begin, output), (end, port) = map(split, text.rsplit("=", 1))
         if (begin, end) == (source.name, target.name):
-            if output not in source.outputs or own not in target.inputs:
+            if output not in source.outputs or port not in target.inputs:
                 raise ValueError(f"expected OUTPUT=INPUT, both Real, found {text}")
-            found[own] = output
-    if not found:
+            pairs[port] = output
+    if not pairs:
         raise ValueError(f"nothing goes from {source.name} to {target.name}: state --connect")
-    return list(found.values()), list(found)
+    return list(pairs.values()), list(pairs)
 
 
 def limited(slope, quotient):
@@ -130,15 +130,15 @@ def run(plant, controller, wires, step, stop_time):
 
 def summary(table, measured, t_on, compared):
     """The final outputs, and the residual after the compensation has settled."""
-    found = {"final": {name: column[-1] for name, column in table.items()}}
+    report = {"final": {name: column[-1] for name, column in table.items()}}
     settled = table["time"] > (t_on + table["time"][-1]) / 2
     if settled.any():
         amplitude = lambda name: np.ptp(table[f"plant.{name}"][settled]) / 2
-        found["residual"] = {name: amplitude(name) for name in measured}
+        report["residual"] = {name: amplitude(name) for name in measured}
         pairs = {text: [table[name] for name in text.rsplit("=", 1)] for text in compared}
         squares = {text: (one - two)[settled] ** 2 for text, (one, two) in pairs.items()}
-        found["rms"] = {text: np.sqrt(np.mean(square)) for text, square in squares.items()}
-    return found
+        report["rms"] = {text: np.sqrt(np.mean(square)) for text, square in squares.items()}
+    return report
 
 
 def write(path, table, every):

@@ -117,16 +117,16 @@ class Trial:
         if other:
             return other
         rows = numpy.load(self.folder / "timed.npy", allow_pickle=True)
-        found = compared(rows, columns(results), self.fmu.step)
-        return self.replayed(found) if found["verdict"] == "differ" else found
+        outcome = compared(rows, columns(results), self.fmu.step)
+        return self.replayed(outcome) if outcome["verdict"] == "differ" else outcome
 
-    def replayed(self, found):
+    def replayed(self, outcome):
         """If values differ: do they still differ when FMPy's functions use the step sizes of aso-ftc?"""
         log = self.folder / "calls.txt"
         options = [*self.timed(self.stop, *self.fmu.compared), "--log-calls", log]
         ended, results = self.ours("replayed", *options)
         if ended.status != 0:
-            return found
+            return outcome
         steps = [
             [float(text) for text in match.groups()]
             for match in re.finditer(r"^m fmi2DoStep\(([^,]+), ([^,]+), true\)", log.read_text(), re.MULTILINE)
@@ -134,10 +134,10 @@ class Trial:
         calls = self.file("calls", {"names": self.fmu.compared, "steps": steps})
         theirs = self.fmpy("replay", repr(self.stop), repr(self.fmu.step), calls)
         if "error" in theirs:
-            return found
+            return outcome
         rows = numpy.load(self.folder / "replay.npy", allow_pickle=True)
         same = compared(rows, columns(results), self.fmu.step)["verdict"] in ("bits", "close")
-        return verdict("steps", found["detail"]) if same else found
+        return verdict("steps", outcome["detail"]) if same else outcome
 
     def chained(self):
         """Question `chained`: are the results those of the FMU alone if it is connected to another one?"""
@@ -157,13 +157,13 @@ class Trial:
         ended, results = self.ours("chained", *link, *timed)
         if ended.status != 0:
             return verdict("lost", ended.why())
-        found = columns(results)[f"m.{port}"]
-        if found == alone:
+        column = columns(results)[f"m.{port}"]
+        if column == alone:
             return verdict("same")
-        if len(found) != len(alone):
-            return verdict("differ", f"{len(found)} rows, alone {len(alone)}")
-        row = next(row for row, pair in enumerate(zip(found, alone)) if pair[0] != pair[1])
-        return verdict("differ", f"{port} in row {row} is {found[row]}, alone {alone[row]}")
+        if len(column) != len(alone):
+            return verdict("differ", f"{len(column)} rows, alone {len(alone)}")
+        row = next(row for row, pair in enumerate(zip(column, alone)) if pair[0] != pair[1])
+        return verdict("differ", f"{port} in row {row} is {column[row]}, alone {alone[row]}")
 
     def set(self):
         """Question `set`: are parameters kept that FMPy can set?"""
@@ -179,11 +179,11 @@ class Trial:
         ended, results = self.ours("set", *settings, *self.timed(stop, *chosen))
         if ended.status != 0:
             return verdict("lost", ended.why())
-        found = columns(results)
+        table = columns(results)
         lost = [
             name
             for name, value in chosen.items()
-            if not abs(number(found.get(f"m.{name}", ["nan"])[0]) - value) <= 1e-9 * abs(value)
+            if not abs(number(table.get(f"m.{name}", ["nan"])[0]) - value) <= 1e-9 * abs(value)
         ]
         return verdict("lost", f"not as set: {', '.join(lost)}") if lost else verdict("kept")
 
@@ -233,10 +233,10 @@ def compared(theirs, ours, step):
         column = ours.get(f"m.{name}")
         if column is None:
             return verdict("differ", f"{name} is not in the results")
-        own = distance(theirs[name], column)
-        bits &= own is None
-        if own is not None and own >= worst:
-            worst, where = own, name
+        deviation = distance(theirs[name], column)
+        bits &= deviation is None
+        if deviation is not None and deviation >= worst:
+            worst, where = deviation, name
     if bits:
         return verdict("bits")
     if worst <= CLOSE:
@@ -247,7 +247,7 @@ def compared(theirs, ours, step):
 def distance(theirs, column):
     """The largest difference relative to the largest magnitude; None if all bits agree."""
     if theirs.dtype.kind not in "fiub":
-        texts = [own.decode("utf-8", "replace") if isinstance(own, bytes) else str(own) for own in theirs]
+        texts = [value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value) for value in theirs]
         return None if texts == column else math.inf
     theirs, ours = theirs.astype(float), numpy.array([number(text) for text in column])
     if numpy.array_equal(theirs, ours, equal_nan=True):

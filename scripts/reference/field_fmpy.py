@@ -70,7 +70,7 @@ def replay(fmu, out, stop, chosen):
     return {"reached": rows[-1][0]}
 
 
-def kept(fmu, stop, step, values):
+def accepted_starts(fmu, stop, step, values):
     """Simulates with start values; returns which of them are in the first row."""
     rows = fmpy.simulate_fmu(
         fmu, stop_time=stop, output_interval=step, start_values=values, output=list(values), **COMMON
@@ -89,7 +89,7 @@ def main():
         "defaults": lambda: defaults(fmu),
         "timed": lambda: timed(fmu, out, numbers[0], numbers[1], chosen),
         "replay": lambda: replay(fmu, out, numbers[0], chosen),
-        "set": lambda: kept(fmu, numbers[0], numbers[1], chosen),
+        "set": lambda: accepted_starts(fmu, numbers[0], numbers[1], chosen),
     }
     try:
         said = calls[task]()

@@ -38,13 +38,13 @@ def find(folders, only=""):
     paths = set()
     for folder in folders:
         paths |= set(folder.rglob("*.fmu")) if folder.is_dir() else {folder}
-    fmus, left_out, seen = [], Counter(), set()
+    fmus, left_out, digests = [], Counter(), set()
     for path in sorted(path.resolve() for path in paths if only in str(path)):
         try:
             fmu, content = read(path), hashlib.sha256(path.read_bytes()).digest()
-            if content in seen:
+            if content in digests:
                 raise LeftOut("that are copies of another")
-            seen.add(content)
+            digests.add(content)
             fmus.append(fmu)
         except LeftOut as reason:
             left_out[str(reason)] += 1
@@ -102,7 +102,7 @@ def experiment(fmu, element):
 def variables(fmu, root):
     """The outputs to compare and to connect, and parameters with a value a thousandth above their start value."""
     outputs, local = [], []
-    types = {own.get("name"): own.find("Real") for own in root.iter("SimpleType")}
+    types = {simple_type.get("name"): simple_type.find("Real") for simple_type in root.iter("SimpleType")}
     for variable in root.iter("ScalarVariable"):
         name, causality, real = variable.get("name", ""), variable.get("causality"), variable.find("Real")
         if causality == "output":

@@ -44,12 +44,12 @@ def run(command, limit, folder):
         start_new_session=True,
         bufsize=0,
     )
-    kept = bytearray()
+    output = bytearray()
 
     def drain():
         while chunk := process.stdout.read(KEPT):
-            kept.extend(chunk)
-            del kept[:-KEPT]
+            output.extend(chunk)
+            del output[:-KEPT]
 
     reader = threading.Thread(target=drain, daemon=True)
     reader.start()
@@ -60,7 +60,7 @@ def run(command, limit, folder):
     finally:
         end_group(process)
     reader.join(5.0)
-    return Ended(status, kept.decode("utf-8", "replace"))
+    return Ended(status, output.decode("utf-8", "replace"))
 
 
 def end_group(process):

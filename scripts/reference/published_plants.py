@@ -65,8 +65,8 @@ def by_scipy(plant):
     """The lowest of each figure over the methods that reach the eigenvalues, or None."""
     (_, *feedback), (_, *observer) = plant.pairs()
     gains, observers = placed(*feedback[:3]), placed(*observer[:3])
-    found = [figures(plant, gains[one][0], observers[one][0].T) for one in METHODS if one in gains and one in observers]
-    return Figures(*(min(values) for values in zip(*(vars(one).values() for one in found)))) if found else None
+    candidates = [figures(plant, gains[one][0], observers[one][0].T) for one in METHODS if one in gains and one in observers]
+    return Figures(*(min(values) for values in zip(*(vars(one).values() for one in candidates)))) if candidates else None
 
 
 def designed(file, sample_time, requirements=True):
@@ -100,17 +100,17 @@ def compared(file, sampled):
     plant = Plant(file.stem, data, sampled)
     report = designed(file, plant.sample_time)
     matrix = {one["name"]: np.array(one["values"]) for one in report["gains"]}
-    own = figures(plant, -matrix["K_x"], np.vstack([matrix["L_x"], matrix["L_f"]]))
-    return report, own, by_scipy(plant)
+    design = figures(plant, -matrix["K_x"], np.vstack([matrix["L_x"], matrix["L_f"]]))
+    return report, design, by_scipy(plant)
 
 
-def pair(own, scipy):
-    return f"{own:.3g} / {scipy:.3g}" if scipy is not None else f"{own:.3g} / -"
+def pair(value, scipy):
+    return f"{value:.3g} / {scipy:.3g}" if scipy is not None else f"{value:.3g} / -"
 
 
 def row(file, sampled):
-    report, own, scipy = compared(file, sampled)
-    values = [pair(value, getattr(scipy, name, None)) for name, value in vars(own).items()]
+    report, design, scipy = compared(file, sampled)
+    values = [pair(value, getattr(scipy, name, None)) for name, value in vars(design).items()]
     disks = [point["together"]["alpha"] for point in report["robustness"]["points"]]
     stable = 100 * report["robustness"]["tolerance"]["stable"]
     name = file.stem + (f", {SAMPLE_TIMES.get(file.stem, SAMPLE_TIME)} s" if sampled else "")
@@ -131,8 +131,8 @@ def chosen(file, sampled):
 
 def table(heads, rows):
     print("| " + " | ".join(heads) + " |\n" + "|---" * len(heads) + "|")
-    for own in rows:
-        print("| " + " | ".join(own) + " |", flush=True)
+    for cells in rows:
+        print("| " + " | ".join(cells) + " |", flush=True)
 
 
 def main():

@@ -53,8 +53,8 @@ def distance(a, b):
     side = np.linspace(-2.0, 2.0, 161)
     starts = sorted((least((x, y)), x, y) for x in side for y in side if y >= 0.0)[:40]
     options = dict(xatol=1e-12, fatol=1e-14, maxiter=4000)
-    found = [minimize(least, start[1:], method="Nelder-Mead", options=options) for start in starts]
-    best = min(found, key=lambda result: result.fun)
+    minima = [minimize(least, start[1:], method="Nelder-Mead", options=options) for start in starts]
+    best = min(minima, key=lambda result: result.fun)
     return np.array([[best.fun, best.x[0], abs(best.x[1])]])
 
 

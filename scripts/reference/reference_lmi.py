@@ -205,8 +205,8 @@ def main():
     versions = f"numpy {np.__version__}, scipy {scipy.__version__}, cvxpy {cp.__version__}"
     lines = [f"# scripts/reference/reference_lmi.py: {versions}"]
     for cases in (norm_cases, synthesis_cases, radius_cases):
-        for found in cases(random):
-            lines += found
+        for block in cases(random):
+            lines += block
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates/control/tests/data/lmi.txt"
     target.write_text("\n".join(lines) + "\n")
 

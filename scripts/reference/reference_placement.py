@@ -80,8 +80,8 @@ def peak(a, b, c, sampled):
 
     last = np.pi if sampled else 100 * np.abs(modes).max()
     grid = np.geomspace(1e-2 * np.abs(modes).min(), last, 300)
-    own = [np.abs(modes), np.abs(modes.imag)]
-    grid = np.unique(np.concatenate([[0.0, last], grid, *own]))
+    resonances = [np.abs(modes), np.abs(modes.imag)]
+    grid = np.unique(np.concatenate([[0.0, last], grid, *resonances]))
     grid = grid[grid <= last]
     values = size(grid)
     best = values.max()
@@ -97,7 +97,7 @@ def peak(a, b, c, sampled):
 
 def placed(a, b, required):
     """The results of scipy: for each method gain, condition number and pole error."""
-    found = {}
+    placements = {}
     for method in METHODS:
         if method == "KNV0" and np.any(required.imag):
             continue
@@ -110,8 +110,8 @@ def placed(a, b, required):
         condition = np.linalg.cond(vectors / np.linalg.norm(vectors, axis=0))
         error = distance(np.linalg.eigvals(a - b @ result.gain_matrix), required)
         if error < 1e-6:
-            found[method] = result.gain_matrix, condition, error
-    return found
+            placements[method] = result.gain_matrix, condition, error
+    return placements
 
 
 def is_stable(required, sampled):
@@ -119,15 +119,15 @@ def is_stable(required, sampled):
 
 
 def best(a, b, required, sampled):
-    found = placed(a, b, required)
-    if not found:
+    placements = placed(a, b, required)
+    if not placements:
         return None
-    method = min(found, key=lambda method: found[method][1])
-    gain = min(np.linalg.norm(k, 2) for k, _, _ in found.values())
+    method = min(placements, key=lambda method: placements[method][1])
+    gain = min(np.linalg.norm(k, 2) for k, _, _ in placements.values())
     s_peak = np.nan
     if is_stable(required, sampled):
-        s_peak = min(peak(a - b @ k, b, -k, sampled) for k, _, _ in found.values())
-    return found[method][1], gain, s_peak, method, found[method][2]
+        s_peak = min(peak(a - b @ k, b, -k, sampled) for k, _, _ in placements.values())
+    return placements[method][1], gain, s_peak, method, placements[method][2]
 
 
 def pendulum():
@@ -197,27 +197,27 @@ class Plant:
             a, b = whole[:n, :n], whole[:n, n:]
         self.a, self.b, self.c = a, b, c
         # The faults add to the commands.
-        kept = np.eye(m) if sampled else np.zeros((m, m))
-        self.a_0 = block_diag(a, kept)
+        fault_dynamics = np.eye(m) if sampled else np.zeros((m, m))
+        self.a_0 = block_diag(a, fault_dynamics)
         self.a_0[:n, n:] = b
         self.c_0 = np.hstack([c, np.zeros((p, m))])
 
     def pairs(self):
-        seen = self.c_0 @ self.a_0 if self.current else self.c_0
+        output_matrix = self.c_0 @ self.a_0 if self.current else self.c_0
         sampled = self.sample_time > 0
         domain = "sampled" if sampled else "continuous"
         yield f"{self.name}, {domain} feedback", self.a, self.b, self.poles[0], sampled
-        yield f"{self.name}, {domain} observer", self.a_0.T, seen.T, self.poles[1], sampled
+        yield f"{self.name}, {domain} observer", self.a_0.T, output_matrix.T, self.poles[1], sampled
 
     def peaks(self):
         """The lowest peaks of S at input and output over loops by one method."""
         (_, *feedback), (_, *observer) = self.pairs()
         gains, observers = placed(*feedback[:3]), placed(*observer[:3])
-        found = [self.peaks_of(gains[one][0], observers[one][0].T) for one in METHODS if one in gains and one in observers]
-        return [min(values) for values in zip(*found)] if found else None
+        peaks = [self.peaks_of(gains[one][0], observers[one][0].T) for one in METHODS if one in gains and one in observers]
+        return [min(values) for values in zip(*peaks)] if peaks else None
 
     def peaks_of(self, k, l):
-        """The feedback is -k; the observer a_0 - l seen."""
+        """The feedback is -k; the observer a_0 - l output_matrix."""
         (n, m), q = self.b.shape, self.b.shape[1]
         command = -np.hstack([k, np.eye(q)])
         b_0 = np.vstack([self.b, np.zeros((q, m))])
@@ -267,11 +267,11 @@ def main():
     heading = f"# scripts/reference/reference_placement.py: numpy {np.__version__}, scipy {scipy.__version__} place_poles; seed {SEED}; "
     of_plants = plants()
     pairs = [pair for plant in of_plants for pair in plant.pairs()]
-    found = [(*system, best(*system[1:])) for system in [*named(), *random_systems(), *pairs]]
-    lines = [line(*system) for system in found if system[-1]]
-    missing = ", ".join(system[0] for system in found if not system[-1])
+    results = [(*system, best(*system[1:])) for system in [*named(), *random_systems(), *pairs]]
+    lines = [line(*system) for system in results if system[-1]]
+    missing = ", ".join(system[0] for system in results if not system[-1])
     with (folder / "placement_reference.txt").open("w") as file:
-        file.write(heading + f"{len(found) - len(lines)} left out: {missing}\n" + "\n".join(lines) + "\n")
+        file.write(heading + f"{len(results) - len(lines)} left out: {missing}\n" + "\n".join(lines) + "\n")
     loops = [(plant, plant.peaks()) for plant in of_plants]
     lines = [loop_line(plant, peaks) for plant, peaks in loops if peaks]
     missing = ", ".join(f"{plant.name} at {plant.sample_time} s" for plant, peaks in loops if not peaks)

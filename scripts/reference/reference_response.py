@@ -80,12 +80,12 @@ class Modes:
 
 def gains(a, b, c, d):
     """Peak-to-peak gains of all channels."""
-    found = np.zeros((c.shape[0], b.shape[1]))
+    peak_gains = np.zeros((c.shape[0], b.shape[1]))
     for j in range(b.shape[1]):
         modes = Modes(a, b[:, j], c)
         for i in range(c.shape[0]):
-            found[i, j] = abs(d[i, j]) + modes.variation(i)
-    return found
+            peak_gains[i, j] = abs(d[i, j]) + modes.variation(i)
+    return peak_gains
 
 
 def random_system(random, case, sampled):

@@ -67,10 +67,10 @@ def gain(p, a, b, r, n, sampled):
     return -(r**-1) * (b.T * p + n.T)
 
 
-def distance(found, exact):
+def distance(solution, exact):
     size = np.sqrt(np.abs(np.diag(exact)))
     size[size == 0] = 1
-    return np.max(np.abs(found - exact) / np.outer(size, size))
+    return np.max(np.abs(solution - exact) / np.outer(size, size))
 
 
 def pendulum():
@@ -160,8 +160,8 @@ def write_lyapunov(file, random):
         q = root @ root.T
         q = (q + q.T) / 2
         p = low(lyapunov(high(a), high(q), True))
-        found = linalg.solve_discrete_lyapunov(a.T, q)
-        write(file, "lyapunov", f"random {case}", A=a, Q=q, P=p, scipy=[[distance(found, p)]])
+        solution = linalg.solve_discrete_lyapunov(a.T, q)
+        write(file, "lyapunov", f"random {case}", A=a, Q=q, P=p, scipy=[[distance(solution, p)]])
 
 
 def write_holds(file, random):

@@ -77,8 +77,8 @@ class Loop:
 
     def channel(self, point, i):
         t = -np.array([self.response(point, w)[i, i] for w in self.grid])
-        found = ct.stability_margins(ct.frd(t / (1 - t), self.grid, smooth=True), returnall=True)
-        gains, phases, _, _, frequencies, _ = found
+        margins = ct.stability_margins(ct.frd(t / (1 - t), self.grid, smooth=True), returnall=True)
+        gains, phases, _, _, frequencies, _ = margins
         gains = list(gains)
         if self.period:
             # python-control looks for crossings inside the grid; at the Nyquist frequency L is real.
@@ -162,29 +162,29 @@ def lqg(a, b, c, period):
     """An LQG controller with a constant disturbance at each command estimated and cancelled."""
     n, m, p = len(a), b.shape[1], len(c)
     w = np.block([[a, b], [np.zeros((m, n + m))]])
-    seen, given = np.hstack([c, np.zeros((p, m))]), np.vstack([b, np.zeros((m, m))])
+    output_matrix, input_matrix = np.hstack([c, np.zeros((p, m))]), np.vstack([b, np.zeros((m, m))])
     if period:
-        w, given = zoh(w, given, period)
+        w, input_matrix = zoh(w, input_matrix, period)
         solve = sl.solve_discrete_are
     else:
         solve = sl.solve_continuous_are
-    ad, bd = w[:n, :n], given[:n]
+    ad, bd = w[:n, :n], input_matrix[:n]
     x = solve(ad, bd, np.eye(n), np.eye(m))
-    y = solve(w.T, seen.T, 10 * np.eye(n + m), np.eye(p))
+    y = solve(w.T, output_matrix.T, 10 * np.eye(n + m), np.eye(p))
     if period:
         k = np.linalg.solve(np.eye(m) + bd.T @ x @ bd, bd.T @ x @ ad)
-        l = w @ y @ seen.T @ np.linalg.inv(np.eye(p) + seen @ y @ seen.T)
+        l = w @ y @ output_matrix.T @ np.linalg.inv(np.eye(p) + output_matrix @ y @ output_matrix.T)
     else:
-        k, l = bd.T @ x, y @ seen.T
+        k, l = bd.T @ x, y @ output_matrix.T
     k = -np.hstack([k, np.eye(m)])
-    return w + given @ k - l @ seen, l, k, np.zeros((m, p))
+    return w + input_matrix @ k - l @ output_matrix, l, k, np.zeros((m, p))
 
 
 def pendulum():
     d = tomllib.loads((ROOT / "fmu-controller/resources/design.toml").read_text())
     a, b, c, f, kx, kf, lx, lf = (np.array(d[key]) for key in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"))
-    own = np.block([[a + b @ kx - lx @ c, f + b @ kf], [-lf @ c, np.zeros((1, 1))]])
-    return Loop((a, b, c), (own, np.vstack([lx, lf]), np.hstack([kx, kf]), np.zeros((1, 2))), 0.0)
+    dynamics = np.block([[a + b @ kx - lx @ c, f + b @ kf], [-lf @ c, np.zeros((1, 1))]])
+    return Loop((a, b, c), (dynamics, np.vstack([lx, lf]), np.hstack([kx, kf]), np.zeros((1, 2))), 0.0)
 
 
 def main():

@@ -101,8 +101,8 @@ def couple(controller, folder, text=None, bit_rate=500_000, settings=(), stop_ti
 def frames(trace):
     """The frames of a trace by candump: times and identifiers."""
     pattern = re.compile(r"\((.*)\) can0 (\w+)#")
-    found = [pattern.match(line).groups() for line in trace.read_text(encoding="utf-8").splitlines()]
-    return np.array([float(time) for time, _ in found]), np.array([int(name, 16) for _, name in found])
+    entries = [pattern.match(line).groups() for line in trace.read_text(encoding="utf-8").splitlines()]
+    return np.array([float(time) for time, _ in entries]), np.array([int(name, 16) for _, name in entries])
 
 
 def longest_delay(trace, schedule):

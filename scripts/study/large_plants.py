@@ -69,7 +69,7 @@ if __name__ == "__main__":
     parser.add_argument("--placement", action="store_true")
     parser.add_argument("--sample-time", type=float)
     parser.add_argument("--seed", type=int)
-    given = parser.parse_args()
-    if given.states % 2 or given.states < 2 * COMMANDS:
-        parser.error(f"expected an even number of states, {2 * COMMANDS} or more, found {given.states}")
-    print(plant_file(given.states, given.placement, given.sample_time, given.seed), end="")
+    options = parser.parse_args()
+    if options.states % 2 or options.states < 2 * COMMANDS:
+        parser.error(f"expected an even number of states, {2 * COMMANDS} or more, found {options.states}")
+    print(plant_file(options.states, options.placement, options.sample_time, options.seed), end="")

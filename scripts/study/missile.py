@@ -74,8 +74,8 @@ def linearised(mach):
     """A, B, C, x_op, u_op and y_op: central differences of the equations, whose error is below 1e-8 of the largest entry."""
     (x, u), step = rest(mach), 1e-5
     columns = [(derivatives(x + step * e, u, mach) - derivatives(x - step * e, u, mach)) / (2 * step) for e in np.eye(4)]
-    seen = [(outputs(x + step * e, mach) - outputs(x - step * e, mach)) / (2 * step) for e in np.eye(4)]
-    return np.array(columns).T, np.array([[0.0], [0], [0], [OMEGA**2]]), np.array(seen).T, x, u, outputs(x, mach)
+    output_columns = [(outputs(x + step * e, mach) - outputs(x - step * e, mach)) / (2 * step) for e in np.eye(4)]
+    return np.array(columns).T, np.array([[0.0], [0], [0], [OMEGA**2]]), np.array(output_columns).T, x, u, outputs(x, mach)
 
 
 def main():

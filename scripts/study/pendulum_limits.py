@@ -72,10 +72,10 @@ class Loop:
 
     def __init__(self, design):
         names = ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f")
-        own = {name: np.array(design[name], dtype=float) for name in names}
-        self.c, self.k = own["C"], np.hstack([own["K_x"], own["K_f"]])
-        a_0 = np.block([[own["A"], own["F_a"]], [np.zeros((1, 5))]]) + np.vstack([own["B"], [[0]]]) @ self.k
-        self.l = np.vstack([own["L_x"], own["L_f"]])
+        matrices = {name: np.array(design[name], dtype=float) for name in names}
+        self.c, self.k = matrices["C"], np.hstack([matrices["K_x"], matrices["K_f"]])
+        a_0 = np.block([[matrices["A"], matrices["F_a"]], [np.zeros((1, 5))]]) + np.vstack([matrices["B"], [[0]]]) @ self.k
+        self.l = np.vstack([matrices["L_x"], matrices["L_f"]])
         self.observer = a_0 - self.l @ np.hstack([self.c, np.zeros((len(self.c), 1))])
 
     def dynamics(self, **parameters):
@@ -142,14 +142,14 @@ def first_unstable(loop, masses):
 def row(name, changes):
     """A row of the table."""
     report, design = designed(changes)
-    own, found = figures(design, 1000), report["robustness"]
-    point = found["points"][1]
-    noise = [one["value"] for one in found["noise_together"]]
-    limits = " and ".join(f"{mass:.2f} kg" for mass in (own.lightest, own.heaviest) if np.isfinite(mass))
+    masses, robustness = figures(design, 1000), report["robustness"]
+    point = robustness["points"][1]
+    noise = [one["value"] for one in robustness["noise_together"]]
+    limits = " and ".join(f"{mass:.2f} kg" for mass in (masses.lightest, masses.heaviest) if np.isfinite(mass))
     return (
-        f"| {name} | {point['judged']:.2f} | {point['together']['alpha']:.2f} | {1e3 * found['delay_margin']:.1f} ms | "
-        f"{1e3 * found['longest_hold']:.1f} ms | {noise[0]:.3g} N | {noise[1]:.3g} N | {found['tolerance']['stable']:.0%} | "
-        f"{found['tolerance']['worst_instability']:.2f} | {limits} | "
+        f"| {name} | {point['judged']:.2f} | {point['together']['alpha']:.2f} | {1e3 * robustness['delay_margin']:.1f} ms | "
+        f"{1e3 * robustness['longest_hold']:.1f} ms | {noise[0]:.3g} N | {noise[1]:.3g} N | {robustness['tolerance']['stable']:.0%} | "
+        f"{robustness['tolerance']['worst_instability']:.2f} | {limits} | "
         f"{report['verdict']['level']} |"
     )
 

@@ -67,15 +67,15 @@ def plant_file(choice, sample_time):
     """The text of fmu-controller/pendulum.toml with these changes; `sample_time` in s."""
     text = (ROOT / "fmu-controller" / "pendulum.toml").read_text(encoding="utf-8")
     before, after = text.split("observer.eigenvalues = ")
-    wanted, after = after.split("\n", 1)
-    wanted = "observer.eigenvalues = " + wanted
+    observer, after = after.split("\n", 1)
+    observer = "observer.eigenvalues = " + observer
     if choice.kind == "ramp":
-        wanted = wanted.replace("]", ", -2500.0]")
+        observer = observer.replace("]", ", -2500.0]")
     if choice.weighted:
         rate = min(OF_A_SAMPLE / sample_time, BANDWIDTH)
-        wanted = f"observer.W = [0, 0, 0, 0, 0, {rate**8!r}]\nobserver.V = [1, 1]"
+        observer = f"observer.W = [0, 0, 0, 0, 0, {rate**8!r}]\nobserver.V = [1, 1]"
     sampled = f'sample_time = {sample_time!r}\nestimator = "{choice.estimator}"\n'
-    return f'{before}{wanted}\n{sampled}{after}kind = "{choice.kind}"\n'
+    return f'{before}{observer}\n{sampled}{after}kind = "{choice.kind}"\n'
 
 
 def design(choice, sample_time, folder):
@@ -125,16 +125,16 @@ def noise_gain(design_file):
     a, b, c, f_a, l_x = map(matrix, ("A", "B", "C", "F_a", "L_x"))
     n, q = f_a.shape
     a_f = np.array(values.get("A_f", np.eye(q)))
-    seen, fault = np.hstack([c, np.zeros((len(c), q))]), np.zeros((q, n))
+    output_matrix, fault = np.hstack([c, np.zeros((len(c), q))]), np.zeros((q, n))
     free, enters = np.block([[a, f_a], [fault, a_f]]), np.vstack([b, np.zeros((q, 1))])
     gain, feedback = np.vstack([l_x, matrix("L_f")]), np.hstack([matrix("K_x"), matrix("K_f")])
     if values["estimator"] == "current":
-        kept = np.eye(n + q) - gain @ seen
-        out, direct, loop = feedback @ kept, feedback @ gain, free + enters @ feedback
-        observer, entry = loop @ kept, loop @ gain
+        correction = np.eye(n + q) - gain @ output_matrix
+        out, direct, loop = feedback @ correction, feedback @ gain, free + enters @ feedback
+        observer, entry = loop @ correction, loop @ gain
     else:
         out, direct = feedback, np.zeros((1, len(c)))
-        observer, entry = free + enters @ feedback - gain @ seen, gain
+        observer, entry = free + enters @ feedback - gain @ output_matrix, gain
     whole = np.block([[a + b @ direct @ c, b @ out], [entry @ c, observer]])
     noise, command = np.vstack([b @ direct, entry]), np.hstack([direct @ c, out])
     return [

@@ -50,10 +50,10 @@ class Page:
 
     async def _call(self, method, values):
         await self._send(method, values)
-        own = self.number
+        number = self.number
         while True:
             message = json.loads(await asyncio.wait_for(self.connection.read_message(), LIMIT))
-            if message.get("id") == own:
+            if message.get("id") == number:
                 assert "error" not in message, message
                 return message["result"]
             await self._note(message)
@@ -129,11 +129,11 @@ class Page:
 
     def violations(self):
         """What axe-core finds serious or critical in the page, light and dark: scheme, rule and elements."""
-        found = []
+        findings = []
         for scheme in ("light", "dark"):
             self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-            found += [(scheme, *rule) for rule in self.serious()]
-        return found
+            findings += [(scheme, *rule) for rule in self.serious()]
+        return findings
 
     def picture(self, path):
         """Writes a screenshot of the whole page."""

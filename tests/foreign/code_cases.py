@@ -118,8 +118,8 @@ def held(text, has_limit=True):
     if "[[measurements]]" in text:
         return text.replace("[[measurements]]", "\n".join(["[[measurements]]", *entries]))
     [line] = re.findall(r"^measurements = .*$", text, flags=re.MULTILINE)
-    signals = [own if isinstance(own, dict) else {"name": own} for own in tomllib.loads(line)["measurements"]]
-    tables = [", ".join([*(f"{key} = {json.dumps(value)}" for key, value in own.items()), *entries]) for own in signals]
+    signals = [signal if isinstance(signal, dict) else {"name": signal} for signal in tomllib.loads(line)["measurements"]]
+    tables = [", ".join([*(f"{key} = {json.dumps(value)}" for key, value in signal.items()), *entries]) for signal in signals]
     return text.replace(line, f"measurements = [{', '.join(f'{{ {table} }}' for table in tables)}]")
 
 
@@ -211,8 +211,8 @@ class Built:
         self.folder, self.single = folder, "--float" in options
         plant = folder / f"{name}.toml"
         plant.write_text(text, encoding="utf-8")
-        wanted = ("--out", folder / "design.toml", "--c-code", folder / "c", "--no-std", folder / "rust")
-        self.done = aso_ftc("design", plant, *wanted, "--certificate-time", "0", *options)
+        outputs = ("--out", folder / "design.toml", "--c-code", folder / "c", "--no-std", folder / "rust")
+        self.done = aso_ftc("design", plant, *outputs, "--certificate-time", "0", *options)
         assert self.done.returncode in (0, 1), self.done.stderr
         self.design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
         [header] = (path for path in (folder / "c").glob("*.h") if path.name != "aso_controller.h")
@@ -245,12 +245,12 @@ class Built:
 
     def has(self, name):
         """Whether the controller has references, a scheduling variable that is no measurement, a detection, or others gains."""
-        own = self.design.get(name)
+        entry = self.design.get(name)
         if name == "reconfigurations":
-            return bool(own or "fallback" in self.design)
-        if name == "schedule" and own:
-            return own["variable"] not in [signal["name"] for signal in self.design["measurements"]]
-        return bool(own)
+            return bool(entry or "fallback" in self.design)
+        if name == "schedule" and entry:
+            return entry["variable"] not in [signal["name"] for signal in self.design["measurements"]]
+        return bool(entry)
 
     @property
     def sizes(self):
@@ -284,7 +284,7 @@ class Plant:
             self.c, self.sensors = self.a[n:, :n] / w, self.f_a[n:] / w
             self.a, self.b, self.f_a = self.a[:n, :n], self.b[:n], self.f_a[:n]
         self.x, self.d = np.zeros(len(self.a)), np.array(design.get("D", np.zeros((len(self.c), self.b.shape[1]))))
-        operating = lambda name: np.array([own.get("operating", 0.0) for own in design[name]])
+        operating = lambda name: np.array([signal.get("operating", 0.0) for signal in design[name]])
         self.u_op, self.y_op = operating("actuators"), operating("measurements")
         self.x_op, self.u = operating("states"), self.u_op
 
@@ -304,7 +304,7 @@ def bound_of(header):
     return np.array([[float(line.split()[1]) for line in group.strip().splitlines()[1:]] for group in groups])
 
 
-def stated(own):
+def stated(controller):
     """The largest numbers of operations that the header of a design states."""
-    text = own.header.replace("\n *", "")
+    text = controller.header.replace("\n *", "")
     return {kind: int(re.search(rf"(\d+) {kind}", text).group(1)) for kind in ("multiplications", "additions", "comparisons", "divisions")}

@@ -13,9 +13,9 @@ class Schedule(ScheduledDesign):
 
     def __init__(self, text):
         super().__init__(text)
-        assert "sample_time" not in self.own
-        self.p = len(self.own["measurements"])
-        self.filter = np.array(self.own["filter"]) if "filter" in self.own else None
+        assert "sample_time" not in self.file
+        self.p = len(self.file["measurements"])
+        self.filter = np.array(self.file["filter"]) if "filter" in self.file else None
 
     def start(self, at):
         """z at the operating point of a point, in the order of the FMU's states."""
@@ -25,40 +25,40 @@ class Schedule(ScheduledDesign):
 
     def equations(self, z, y, r, value, limited=True):
         """z' and the commands."""
-        own = self.numbers(value)
+        point = self.numbers(value)
         filters = 0 if self.filter is None else self.p
         x_hat, f_hat, y_f, x_i = np.split(z, np.cumsum([self.n, self.q, filters]))
-        seen = y if self.filter is None else y_f
-        x, e, r = x_hat - own["x_op"], seen - own["y_op"], r - own.get("r_op", np.zeros(0))
-        e = e - own["C"] @ x
+        output = y if self.filter is None else y_f
+        x, e, r = x_hat - point["x_op"], output - point["y_op"], r - point.get("r_op", np.zeros(0))
+        e = e - point["C"] @ x
         # With a direct term the state is the integral part of the estimate.
-        fault = f_hat + own["P_f"] @ e if "P_f" in own else f_hat
-        v = own["u_op"] + own["K_x"] @ x + own["K_f"] @ fault
-        if "N_r" in own:
-            v = v + own["N_r"] @ r
+        fault = f_hat + point["P_f"] @ e if "P_f" in point else f_hat
+        v = point["u_op"] + point["K_x"] @ x + point["K_f"] @ fault
+        if "N_r" in point:
+            v = v + point["N_r"] @ r
         if self.integrals:
-            v = v + own["K_i"] @ x_i
+            v = v + point["K_i"] @ x_i
         u = np.clip(v, *self.limits) if limited else v
-        parts = [own["A"] @ x + own["B"] @ (u - own["u_op"]) + own["F_a"] @ f_hat + own["L_x"] @ e, own["L_f"] @ e]
+        parts = [point["A"] @ x + point["B"] @ (u - point["u_op"]) + point["F_a"] @ f_hat + point["L_x"] @ e, point["L_f"] @ e]
         if self.filter is not None:
             parts.append(self.filter * (y - y_f))
         if self.integrals:
-            slope = r - np.array(self.own["H"]) @ (y - own["y_op"])
-            if "F_i" in self.own:
-                slope = slope + np.array(self.own["F_i"]) @ fault
-            parts.append(slope + (own["L_w"] @ (u - v) if "L_w" in own else 0))
+            slope = r - np.array(self.file["H"]) @ (y - point["y_op"])
+            if "F_i" in self.file:
+                slope = slope + np.array(self.file["F_i"]) @ fault
+            parts.append(slope + (point["L_w"] @ (u - v) if "L_w" in point else 0))
         return np.concatenate(parts), u
 
     def loop(self, value):
         """The dynamics of the interpolated plant with the controller without a filter, of [x; z]."""
-        own, size = self.numbers(value), self.n + len(self.start(self.at[0]))
-        rest = np.concatenate([own["x_op"], own["x_op"], np.zeros(self.q + self.integrals)])
+        point, size = self.numbers(value), self.n + len(self.start(self.at[0]))
+        rest = np.concatenate([point["x_op"], point["x_op"], np.zeros(self.q + self.integrals)])
         columns = []
         for unit in np.eye(size):
             x, z = np.split(rest + unit, [self.n])
-            y = own["y_op"] + own["C"] @ unit[: self.n]
-            slope, u = self.equations(z, y, own.get("r_op", np.zeros(0)), value, limited=False)
-            columns.append(np.concatenate([own["A"] @ unit[: self.n] + own["B"] @ (u - own["u_op"]), slope]))
+            y = point["y_op"] + point["C"] @ unit[: self.n]
+            slope, u = self.equations(z, y, point.get("r_op", np.zeros(0)), value, limited=False)
+            columns.append(np.concatenate([point["A"] @ unit[: self.n] + point["B"] @ (u - point["u_op"]), slope]))
         return np.array(columns).T
 
 
@@ -83,13 +83,13 @@ class Exchanged:
 
     def at(self, time, z, inputs):
         """The derivatives of the states."""
-        own = self.instance
-        own.must("SetTime", time)
-        own.must("SetContinuousStates", reals(*z), len(z))
-        own.set(inputs)
+        instance = self.instance
+        instance.must("SetTime", time)
+        instance.must("SetContinuousStates", reals(*z), len(z))
+        instance.set(inputs)
         slopes = reals(*([0.0] * len(z)))
         # The first value outside of the points is a warning.
-        assert own.call("GetDerivatives", slopes, len(z)) in (OK, WARNING)
+        assert instance.call("GetDerivatives", slopes, len(z)) in (OK, WARNING)
         return np.array(slopes)
 
     def event(self, time):
@@ -101,16 +101,16 @@ class Exchanged:
         self.instance.must("EnterContinuousTimeMode")
 
 
-def check_certificate(schedule, found):
+def check_certificate(schedule, certificate):
     """Checks the inequalities of a report's schedule at 201 values between the points; returns the proven rate, 0 for any rate."""
     values = np.linspace(schedule.at[0], schedule.at[-1], 201)
     loops = [schedule.loop(value) for value in values]
     worst = max(np.linalg.eigvals(a).real.max() for a in loops)
-    assert found["worst_instability"] >= worst - 1e-6 and worst < 0
-    if "p" in found["any_rate"]:
-        grid, fastest = [np.array(found["any_rate"]["p"])] * len(schedule.at), 0.0
+    assert certificate["worst_instability"] >= worst - 1e-6 and worst < 0
+    if "p" in certificate["any_rate"]:
+        grid, fastest = [np.array(certificate["any_rate"]["p"])] * len(schedule.at), 0.0
     else:
-        grid, fastest = [np.array(p) for p in found["bounded_rate"]["p"]], found["bounded_rate"]["rate"]
+        grid, fastest = [np.array(p) for p in certificate["bounded_rate"]["p"]], certificate["bounded_rate"]["rate"]
         assert fastest > 0
     for value, a in zip(values, loops):
         k = min(np.searchsorted(schedule.at, value, side="right"), len(schedule.at) - 1) - 1

@@ -39,8 +39,8 @@ class Designed:
     def __init__(self, aso_ftc, plant_file, folder):
         self.folder, self.fmu = Path(folder), Path(folder) / "Designed.fmu"
         file = self.folder / "design.toml"
-        wanted = ("--out", file, "--report", self.folder / "report.html", "--fmu", self.fmu, "--json")
-        done = aso_ftc("design", ROOT / plant_file, *wanted)
+        outputs = ("--out", file, "--report", self.folder / "report.html", "--fmu", self.fmu, "--json")
+        done = aso_ftc("design", ROOT / plant_file, *outputs)
         assert done.returncode in (0, 1), done.stderr
         self.report = json.loads(done.stdout)
         assert done.returncode == (self.report["verdict"]["level"] == "red")
@@ -56,8 +56,8 @@ class Designed:
         inside = unpacked / "documentation" / "report.html"
         assert inside.read_text(encoding="utf-8") == self.page
         assert self.page.startswith("<!DOCTYPE html>") and self.report["description"] in self.page
-        own = (unpacked / "resources" / "design.toml").read_text(encoding="utf-8")
-        assert tomllib.loads(own) == self.design
+        text = (unpacked / "resources" / "design.toml").read_text(encoding="utf-8")
+        assert tomllib.loads(text) == self.design
 
     def estimate(self, name):
         """The qualified name of the estimate of a fault."""

@@ -45,7 +45,7 @@ class Matrices:
         return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
 
 
-def made(aso_ftc, folder, text):
+def design_and_report(aso_ftc, folder, text):
     """The matrices of the design file for a plant file, and the report; None and the error if it is refused."""
     plant, file = folder / "plant.toml", folder / "design.toml"
     plant.write_text(text, encoding="utf-8")
@@ -56,36 +56,36 @@ def made(aso_ftc, folder, text):
     return Matrices(tomllib.loads(file.read_text(encoding="utf-8"))), json.loads(done.stdout)
 
 
-def commands(own):
+def commands(matrices):
     """u = K_x x_hat + K_f f_hat as a matrix for [x; x_hat; f_hat]; with a current estimator after the correction."""
-    n, q = own.n, own.q
+    n, q = matrices.n, matrices.q
     x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
-    if own.current:
-        innovation = own.C @ (x - x_hat)
-        x_hat, f_hat = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
-    return own.K_x @ x_hat + own.K_f @ f_hat
+    if matrices.current:
+        innovation = matrices.C @ (x - x_hat)
+        x_hat, f_hat = x_hat + matrices.L_x @ innovation, f_hat + matrices.L_f @ innovation
+    return matrices.K_x @ x_hat + matrices.K_f @ f_hat
 
 
-def closed_loop(own, losses=None):
+def closed_loop(matrices, losses=None):
     """A, B, C, D of the loop; `losses` reduce the effect of each actuator of the plant."""
-    n, q = own.n, own.q
-    left = np.eye(own.B.shape[1]) - np.diag(losses if losses is not None else [0] * own.B.shape[1])
+    n, q = matrices.n, matrices.q
+    left = np.eye(matrices.B.shape[1]) - np.diag(losses if losses is not None else [0] * matrices.B.shape[1])
     x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
-    innovation = own.C @ (x - x_hat)
-    if own.current:
-        x_hat, f_hat = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
-    command = own.K_x @ x_hat + own.K_f @ f_hat
-    correction = (1 - own.current) * innovation
+    innovation = matrices.C @ (x - x_hat)
+    if matrices.current:
+        x_hat, f_hat = x_hat + matrices.L_x @ innovation, f_hat + matrices.L_f @ innovation
+    command = matrices.K_x @ x_hat + matrices.K_f @ f_hat
+    correction = (1 - matrices.current) * innovation
     a = np.vstack(
         [
-            own.A @ x + own.B @ left @ command,
-            own.A @ x_hat + own.B @ command + own.F_a @ f_hat + own.L_x @ correction,
-            own.A_f @ f_hat + own.L_f @ correction if own.period else own.L_f @ correction,
+            matrices.A @ x + matrices.B @ left @ command,
+            matrices.A @ x_hat + matrices.B @ command + matrices.F_a @ f_hat + matrices.L_x @ correction,
+            matrices.A_f @ f_hat + matrices.L_f @ correction if matrices.period else matrices.L_f @ correction,
         ]
     )
-    if own.period is None:
-        a[2 * n :] += own.A_f @ f_hat
-    b = np.vstack([own.F_a, np.zeros((n + q, q))])
+    if matrices.period is None:
+        a[2 * n :] += matrices.A_f @ f_hat
+    b = np.vstack([matrices.F_a, np.zeros((n + q, q))])
     c = np.vstack([x, x - x_hat, f_hat])
     d = np.vstack([np.zeros((2 * n, q)), -np.eye(q)])
     return a, b, c, d
@@ -136,7 +136,7 @@ def lyapunov(a, q, period):
     scaled, (scale, _) = matrix_balance(a, permute=False, separate=True)
     inner = q * np.outer(scale, scale)
     if period is None:
-        found = solve_continuous_lyapunov(scaled.T, -inner)
+        solution = solve_continuous_lyapunov(scaled.T, -inner)
     else:
-        found = solve_discrete_lyapunov(scaled.T, inner)
-    return found / np.outer(scale, scale)
+        solution = solve_discrete_lyapunov(scaled.T, inner)
+    return solution / np.outer(scale, scale)

@@ -184,7 +184,7 @@ def worker():
 def scenarios():
     """All scenarios; that of a campaign only where the package is."""
     checkpoint = ["--checkpoint", "state", "--checkpoint-every", "0.01"]
-    found = [
+    cases = [
         run("csv", "--results", "out/r.csv", outputs=["out/r.csv"]),
         run("parquet", "--results", "r.parquet", outputs=["r.parquet"]),
         run("checkpoint", "--results", "r.csv", *checkpoint, outputs=["r.csv", "state"]),
@@ -200,7 +200,7 @@ def scenarios():
         Scenario("check", ["check", SERVO], [], [], (SERVO,), lambda folder: None),
         report(),
     ]
-    return [*found, worker()] if PYTHON.exists() else found
+    return [*cases, worker()] if PYTHON.exists() else cases
 
 
 def is_whole(name, content, right, places):

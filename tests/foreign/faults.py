@@ -289,8 +289,8 @@ def files(folder):
 def sweep(bench: Bench, kind: Kind, most: int | None, pool: ThreadPoolExecutor) -> Sweep:
     """Lets the n-th call fail, for every n or for `most` of them."""
     counted, broken = bench.run(kind, 0)
-    found = Sweep(bench.scenario.name, kind, counted.calls)
-    found.broken += [f"without a fault: {text}" for text in broken]
+    result = Sweep(bench.scenario.name, kind, counted.calls)
+    result.broken += [f"without a fault: {text}" for text in broken]
     numbers = list(range(1, counted.calls + 2))
     if most is not None and counted.calls > most:
         numbers = sorted({1 + round(place * (counted.calls - 1) / max(1, most - 1)) for place in range(most)})
@@ -300,17 +300,17 @@ def sweep(bench: Bench, kind: Kind, most: int | None, pool: ThreadPoolExecutor) 
         for run, broken in pool.map(lambda number: bench.run(kind, number), numbers):
             reached = run.faults
             if reached:
-                found.faults += 1
-                found.statuses["none" if run.status is None else run.status] += 1
+                result.faults += 1
+                result.statuses["none" if run.status is None else run.status] += 1
             if broken:
                 end = run.err.strip().splitlines()[-1:] or [""]
                 text = f"{run.function} {run.path}: {'; '.join(broken)}: {end[0]}"
                 alike.setdefault(VARYING.sub("", text), []).append(run.number)
         # The number of calls varies with the timing of threads.
         numbers = [numbers[-1] + 1] if reached and most is None else []
-    found.broken += [f"{len(runs)} x, n = {runs[0]}: {text}" for text, runs in alike.items()]
-    found.runs = sum(map(len, alike.values()))
-    return found
+    result.broken += [f"{len(runs)} x, n = {runs[0]}: {text}" for text, runs in alike.items()]
+    result.runs = sum(map(len, alike.values()))
+    return result
 
 
 def main():
@@ -331,10 +331,10 @@ def main():
             for kind in KINDS:
                 if not scenario.has(kind.calls) or (options.calls and kind.calls not in options.calls):
                     continue
-                found = sweep(bench, kind, options.most, pool)
-                print(found, *found.broken, sep="\n  ", flush=True)
-                total += found.faults
-                broken += len(found.broken)
+                result = sweep(bench, kind, options.most, pool)
+                print(result, *result.broken, sep="\n  ", flush=True)
+                total += result.faults
+                broken += len(result.broken)
     print(f"{total} faults, {broken} ways to break the rule")
     sys.exit(broken > 0)
 

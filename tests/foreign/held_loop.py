@@ -114,10 +114,10 @@ def held_loop(fmus, grid, settings=SETTINGS, exchange_before_reading=False):
     return loop.names(), np.array(rows)
 
 
-def expect_equal(names, expected, found):
+def expect_equal(names, expected, results):
     """Fails at the first value whose bits differ."""
-    assert expected.shape == found.shape
-    for (slave, name), reference, column in zip(names, expected.T, found.T):
+    assert expected.shape == results.shape
+    for (slave, name), reference, column in zip(names, expected.T, results.T):
         different = np.flatnonzero(reference.view(np.int64) != column.view(np.int64))
         first = different[0] if different.size else 0
         text = f"{slave}.{name} after {first + 1} steps: {reference[first]} and {column[first]}"

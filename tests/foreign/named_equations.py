@@ -72,7 +72,7 @@ def evaluated(values, design, switches, start=False, minus=-1.0):
     v = v + compensating * (named.matrix("K_f", m, q) @ f_hat)
     at = [limited(values, j, command, m) for j, command in enumerate(v + u_op)]
     u = np.array([free if lim is None else lim for lim, free in zip(at, v + u_op)])
-    v = np.array([own if lim is None else lim + minus * op for lim, own, op in zip(at, v, u_op)])
+    v = np.array([free if lim is None else lim + minus * op for lim, free, op in zip(at, v, u_op)])
     x_slopes = named.matrix("A", n, n) @ deviation + named.matrix("B", n, m) @ v
     x_slopes = x_slopes + named.matrix("F_a", n, q) @ f_hat
     x_slopes = x_slopes + named.matrix("L_x", n, p) @ innovation

@@ -22,14 +22,14 @@ def element_name(name, row, column):
 def read_matrices(instance):
     """The eight matrices, read element by element from the parameters of an instance."""
     parameters = [v for v in instance.fmu.names(causality="parameter") if "," in v]
-    found = {}
+    matrices = {}
     for name in MATRICES:
         indices = [p[len(name) + 1 : -1].split(",") for p in parameters if p.startswith(f"{name}[")]
         rows, columns = (max(int(index[k]) for index in indices) for k in (0, 1))
         names = [element_name(name, i, j) for i in range(rows) for j in range(columns)]
         assert len(indices) == rows * columns
-        found[name] = np.array(instance.get(*names)).reshape(rows, columns)
-    return found
+        matrices[name] = np.array(instance.get(*names)).reshape(rows, columns)
+    return matrices
 
 
 def linear_system(design, compensating, estimating):

@@ -22,11 +22,11 @@ class SampledController:
         self.entry = np.vstack([B, np.zeros((q, m))])
         self.view = np.hstack([C, np.zeros((len(C), q))])
         self.feedback, self.gain = np.hstack([K_x, K_f]), np.vstack([L_x, L_f])
-        point = lambda name: np.array([own.get("operating", 0.0) for own in design[name]])
+        point = lambda name: np.array([signal.get("operating", 0.0) for signal in design[name]])
         self.x_op = np.concatenate([point("states"), np.zeros(q)])
         self.u_op, self.y_op = point("actuators"), point("measurements")
         free = [-np.inf, np.inf]
-        self.limits = np.transpose([own.get("limits", free) for own in design["actuators"]])
+        self.limits = np.transpose([signal.get("limits", free) for signal in design["actuators"]])
         self.filter = design.get("filter")
         self.current = design["estimator"] == "current"
         self.predicted, self.filtered = np.asarray(z) - self.x_op, np.asarray(y)

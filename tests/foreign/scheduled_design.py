@@ -51,12 +51,12 @@ class ScheduledDesign:
     """A design file with a schedule."""
 
     def __init__(self, text):
-        self.own = tomllib.loads(text)
-        self.points = self.own["schedule"]["points"]
+        self.file = tomllib.loads(text)
+        self.points = self.file["schedule"]["points"]
         self.at = [point["at"] for point in self.points]
         free = [-np.inf, np.inf]
-        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.own["actuators"]])
-        (self.n, self.q), self.t = np.shape(self.own["F_a"]), len(self.points[0].get("r_op", []))
+        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.file["actuators"]])
+        (self.n, self.q), self.t = np.shape(self.file["F_a"]), len(self.points[0].get("r_op", []))
         self.integrals = self.t if "K_i" in self.points[0] else 0
 
     def numbers(self, value):

@@ -154,7 +154,7 @@ def ecos_style(packed, folder):
 def nested_style(packed, folder):
     """The plant inside of a system that scales its outputs by powers of two, without rounding errors."""
     outputs = [name for source, name, _, _ in LINKS if source == "plant"]
-    own = {f"{key}.value": value for key, value in SETTINGS["plant"].items()}
+    settings = {f"{key}.value": value for key, value in SETTINGS["plant"].items()}
     rows = "".join(
         f'<ssm:MappingEntry source="{key}.value" target="{key}"/>' for key in SETTINGS["plant"]
     )
@@ -163,7 +163,7 @@ def nested_style(packed, folder):
     plant = component(
         "plant",
         "resources/a%20plant.fmu",
-        connectors("plant") + bindings(inline(parameters(own), "", mapping)),
+        connectors("plant") + bindings(inline(parameters(settings), "", mapping)),
     )
     double = '<ssc:LinearTransformation factor="2"/>'
     half = '<ssc:LinearTransformation factor="0.5"/>'

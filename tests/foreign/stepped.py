@@ -10,7 +10,7 @@ class Stepped:
     def __init__(self, fmu, folder, start=()):
         description = read_model_description(str(fmu))
         self.names = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.own = FMU2Slave(
+        self.slave = FMU2Slave(
             guid=description.guid,
             unzipDirectory=extract(str(fmu), str(folder)),
             modelIdentifier=description.coSimulation.modelIdentifier,
@@ -19,18 +19,18 @@ class Stepped:
         # FMPy's default callbacks pass messages to the logger of the last simulate_fmu, which may be freed.
         self.callbacks = fmi2CallbackFunctions.from_buffer_copy(defaultCallbacks)
         self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
-        self.own.instantiate(callbacks=self.callbacks)
+        self.slave.instantiate(callbacks=self.callbacks)
         for name, value in start:
             self.set(name, value)
-        self.own.setupExperiment(startTime=0.0)
-        self.own.enterInitializationMode()
-        self.own.exitInitializationMode()
+        self.slave.setupExperiment(startTime=0.0)
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
 
     def set(self, name, value):
-        self.own.setReal([self.names[name]], [value])
+        self.slave.setReal([self.names[name]], [value])
 
     def get(self, name):
-        return self.own.getReal([self.names[name]])[0]
+        return self.slave.getReal([self.names[name]])[0]
 
     def step(self, time, size):
-        self.own.doStep(currentCommunicationPoint=time, communicationStepSize=size)
+        self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=size)

@@ -191,11 +191,11 @@ def test_derivatives_with_null_arrays_are_an_error_if_not_empty(plant, function)
     name = "u" if function.startswith("Set") else "x_p"
     whole = (plant.references(name), 1, integers(1), reals(0))
     for missing in (0, 2, 3):
-        given = [None if position == missing else part for position, part in enumerate(whole)]
+        args = [None if position == missing else part for position, part in enumerate(whole)]
         with Instance(plant) as instance:
             instance.start()
             assert instance.call(function, None, 0, None, None) == OK
-            assert instance.call(function, *given) == ERROR
+            assert instance.call(function, *args) == ERROR
             assert f"fmi2{function}" in instance.last_message()
             assert "null" in instance.last_message()
 
@@ -214,10 +214,10 @@ def test_null_pointers_to_states_are_an_error(fmu):
         ("GetBooleanStatus", 3, None),
         ("NewDiscreteStates", None),
     ]
-    for name, *given in calls:
+    for name, *args in calls:
         with Instance(fmu, kind=name != "NewDiscreteStates") as instance:
             instance.start()
-            assert instance.call(name, *given) == ERROR, name
+            assert instance.call(name, *args) == ERROR, name
             assert f"fmi2{name}" in instance.last_message()
 
 
@@ -239,7 +239,7 @@ def test_unknown_value_references_are_an_error_that_names_them(fmu, way, kind):
 
 
 def test_null_strings_are_an_error(fmu):
-    for given in ((1, 1, texts(None)), (1, 2, (c_char_p * 2)(b"logStatusError", None))):
+    for args in ((1, 1, texts(None)), (1, 2, (c_char_p * 2)(b"logStatusError", None))):
         with Instance(fmu) as instance:
-            assert instance.call("SetDebugLogging", *given) == ERROR
+            assert instance.call("SetDebugLogging", *args) == ERROR
             assert "null" in instance.last_message()

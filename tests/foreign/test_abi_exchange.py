@@ -206,16 +206,16 @@ def test_directional_derivatives_with_null_or_unknown_references_are_an_error(fm
     )
     whole = (output, 1, real_input, 1, reals(1.0), reals(0.0))
     for missing in (0, 2, 4, 5):
-        given = [None if position == missing else part for position, part in enumerate(whole)]
+        arguments = [None if position == missing else part for position, part in enumerate(whole)]
         with Instance(fmu) as instance:
             instance.start()
-            assert instance.call("GetDirectionalDerivative", *given) == ERROR
+            assert instance.call("GetDirectionalDerivative", *arguments) == ERROR
             assert "null" in instance.last_message()
     for position in (0, 2):
-        given = [references(4711) if k == position else part for k, part in enumerate(whole)]
+        arguments = [references(4711) if k == position else part for k, part in enumerate(whole)]
         with Instance(fmu) as instance:
             instance.start()
-            assert instance.call("GetDirectionalDerivative", *given) == ERROR
+            assert instance.call("GetDirectionalDerivative", *arguments) == ERROR
             assert "4711" in instance.last_message()
 
 

@@ -53,12 +53,12 @@ def happen(instance, what):
 def test_a_run_after_a_reset_has_the_same_bits_as_the_first(fmu, before):
     with begun(fmu, 0) as fresh, Instance(fmu) as instance:
         blank = serialized(instance)
-        wanted = drive(fresh, 0, 200)
+        expected = drive(fresh, 0, 200)
         happen(instance, before)
         instance.must("Reset")
         assert serialized(instance) == blank
         instance.start(START[fmu.identifier])
-        assert drive(instance, 0, 200) == wanted
+        assert drive(instance, 0, 200) == expected
 
 
 def test_two_hundred_instances_in_threads_give_the_results_of_each_alone(fmu):
@@ -149,21 +149,21 @@ def panic_in_a_step(folder):
 
     with Instance(fmu) as calm, ThreadPoolExecutor(2) as pool:
         calm.start({"u": 2.5})
-        found = list(pool.map(panic, range(20)))
+        outcomes = list(pool.map(panic, range(20)))
         calm.step(0.0, 0.5)
-        print(json.dumps([found, calm.get("y"), calm.get("steps")]))
+        print(json.dumps([outcomes, calm.get("y"), calm.get("steps")]))
     _ctypes.dlclose(fmu.library._handle)
 
 
 def test_a_panic_is_one_message_with_file_and_line_and_nothing_on_stderr(hostile, python, root):
     done = in_own_process(python, "panic_in_a_step", hostile.folder)
     assert (done.returncode, done.stderr) == (0, "")
-    found, y, steps = json.loads(done.stdout)
+    outcomes, y, steps = json.loads(done.stdout)
     assert (y, steps) == ([5.0], [1])
     source = (root / "tests/models/hostile-names/src/model.rs").read_text(encoding="utf-8")
     lines = [k for k, line in enumerate(source.splitlines(), 1) if "assert!(!self.panics" in line]
     assert len(lines) == 1
-    for status, message, count in found:
+    for status, message, count in outcomes:
         assert (status, count) == (FATAL, 1)
         assert message.startswith("fmi2DoStep: ") and f"model.rs:{lines[0]}:" in message
         assert "as it was told" in message

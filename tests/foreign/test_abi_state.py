@@ -13,7 +13,7 @@ from excitation import START, STEP, begun, drive, restore, serialized
 BEFORE, AFTER = 120, 200  # steps; the compensation starts and the cart stops and starts in both
 
 
-def taken(instance):
+def fmu_state(instance):
     """The present state."""
     state = c_void_p()
     instance.must("GetFMUstate", byref(state))
@@ -49,7 +49,7 @@ def test_the_excitation_covers_stick_slip_and_compensation(plant, controller):
 @pytest.mark.parametrize("mark", [0, 1, 37, BEFORE, 160])
 def test_restoring_a_state_gives_the_same_bits(fmu, mark):
     with begun(fmu, mark) as instance:
-        state = taken(instance)
+        state = fmu_state(instance)
         first = drive(instance, mark, AFTER)
         for _ in range(2):
             instance.must("SetFMUstate", state)
@@ -59,7 +59,7 @@ def test_restoring_a_state_gives_the_same_bits(fmu, mark):
 
 def test_a_state_continues_bit_by_bit_in_another_instance(fmu):
     with begun(fmu, BEFORE) as instance, Instance(fmu, name=b"two") as other:
-        state = taken(instance)
+        state = fmu_state(instance)
         other.must("SetFMUstate", state)
         assert drive(other, BEFORE, AFTER) == drive(instance, BEFORE, AFTER)
         other.must("FreeFMUstate", byref(state))
@@ -93,15 +93,15 @@ def test_a_state_contains_inputs_and_slopes_set_for_the_next_step(fmu):
         instance.set_slopes(**{names[0]: 5.0})
         data, time = serialized(instance), BEFORE * STEP
         instance.step(time, STEP)
-        wanted = instance.outputs()
+        expected = instance.outputs()
         instance.must("Reset")
         restore(instance, data)
         instance.step(time, STEP)
-        assert instance.outputs() == wanted
+        assert instance.outputs() == expected
         restore(instance, data)
         instance.set_slopes(**{names[0]: 0.0})
         instance.step(time, STEP)
-        assert instance.outputs() != wanted
+        assert instance.outputs() != expected
 
 
 def test_a_state_contains_parameters_start_time_and_stop_time(plant):
@@ -120,13 +120,13 @@ def test_a_state_contains_parameters_start_time_and_stop_time(plant):
 def test_a_state_restores_an_instance_after_every_kind_of_end(fmu):
     with begun(fmu, BEFORE) as instance:
         data = serialized(instance)
-        wanted = drive(instance, BEFORE, 20)
+        expected = drive(instance, BEFORE, 20)
         instance.must("Terminate")
         restore(instance, data)
-        assert drive(instance, BEFORE, 20) == wanted
+        assert drive(instance, BEFORE, 20) == expected
         assert instance.call("DoStep", -1.0, STEP, 1) == ERROR
         restore(instance, data)
-        assert drive(instance, BEFORE, 20) == wanted
+        assert drive(instance, BEFORE, 20) == expected
 
 
 def test_a_state_can_be_saved_before_initialization(fmu):
@@ -134,15 +134,15 @@ def test_a_state_can_be_saved_before_initialization(fmu):
         instance.set(START[fmu.identifier])
         data = serialized(instance)
         instance.start({})
-        wanted = drive(instance, 0, 40)
+        expected = drive(instance, 0, 40)
         restore(instance, data)
         instance.start({})
-        assert drive(instance, 0, 40) == wanted
+        assert drive(instance, 0, 40) == expected
 
 
 def test_a_state_can_be_overwritten_and_freed_and_freeing_null_is_accepted(fmu):
     with begun(fmu, 10) as instance:
-        state = taken(instance)
+        state = fmu_state(instance)
         drive(instance, 10, 10)
         instance.must("GetFMUstate", byref(state))
         first = drive(instance, 20, 10)
@@ -155,7 +155,7 @@ def test_a_state_can_be_overwritten_and_freed_and_freeing_null_is_accepted(fmu):
 
 def test_a_buffer_too_small_for_the_bytes_is_refused_and_unchanged(fmu):
     with begun(fmu, 3) as instance:
-        state, size = taken(instance), c_size_t()
+        state, size = fmu_state(instance), c_size_t()
         instance.must("SerializedFMUstateSize", state, byref(size))
         place = create_string_buffer(b"\x5a" * size.value)
         assert instance.call("SerializeFMUstate", state, place, size.value - 1) == ERROR
@@ -201,7 +201,7 @@ def test_a_state_of_another_fmu_is_refused(plant, controller, tmp_path):
     with begun(plant, 5) as one, begun(controller, 5) as two, begun(other, 5) as three:
         for target, source in ((one, two), (two, one), (two, three), (three, two)):
             assert "another FMU" in refused(target, serialized(source))
-        state = taken(three)
+        state = fmu_state(three)
         assert two.call("SetFMUstate", state) == ERROR
         assert other.description.guid in two.last_message()
         three.must("FreeFMUstate", byref(state))

@@ -43,14 +43,14 @@ def test_start_values_equal_those_of_the_description(fmu):
     for entered in (True, False):
         with Instance(fmu) as instance:
             instance.enter() if entered else instance.start()
-            given = {name: v for name, v in fmu.variables.items() if v.start is not None}
-            assert set(fmu.names(causality="parameter")) <= set(given)
-            for name, variable in given.items():
+            variables = {name: v for name, v in fmu.variables.items() if v.start is not None}
+            assert set(fmu.names(causality="parameter")) <= set(variables)
+            for name, variable in variables.items():
                 start = variable.start
-                wanted = (
+                flag = (
                     {"true": 1.0, "false": 0.0}.get(start) if variable.type == "Boolean" else None
                 )
-                assert instance.get(name) == [float(start) if wanted is None else wanted], name
+                assert instance.get(name) == [float(start) if flag is None else flag], name
 
 
 def test_every_parameter_and_input_keeps_a_value_set_before_the_start(fmu):
@@ -92,15 +92,15 @@ def test_input_derivatives_that_are_not_finite_are_an_error(fmu, value):
     name = fmu.names(causality="input", type="Real")[0]
     with Instance(fmu) as instance:
         instance.start()
-        given = (fmu.references(name), 1, integers(1), reals(value))
-        assert instance.call("SetRealInputDerivatives", *given) == ERROR
+        arguments = (fmu.references(name), 1, integers(1), reals(value))
+        assert instance.call("SetRealInputDerivatives", *arguments) == ERROR
         assert name in instance.last_message()
 
 
 def same_reference(fmu, name):
     """The variable and its aliases, which have the same value reference."""
-    own = fmu.variables[name]
-    alike = lambda v: (v.type, v.valueReference) == (own.type, own.valueReference)
+    variable = fmu.variables[name]
+    alike = lambda v: (v.type, v.valueReference) == (variable.type, variable.valueReference)
     return [other.name for other in fmu.variables.values() if alike(other)]
 
 
@@ -200,8 +200,8 @@ def test_derivatives_are_only_for_inputs_and_outputs_with_an_order_of_at_least_o
     for function, name, order in wrong:
         with Instance(plant) as instance:
             instance.start()
-            given = (plant.references(name), 1, integers(order), reals(0))
-            assert instance.call(function, *given) == ERROR, (function, name, order)
+            arguments = (plant.references(name), 1, integers(order), reals(0))
+            assert instance.call(function, *arguments) == ERROR, (function, name, order)
             assert name in instance.last_message() and function in instance.last_message()
 
 

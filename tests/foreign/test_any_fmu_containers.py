@@ -43,18 +43,18 @@ def parts(aso_ftc, packed, tmp_path_factory):
 
 def of_the_toolbox(packed, unpacked, folder):
     """A container of the toolbox; its outputs have the names of the parts' outputs."""
-    made = FMUContainer("loop", packed["plant"].parent)
+    container = FMUContainer("loop", packed["plant"].parent)
     for role, path in packed.items():
-        made.get_fmu(path.name)
+        container.get_fmu(path.name)
         for name, value in SETTINGS[role].items():
-            made.add_start_value(path.name, name, text(value))
+            container.add_start_value(path.name, name, text(value))
         for name in real_outputs(unpacked[role].description):
-            made.add_output(path.name, name, f"{role}.{name}")
+            container.add_output(path.name, name, f"{role}.{name}")
     for source, output, sink, name in LINKS:
-        made.add_link(packed[source].name, output, packed[sink].name, name)
-    made.add_implicit_rule(auto_input=True, auto_output=False, auto_link=False)
+        container.add_link(packed[source].name, output, packed[sink].name, name)
+    container.add_implicit_rule(auto_input=True, auto_output=False, auto_link=False)
     path = folder / "loop.fmu"
-    made.make_fmu(path, step_size=STEP)
+    container.make_fmu(path, step_size=STEP)
     return path
 
 
@@ -110,8 +110,8 @@ def expect_parts(table, parts, names):
     assert numbers(table, "time") == pytest.approx(np.arange(COUNT + 1) * STEP, abs=1e-12)
     assert {"plant.x_p", "controller.u"} < set(names)
     for name in names:
-        found, expected = numbers(table, f"c.{name}")[1:], numbers(parts, name)[1:]
-        assert np.array_equal(found, expected), name
+        values, expected = numbers(table, f"c.{name}")[1:], numbers(parts, name)[1:]
+        assert np.array_equal(values, expected), name
         assert np.ptp(expected) > 0 or name == "controller.f_hat", name
 
 

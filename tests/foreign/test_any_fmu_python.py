@@ -95,8 +95,8 @@ def test_the_library_of_the_python3_in_path_is_loaded_without_an_option(
     fmus, links = loop
     path = f"{os.path.dirname(sys.executable)}{os.pathsep}{os.environ['PATH']}"
     environment = {**ENVIRONMENT, "PATH": path}
-    own = run(aso_ftc, tmp_path, fmus, STEP, 1, *more, links=links, env=environment)
-    assert own == run(aso_ftc, tmp_path, fmus, STEP, 1, *preload, links=links, env=ENVIRONMENT)
+    table = run(aso_ftc, tmp_path, fmus, STEP, 1, *more, links=links, env=environment)
+    assert table == run(aso_ftc, tmp_path, fmus, STEP, 1, *preload, links=links, env=ENVIRONMENT)
 
 
 def test_without_a_python_the_last_line_of_the_error_is_the_cause(aso_ftc, loop, tmp_path):

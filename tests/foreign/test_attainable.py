@@ -32,16 +32,16 @@ def peaks(report):
 
 def test_a_zero_beside_an_unstable_eigenvalue_forces_the_peak_of_every_controller(report):
     # (s - 3) / ((s - 2) (s + 1)): (3 + 2) / (3 - 2) = 5.
-    found = report([1, -3], np.poly([2, -1]), "")
-    (warning,) = said(found, "no controller has a peak of S below 5: its zero at 3 1/s")
+    result = report([1, -3], np.poly([2, -1]), "")
+    (warning,) = said(result, "no controller has a peak of S below 5: its zero at 3 1/s")
     assert "plant.toml" in warning
-    assert min(peaks(found)) >= 5
+    assert min(peaks(result)) >= 5
 
 
 def test_a_zero_far_from_the_unstable_eigenvalue_is_no_warning(report):
     # The X-29: about 6 and 26 1/s, (26 + 6) / (26 - 6) = 1.6 (Stein, IEEE Control Systems 23 (2003)).
-    found = report([1, -26], np.poly([6, -1, -30]), "")
-    assert not said(found, "no controller") and min(peaks(found)) >= 1.6
+    result = report([1, -26], np.poly([6, -1, -30]), "")
+    assert not said(result, "no controller") and min(peaks(result)) >= 1.6
 
 
 def test_a_feedback_faster_than_the_zero_allows_is_named_with_the_speed_that_it_allows(report):
@@ -62,10 +62,10 @@ def test_a_feedback_faster_than_the_zero_allows_is_named_with_the_speed_that_it_
 
 def test_samples_too_far_apart_for_an_unstable_plant_are_named_with_the_time_that_is_short_enough(report):
     # The mean of log |S| over the unit circle is 10 * 0.1: no peak below e.
-    found = report([1], np.poly([10, -1]), "sample_time = 0.1\n")
-    (warning,) = said(found, "no controller has a peak of S below 2.7183")
+    result = report([1], np.poly([10, -1]), "sample_time = 0.1\n")
+    (warning,) = said(result, "no controller has a peak of S below 2.7183")
     assert float(warning.split("at most ")[1].split()[0]) == pytest.approx(np.log(2) / 10, rel=1e-3)
-    assert min(peaks(found)) >= np.e
+    assert min(peaks(result)) >= np.e
     assert not said(report([1], np.poly([10, -1]), "sample_time = 0.01\n"), "no controller")
 
 

@@ -35,10 +35,10 @@ def test_the_frames_are_those_that_cantools_makes_of_the_signals(controller, tmp
     network = cantools.database.can.Database()
     network.add_dbc_file(str(can_bus.NETWORK))
     time, cart, angle, force = columns(folder / "results.csv", "time", "plant.x_p", "plant.theta", "controller.u")
-    seen = {can_bus.MEASUREMENTS: [], can_bus.COMMAND_FRAME: []}
+    trace = {can_bus.MEASUREMENTS: [], can_bus.COMMAND_FRAME: []}
     for frame in can.LogReader(folder / "trace.log"):
-        seen[frame.arbitration_id].append(bytes(frame.data))
-    for identifier, frames in seen.items():
+        trace[frame.arbitration_id].append(bytes(frame.data))
+    for identifier, frames in trace.items():
         message = network.get_message_by_frame_id(identifier)
         assert 48 <= len(frames) <= 50
         for number, frame in enumerate(frames):

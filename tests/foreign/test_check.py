@@ -23,7 +23,7 @@ def check(aso_ftc):
         done = aso_ftc("check", "--json", *more, path)
         assert done.returncode in (0, 1), done
         report = json.loads(done.stdout)
-        errors = [own for own in report["findings"] if own["severity"] == "error"]
+        errors = [finding for finding in report["findings"] if finding["severity"] == "error"]
         assert report["errors"] == len(errors) and done.returncode == (1 if errors else 0)
         return done.returncode, report["findings"]
 
@@ -57,20 +57,20 @@ def fmu(tmp_path, files):
 
 
 def the_one(findings, part, words):
-    found = [own for own in findings if own["part"] == part and words in own["what"]]
-    assert len(found) == 1, findings
-    return found[0]
+    matches = [finding for finding in findings if finding["part"] == part and words in finding["what"]]
+    assert len(matches) == 1, findings
+    return matches[0]
 
 
 @pytest.mark.parametrize("role", ["plant", "controller"])
 def test_our_fmus_break_no_rule_and_need_the_glibc_that_is_in_their_symbols(check, packed, files, role):
     status, findings = check(packed[role])
     assert status == 0
-    assert {own["severity"] for own in findings} <= {"note"}, findings
+    assert {finding["severity"] for finding in findings} <= {"note"}, findings
     with zipfile.ZipFile(packed[role]) as archive:
         code = archive.read(library(dict.fromkeys(archive.namelist())))
     versions = re.findall(rb"GLIBC_([0-9.]+)", code)
-    newest = max(versions, key=lambda own: [int(part) for part in own.split(b".")]).decode()
+    newest = max(versions, key=lambda version: [int(part) for part in version.split(b".")]).decode()
     assert f"glibc {newest} " in the_one(findings, "binaries", "glibc")["what"]
 
 
@@ -85,7 +85,7 @@ def mutated(xml, seed):
     """The description with one random change."""
     chance = random.Random(seed)
     root = etree.fromstring(xml)
-    element = chance.choice([own for own in root.iter() if isinstance(own.tag, str)])
+    element = chance.choice([node for node in root.iter() if isinstance(node.tag, str)])
     operation = chance.randrange(6)
     if operation == 0:
         element.set("colour", "red")
@@ -135,10 +135,10 @@ def test_paths_with_backslashes_are_an_error_and_the_fmu_is_still_read(check, fm
     path = fmu({name: None, name.replace("/", "\\"): files[name]})
     status, findings = check(path, "--no-run")
     assert status == 1
-    found = the_one(findings, "archive", "backslashes")
-    assert found["severity"] == "error" and found["where"] == name.replace("/", "\\")
+    error = the_one(findings, "archive", "backslashes")
+    assert error["severity"] == "error" and error["where"] == name.replace("/", "\\")
     # The library is found: only its path is wrong.
-    assert not [own for own in findings if own["part"] == "binaries" and own["severity"] == "error"]
+    assert not [finding for finding in findings if finding["part"] == "binaries" and finding["severity"] == "error"]
 
 
 def test_stored_entries_with_data_descriptors_are_an_error(check, tmp_path, files):
@@ -158,8 +158,8 @@ def test_stored_entries_with_data_descriptors_are_an_error(check, tmp_path, file
         archive.writestr("modelDescription.xml", files["modelDescription.xml"])
         archive.writestr("sources/all.c", "")
     status, findings = check(path)
-    found = [own for own in findings if "data descriptor" in own["what"]]
-    assert status == 1 and {own["where"] for own in found} == {"modelDescription.xml", "sources/all.c"}
+    errors = [finding for finding in findings if "data descriptor" in finding["what"]]
+    assert status == 1 and {finding["where"] for finding in errors} == {"modelDescription.xml", "sources/all.c"}
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_missing_source_files_are_an_error(check, fmu, files):
     _, findings = check(fmu({"modelDescription.xml": with_sources}), "--no-run")
     assert "sources/a.c" in the_one(findings, "archive", "SourceFiles")["what"]
     _, findings = check(fmu({"modelDescription.xml": with_sources, "sources/a.c": ""}), "--no-run")
-    assert not [own for own in findings if "SourceFiles" in own["what"]]
+    assert not [finding for finding in findings if "SourceFiles" in finding["what"]]
 
 
 @pytest.mark.parametrize("name", ["./a.c", "sub/a.c", "sub\\a.c", "sources/a.c", "sub/../a.c", "./sub/./a.c"])
@@ -198,7 +198,7 @@ def test_source_files_are_found_in_every_notation_of_their_path(check, fmu, file
     xml = re.sub(r"(<CoSimulation[^>]*)/>", stated, xml)
     path = "sources/" + name.replace("\\", "/").replace("sub/../", "").replace("./", "").removeprefix("sources/")
     _, findings = check(fmu({"modelDescription.xml": xml, path: ""}), "--no-run")
-    assert not [own for own in findings if "SourceFiles" in own["what"]], path
+    assert not [finding for finding in findings if "SourceFiles" in finding["what"]], path
     _, findings = check(fmu({"modelDescription.xml": xml, "sources/b.c": ""}), "--no-run")
     assert the_one(findings, "archive", "SourceFiles")["severity"] == "error"
 
@@ -214,15 +214,15 @@ def test_a_source_file_in_another_case_is_a_warning_and_one_outside_of_sources_a
 
 def test_an_empty_folder_of_a_platform_is_a_note(check, fmu):
     _, findings = check(fmu({"binaries/linux32/": ""}), "--no-run")
-    found = [own for own in findings if own["where"] == "binaries/linux32/"]
-    assert [own["severity"] for own in found] == ["note"], findings
+    notes = [finding for finding in findings if finding["where"] == "binaries/linux32/"]
+    assert [finding["severity"] for finding in notes] == ["note"], findings
 
 
 def answer(aso_ftc, path, *more):
     done = aso_ftc("check", "--json", *more, path)
     assert done.returncode in (0, 1), done
     report = json.loads(done.stdout)
-    return report["here"], {own["tool"]: own["reason"] for own in report["not_in"]}
+    return report["here"], {entry["tool"]: entry["reason"] for entry in report["not_in"]}
 
 
 def test_the_report_starts_with_how_the_fmu_ran(aso_ftc, packed):
@@ -323,10 +323,10 @@ def test_equal_findings_are_one_line_with_a_count_and_the_json_lists_all(aso_ftc
     xml = re.sub(r' unit="[^"]*"', ' unit="?"', xml)
     path = fmu({"modelDescription.xml": xml})
     _, findings = check(path, "--no-run")
-    undefined = [own for own in findings if "which is not defined" in own["what"]]
+    undefined = [finding for finding in findings if "which is not defined" in finding["what"]]
     assert len(undefined) > 2
     lines = aso_ftc("check", "--no-run", path).stdout.splitlines()
-    (line,) = [own for own in lines if own.startswith("error") and "which is not defined" in own]
+    (line,) = [text for text in lines if text.startswith("error") and "which is not defined" in text]
     assert f"; and {len(undefined) - 1} more variables" in line, line
 
 
@@ -336,8 +336,8 @@ def test_a_library_for_another_machine_is_an_error(check, fmu, files):
     assert code[18:20] == b"\x3e\x00"  # e_machine: EM_X86_64
     code[18:20] = b"\xb7\x00"  # EM_AARCH64
     status, findings = check(fmu({name: bytes(code)}), "--no-run")
-    found = the_one(findings, "binaries", "expected Elf for X86_64, found Elf for Aarch64")
-    assert status == 1 and found["section"] == "2.3"
+    error = the_one(findings, "binaries", "expected Elf for X86_64, found Elf for Aarch64")
+    assert status == 1 and error["section"] == "2.3"
 
 
 def test_a_library_in_the_folder_of_another_system_is_an_error(check, fmu, files):
@@ -372,15 +372,15 @@ def test_a_start_value_that_the_library_does_not_have_is_an_error(check, fmu, fi
     number = re.search(r'name="F_c".*?start="([^"]*)"', xml, re.DOTALL)
     changed = xml[: number.start(1)] + "17.5" + xml[number.end(1) :]
     status, findings = check(fmu({"modelDescription.xml": changed}))
-    found = the_one(findings, "behaviour", "17.5")
-    assert status == 1 and found["where"] == "variable F_c"
-    assert found["what"].startswith(f"the library starts with {float(number.group(1))}")
+    error = the_one(findings, "behaviour", "17.5")
+    assert status == 1 and error["where"] == "variable F_c"
+    assert error["what"].startswith(f"the library starts with {float(number.group(1))}")
 
 
 def test_a_category_that_is_not_declared_is_an_error(check, fmu, files):
     xml = re.sub(r"\s*<LogCategories>.*?</LogCategories>", "", files["modelDescription.xml"].decode(), flags=re.DOTALL)
     _, findings = check(fmu({"modelDescription.xml": xml}))
-    assert {own["section"] for own in findings if own["where"] == "logger"} == {"2.2.4"}
+    assert {finding["section"] for finding in findings if finding["where"] == "logger"} == {"2.2.4"}
 
 
 def test_the_text_report_has_each_finding_with_its_place_section_and_reason(aso_ftc, fmu, files):

@@ -30,54 +30,54 @@ def description(fmus):
 
 def test_fmpy_reads_the_clocks_and_the_clocked_variables(fmus, description):
     assert validate_fmu(str(fmus[3])) == []
-    variables = {own.name: own for own in description.modelVariables}
+    variables = {variable.name: variable for variable in description.modelVariables}
     sample = variables["sample"]
     assert (sample.type, sample.causality, sample.intervalVariability) == ("Clock", "input", "constant")
     # FMPy does not read the interval.
     xml = zipfile.ZipFile(fmus[3]).read("modelDescription.xml").decode()
     assert re.search(r'name="sample".* intervalDecimal="0.1"', xml)
     assert variables["third"].intervalVariability == "triggered"
-    assert [own.name for own in variables["count"].clocks] == ["sample", "restart"]
+    assert [variable.name for variable in variables["count"].clocks] == ["sample", "restart"]
 
 
 def test_fmi_2_leaves_the_clocks_out(fmus):
     assert validate_fmu(str(fmus[2])) == []
-    names = [own.name for own in fmpy.read_model_description(str(fmus[2])).modelVariables]
+    names = [variable.name for variable in fmpy.read_model_description(str(fmus[2])).modelVariables]
     assert names == ["time", "count", "restarts"]
 
 
 def test_ticks_that_the_importer_sets_are_counted_and_the_output_clock_answers(fmus, description):
-    references = {own.name: own.valueReference for own in description.modelVariables}
-    own = FMU3Slave(
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    slave = FMU3Slave(
         guid=description.guid, unzipDirectory=fmpy.extract(str(fmus[3])), modelIdentifier="Counter", instanceName="one"
     )
-    own.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
-    own.enterInitializationMode()
-    own.exitInitializationMode()
+    slave.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
     ticks = []
     for k in range(7):
         if k > 0:
-            own.enterEventMode()
-        own.setClock([references["sample"]], [True])
+            slave.enterEventMode()
+        slave.setClock([references["sample"]], [True])
         if k == 5:
-            own.setClock([references["restart"]], [True])
-        ticks.append(bool(own.getClock([references["third"]])[0]))
+            slave.setClock([references["restart"]], [True])
+        ticks.append(bool(slave.getClock([references["third"]])[0]))
         # While its clock ticks, a clocked variable has the value that the update keeps.
-        count = own.getInt32([references["count"]])[0]
-        assert own.getInt32([references["count"]])[0] == count == (1, 2, 3, 4, 5, 1, 2)[k]
-        own.updateDiscreteStates()
-        assert own.getInt32([references["count"]])[0] == count
+        count = slave.getInt32([references["count"]])[0]
+        assert slave.getInt32([references["count"]])[0] == count == (1, 2, 3, 4, 5, 1, 2)[k]
+        slave.updateDiscreteStates()
+        assert slave.getInt32([references["count"]])[0] == count
         # A clock ticks in one event only.
-        assert not own.getClock([references["sample"]])[0]
-        own.enterStepMode()
-        own.doStep(currentCommunicationPoint=0.1 * k, communicationStepSize=0.1)
+        assert not slave.getClock([references["sample"]])[0]
+        slave.enterStepMode()
+        slave.doStep(currentCommunicationPoint=0.1 * k, communicationStepSize=0.1)
     # The sixth tick makes the counter start again and counts from there.
     assert ticks == [False, False, True, False, False, True, False]
-    assert [own.getInt32([references[name]])[0] for name in ("count", "restarts")] == [2, 1]
+    assert [slave.getInt32([references[name]])[0] for name in ("count", "restarts")] == [2, 1]
     with pytest.raises(Exception, match="fmi3SetClock"):
-        own.enterEventMode()
-        own.setClock([references["third"]], [True])
-    own.freeInstance()
+        slave.enterEventMode()
+        slave.setClock([references["third"]], [True])
+    slave.freeInstance()
 
 
 def test_our_master_ticks_a_periodic_clock_and_passes_the_ticks_of_an_output_clock_on(fmus, aso_ftc, tmp_path):
@@ -120,7 +120,7 @@ def test_a_sampled_controller_with_a_clock_runs_as_the_one_of_fmi_2(aso_ftc, roo
         assert version == "" or {row["controller.sample_clock"] for row in rows} == {"1"}
         ends.append([float(last[name]) for name in ("plant.x_p", "plant.theta", "controller.u")])
     variables = fmpy.read_model_description(str(tmp_path / "Sampled.fmi3.fmu")).modelVariables
-    assert [own.name for own in variables if own.type == "Clock"] == ["sample_clock"]
+    assert [variable.name for variable in variables if variable.type == "Clock"] == ["sample_clock"]
     # The angle has come to rest: 1e-10 rad, from 0.1.
     assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)
 
@@ -130,7 +130,7 @@ def test_a_clock_of_each_type_ticks_when_the_model_says(aso_ftc, root, tmp_path)
     assert done.returncode == 0, done.stderr
     fmu = next(tmp_path.glob("*.fmu"))
     assert validate_fmu(str(fmu)) == []
-    types = {own.name: own.intervalVariability for own in fmpy.read_model_description(str(fmu)).modelVariables}
+    types = {variable.name: variable.intervalVariability for variable in fmpy.read_model_description(str(fmu)).modelVariables}
     for name in ("constant", "fixed", "tunable", "changing", "countdown", "triggered"):
         assert types[name] == name
     (tmp_path / "in.csv").write_text("time,beat,triggered\n0,0.2,0\n0.25,0.2,1\n0.5,0.4,0\n", encoding="utf-8")

@@ -59,17 +59,17 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
     (tmp_path / "Cargo.toml").write_text(f'[workspace]\nresolver = "2"\nmembers = [{listed}]\n', encoding="utf-8")
     cargo, rustc, _ = map(str, DEBIAN)
     options = ["--release", "--workspace", "--target", "thumbv7em-none-eabihf", "-Z", "build-std=core"]
-    kept = {name: os.environ[name] for name in ("HOME", "CARGO_HOME") if name in os.environ}
-    tools = {"PATH": "/usr/bin:/bin", "RUSTC": rustc, "RUSTC_BOOTSTRAP": "1", "RUSTFLAGS": "-D warnings", **kept}
+    homes = {name: os.environ[name] for name in ("HOME", "CARGO_HOME") if name in os.environ}
+    tools = {"PATH": "/usr/bin:/bin", "RUSTC": rustc, "RUSTC_BOOTSTRAP": "1", "RUSTFLAGS": "-D warnings", **homes}
     done = subprocess.run([cargo, "build", *options], cwd=tmp_path, env=tools, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    for own in members.values():
-        library = tmp_path / "target" / "thumbv7em-none-eabihf" / "release" / f"lib{own.name}.rlib"
+    for controller in members.values():
+        library = tmp_path / "target" / "thumbv7em-none-eabihf" / "release" / f"lib{controller.name}.rlib"
         listed = [line.split() for line in subprocess.check_output(["arm-none-eabi-nm", library], text=True).splitlines()]
         needed = {words[-1] for words in listed if words[:1] == ["U"]} - {words[2] for words in listed if len(words) == 3}
-        numbers = () if own.single else ("__aeabi_d", "__aeabi_ui2d")
+        numbers = () if controller.single else ("__aeabi_d", "__aeabi_ui2d")
         memory = ("__aeabi_mem", "memcpy", "memset", "memcmp", "bcmp")
-        assert (own.single or needed) and all(name.startswith((*numbers, *memory)) for name in needed), needed
+        assert (controller.single or needed) and all(name.startswith((*numbers, *memory)) for name in needed), needed
 
 
 @pytest.mark.skipif(not all(TOOLS), reason="no Cortex-M: gcc-arm-none-eabi, qemu-system-arm")
@@ -81,11 +81,11 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
 def test_no_sample_has_more_operations_than_the_header_states(aso_ftc, packed, tmp_path, name):
     """The instructions of the floating-point unit in QEMU. The compiler leaves out products with 1 and the sum of -0 and a number."""
     packed_plant(aso_ftc, "ThreeTank")
-    own = Built(aso_ftc, CASES[name].text, tmp_path, "--float")
-    done = subprocess.run([ROOT / "scripts" / "bench" / "cortex_m_cycles.py", own.folder / "c"], capture_output=True, text=True)
+    controller = Built(aso_ftc, CASES[name].text, tmp_path, "--float")
+    done = subprocess.run([ROOT / "scripts" / "bench" / "cortex_m_cycles.py", controller.folder / "c"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     most = {kind: int(re.search(rf"(\d+) {kind}", done.stdout).group(1)) for kind in ("multiplications", "additions", "divisions")}
-    found = stated(own)
-    assert all(count <= found[kind] for kind, count in most.items()), (most, found)
-    assert most["divisions"] == found["divisions"]
-    assert most["multiplications"] > 0.9 * found["multiplications"] and most["additions"] > 0.75 * found["additions"]
+    limits = stated(controller)
+    assert all(count <= limits[kind] for kind, count in most.items()), (most, limits)
+    assert most["divisions"] == limits["divisions"]
+    assert most["multiplications"] > 0.9 * limits["multiplications"] and most["additions"] > 0.75 * limits["additions"]

@@ -60,10 +60,10 @@ def test_the_examples_of_the_help_work(command, folder, packed, verb):
 
 def test_the_version_names_a_commit_of_the_clone(command, root):
     text = subprocess.check_output([command, "--version"], text=True)
-    found = re.fullmatch(r"aso-ftc \d+\.\d+\.\d+(?: \(([0-9a-f]{8,}) \d{4}-\d\d-\d\d\))?\n", text)
-    assert found, text
+    match = re.fullmatch(r"aso-ftc \d+\.\d+\.\d+(?: \(([0-9a-f]{8,}) \d{4}-\d\d-\d\d\))?\n", text)
+    assert match, text
     if (root / ".git").exists():
-        subprocess.run(["git", "cat-file", "-e", f"{found[1]}^{{commit}}"], cwd=root, check=True)
+        subprocess.run(["git", "cat-file", "-e", f"{match[1]}^{{commit}}"], cwd=root, check=True)
 
 
 def test_bash_completes_verbs_and_options(command, tmp_path):

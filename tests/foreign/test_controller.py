@@ -66,11 +66,11 @@ def test_a_step_of_any_size_equals_the_matrix_exponential(
 ):
     compensating = switch is ON
     with begun(controller, {**switch, "monitor": monitor}) as instance:
-        found = advance(instance, 0.0, size, slope=slope)
-        wanted = propagated(design, Z_0, Y, slope, size, compensating, compensating or monitor)
-        assert found == pytest.approx(wanted, rel=1e-9)
-        assert (found[4] == Z_0[4]) == (not compensating and not monitor)
-        u = command(design, found, compensating)
+        state = advance(instance, 0.0, size, slope=slope)
+        expected = propagated(design, Z_0, Y, slope, size, compensating, compensating or monitor)
+        assert state == pytest.approx(expected, rel=1e-9)
+        assert (state[4] == Z_0[4]) == (not compensating and not monitor)
+        u = command(design, state, compensating)
         assert instance.get("u") == pytest.approx(u, rel=1e-12)
 
 
@@ -81,9 +81,9 @@ def test_a_small_step_also_equals_scipys_integration(controller, design):
     augmented = np.zeros((9, 9))
     augmented[:5, :5], augmented[:5, 5:7] = M / scale[:, None] * scale, N / scale[:, None]
     augmented[5:7, 7:] = np.eye(2)
-    wanted = (expm(augmented * size) @ [*(Z_0 / scale), *Y, *SLOPE])[:5] * scale
+    expected = (expm(augmented * size) @ [*(Z_0 / scale), *Y, *SLOPE])[:5] * scale
     with begun(controller, ON) as instance:
-        assert advance(instance, 0.0, size) == pytest.approx(wanted, rel=1e-9)
+        assert advance(instance, 0.0, size) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_hundred_steps_end_where_one_step_of_their_total_size_ends(controller):
@@ -98,22 +98,22 @@ def test_a_hundred_steps_end_where_one_step_of_their_total_size_ends(controller)
 def test_the_compensation_starts_inside_of_the_step_that_contains_t_on(controller, design, monitor):
     switch, size = 0.00037, 0.001
     with begun(controller, {"t_on": switch, "monitor": monitor}) as instance:
-        found = advance(instance, 0.0, size)
+        state = advance(instance, 0.0, size)
         before = propagated(design, Z_0, Y, SLOPE, switch, False, monitor)
-        wanted = propagated(design, before, Y + switch * SLOPE, SLOPE, size - switch, True, True)
-        assert found == pytest.approx(wanted, rel=1e-9)
-        assert instance.get("u") == pytest.approx(command(design, found, True), rel=1e-12)
+        expected = propagated(design, before, Y + switch * SLOPE, SLOPE, size - switch, True, True)
+        assert state == pytest.approx(expected, rel=1e-9)
+        assert instance.get("u") == pytest.approx(command(design, state, True), rel=1e-12)
 
 
 def test_the_compensation_is_on_at_t_on_and_off_just_before(controller, design):
     for t_on, compensating in ((0.003, True), (0.0030001, False)):
         with begun(controller, {"t_on": t_on}) as instance:
             for k in range(3):
-                found = advance(instance, k * 0.001, 0.001, slope=np.zeros(2))
+                state = advance(instance, k * 0.001, 0.001, slope=np.zeros(2))
             assert instance.get("u") == pytest.approx(
-                command(design, found, compensating), rel=1e-12
+                command(design, state, compensating), rel=1e-12
             )
-            assert found[4] == Z_0[4]
+            assert state[4] == Z_0[4]
 
 
 def test_without_compensate_t_on_has_no_effect(controller):
@@ -142,8 +142,8 @@ def test_slopes_of_the_outputs_are_those_of_the_right_hand_side(controller, desi
 def test_slopes_of_the_measurements_apply_to_one_step_only(controller, design):
     with begun(controller, ON) as instance:
         z = advance(instance, 0.0, 1e-3)
-        found = advance(instance, 1e-3, 1e-3, slope=np.zeros(2))
-        assert found == pytest.approx(
+        state = advance(instance, 1e-3, 1e-3, slope=np.zeros(2))
+        assert state == pytest.approx(
             propagated(design, z, Y, np.zeros(2), 1e-3, True, True), rel=1e-9
         )
 
@@ -184,7 +184,7 @@ def test_each_initial_output_depends_on_the_listed_variables_only(controller):
             start = BASE.get(name, None if variable.type == "Boolean" else float(variable.start))
             value = not start if variable.type == "Boolean" else start + 1.25
             variants[name] = at_start(controller, {name: value})
-    found = {
+    dependencies = {
         output: {name for name, values in variants.items() if values[output] != before[output]}
         for output in before
     }
@@ -193,7 +193,7 @@ def test_each_initial_output_depends_on_the_listed_variables_only(controller):
         for unknown in controller.description.initialUnknowns
         if unknown.variable.causality == "output"
     }
-    assert found == listed
+    assert dependencies == listed
 
 
 def test_parameters_affect_the_steps(controller, design):
@@ -201,7 +201,7 @@ def test_parameters_affect_the_steps(controller, design):
     values = {f"A[{k},{k}]": changed["A"][k - 1, k - 1] for k in range(1, 5)}
     values |= {f"L_f[1,{k}]": changed["L_f"][0, k - 1] for k in (1, 2)}
     with begun(controller, {**ON, **values}) as instance:
-        found = advance(instance, 0.0, 1e-3)
-        assert found == pytest.approx(
+        state = advance(instance, 0.0, 1e-3)
+        assert state == pytest.approx(
             propagated(changed, Z_0, Y, SLOPE, 1e-3, True, True), rel=1e-9
         )

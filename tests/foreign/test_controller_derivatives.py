@@ -6,7 +6,7 @@ import pytest
 from c_abi import CO_SIMULATION, MODEL_EXCHANGE, Instance
 from design_file import shipped_design, vector
 from named_equations import evaluated, losses, rounding, size_of
-from test_designs import LIMITED, SIZES, made, random_design
+from test_designs import LIMITED, SIZES, fmu_with, random_design
 
 STEP = 1e-30
 T_ON = 0.25
@@ -36,12 +36,12 @@ def check(instance, unknowns, direction, switches, start=False):
     on = (compensating, compensating or monitor)
     allowed = rounding(values, direction, design, start)
     if "sample_time" in design and not start:
-        wanted = dict.fromkeys(unknowns, 0.0)
+        expected = dict.fromkeys(unknowns, 0.0)
     else:
         moved = {name: values[name] + 1j * STEP * along for name, along in direction.items()}
-        wanted = evaluated({**values, **moved}, design, on, start)
+        expected = evaluated({**values, **moved}, design, on, start)
     for name, value in instance.directional(unknowns, direction).items():
-        assert abs(value - np.imag(wanted[name]) / STEP) <= allowed[name], name
+        assert abs(value - np.imag(expected[name]) / STEP) <= allowed[name], name
 
 
 def real_names(fmu, **attributes):
@@ -63,7 +63,7 @@ def designs(controller, folder):
     cases = [(sizes, None) for sizes in SIZES] + LIMITED + [((2, 2, 2, 2), [WIDE] * 2)]
     for k, case in enumerate(cases + EXTENDED):
         (folder / str(k)).mkdir()
-        yield made(controller, random_design(*case), folder / str(k))
+        yield fmu_with(controller, random_design(*case), folder / str(k))
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +78,8 @@ def starts(fmu, switches):
     _, compensate, monitor = switches
     names = vector("x_hat_0", n) + vector("f_hat_0", q) + real_names(fmu, causality="input")
     values = np.random.default_rng(11).normal(size=n + q + p)
-    given = dict(zip(names, map(float, values)))
-    return {**given, "t_on": T_ON, "compensate": compensate, "monitor": monitor}
+    initial = dict(zip(names, map(float, values)))
+    return {**initial, "t_on": T_ON, "compensate": compensate, "monitor": monitor}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -153,7 +153,7 @@ def jacobian(instance, fmu):
 
 def factors(fmu, parameters):
     """Each entry of the Jacobian in several situations."""
-    found = []
+    jacobians = []
     for time, compensate, monitor in SWITCHES:
         for limit in (-1e6, 0.0, 1e6):
             limits = {
@@ -163,28 +163,28 @@ def factors(fmu, parameters):
             values = starts(fmu, (time, compensate, monitor)) | limits | parameters
             with Instance(fmu, kind=MODEL_EXCHANGE) as instance:
                 instance.start_exchange(values, start=time)
-                found.append(jacobian(instance, fmu))
-    return {pair: [each[pair] for each in found] for pair in found[0]}
+                jacobians.append(jacobian(instance, fmu))
+    return {pair: [each[pair] for each in jacobians] for pair in jacobians[0]}
 
 
-def kind_of(own, other, cut_off):
+def kind_of(entries, other, cut_off):
     """The kind of a dependency, from its factors with two sets of parameters, for an unknown with or
     without limits."""
-    if not any(own):
+    if not any(entries):
         return None
-    if len(set(own)) > 1:
+    if len(set(entries)) > 1:
         return "dependent" if cut_off else "discrete"
-    return "constant" if own == other else "fixed"
+    return "constant" if entries == other else "fixed"
 
 
 def listed_kinds(fmu):
     """Kinds of dependencies by the names of both variables, from the description."""
-    found = {}
+    dependencies = {}
     for unknown in fmu.description.outputs + fmu.description.derivatives:
         kinds = unknown.dependenciesKind or ["dependent"] * len(unknown.dependencies)
         for known, kind in zip(unknown.dependencies, kinds, strict=True):
-            found[unknown.variable.name, known.name] = kind
-    return found
+            dependencies[unknown.variable.name, known.name] = kind
+    return dependencies
 
 
 def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their_kinds(fmus):
@@ -194,7 +194,7 @@ def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their
         filters = {name: 0.5 for name in fmu.variables if name.startswith("filter")}
         first = matrices | filters
         second = {name: value + 0.125 for name, value in first.items()}
-        own, other = factors(fmu, first), factors(fmu, second)
+        entries, other = factors(fmu, first), factors(fmu, second)
         cut_off = {
             unknown
             for name, unknown in zip(vector("u_min", m), vector("u", m))
@@ -203,8 +203,8 @@ def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their
         if cut_off:
             cut_off |= {f"der({name})" for name in vector("x_hat", n)}
         cut_off |= {name for name, *_ in losses(fmu.design)}
-        found = {pair: kind_of(own[pair], other[pair], pair[0] in cut_off) for pair in own}
-        assert {pair: kind for pair, kind in found.items() if kind} == listed_kinds(fmu)
+        kinds = {pair: kind_of(entries[pair], other[pair], pair[0] in cut_off) for pair in entries}
+        assert {pair: kind for pair, kind in kinds.items() if kind} == listed_kinds(fmu)
 
 
 def test_each_initial_value_depends_on_exactly_the_listed_variables(fmus):
@@ -213,16 +213,16 @@ def test_each_initial_value_depends_on_exactly_the_listed_variables(fmus):
         full = {name: 0.5 + k / 64 for k, name in enumerate(fmu.variables) if "," in name}
         free = ("filter", "x_op", "u_op", "y_op")
         full |= {name: 0.4 for name in fmu.variables if name.startswith(free)}
-        found = {unknown: set() for unknown in unknowns}
+        influences = {unknown: set() for unknown in unknowns}
         for switches in SWITCHES:
             for limit in (-1e4, 0.0, 1e4):
                 for unknown, known in initial_influences(fmu, switches, limit, full):
-                    found[unknown].add(known)
+                    influences[unknown].add(known)
         listed = {
             unknown.variable.name: {variable.name for variable in unknown.dependencies}
             for unknown in fmu.description.initialUnknowns
         }
-        assert found == listed
+        assert influences == listed
 
 
 def initial_influences(fmu, switches, limit, parameters):

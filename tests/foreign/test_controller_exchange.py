@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from c_abi import MODEL_EXCHANGE, EventInfo, Fmu, Instance, reals
 from design_file import design_text, redesigned, shipped_design, vector
 from named_equations import evaluated, losses, state_names
-from test_designs import LIMITED, SIZES, made, random_design
+from test_designs import LIMITED, SIZES, fmu_with, random_design
 
 T_ON = 0.3037  # s, inside a communication step
 STOP = 1.0  # s
@@ -73,8 +73,8 @@ class Run(NamedTuple):
 
     def compensating(self, time):
         """Whether f_hat is part of the command from `time` on."""
-        wanted = [on for since, on in self.compensate if time >= since][-1]
-        return wanted and time >= self.design["t_on"]
+        enabled = [on for since, on in self.compensate if time >= since][-1]
+        return enabled and time >= self.design["t_on"]
 
 
 def input_signals(run):
@@ -124,15 +124,15 @@ def stepped(run):
 
 def solved(run):
     """scipy's solution of the equations, piece by piece between the times of switches."""
-    given, states = constants(run), run.states
+    parameters, states = constants(run), run.states
 
     def at(z, y, on):
-        values = given | dict(zip([*run.inputs, *states], [*y, *z]))
+        values = parameters | dict(zip([*run.inputs, *states], [*y, *z]))
         return evaluated(values, run.design, (on, on or run.design["monitor"]))
 
     def right(_, z, y, on):
-        found = at(z, y, on)
-        return [found[f"der({name})"] for name in states]
+        values = at(z, y, on)
+        return [values[f"der({name})"] for name in states]
 
     filtered = run.levels[0] if "filter" in run.design else []
     z, rows = np.array([*run.estimate, *filtered]), []
@@ -161,13 +161,13 @@ def check(run):
 
     Not compared when `compensate` switches, because co-simulation follows with the next step.
     """
-    found, oracle, co_simulated = integrated(run), solved(run), stepped(run)
+    model_exchange, oracle, co_simulated = integrated(run), solved(run), stepped(run)
     allowed = FRACTION * np.ptp(oracle, axis=0)
     assert (allowed > 0).all()
-    assert (abs(found - oracle) <= allowed).all()
+    assert (abs(model_exchange - oracle) <= allowed).all()
     stays = ~np.isclose(run.times[:, None], [time for time, _ in run.compensate[1:]]).any(axis=1)
     assert (abs(co_simulated - oracle)[stays] <= allowed).all()
-    assert (abs(found - co_simulated)[stays] <= allowed).all()
+    assert (abs(model_exchange - co_simulated)[stays] <= allowed).all()
     return oracle
 
 
@@ -188,7 +188,7 @@ def random_run(controller, folder, sizes, limits, extras="", **general):
     n, _, p, q = sizes
     design = random_design(sizes, limits, extras) | {"t_on": T_ON, **general}
     levels = np.random.default_rng(17).normal(size=(len(JUMPS), p))
-    return Run(made(controller, design, folder), design, np.linspace(-1, 1.5, n + q), levels)
+    return Run(fmu_with(controller, design, folder), design, np.linspace(-1, 1.5, n + q), levels)
 
 
 def shipped_run(controller, folder, limits=None, **options):
@@ -283,7 +283,7 @@ def test_each_limited_command_has_two_indicators_that_are_never_zero_after_an_ev
             new_discrete_states(instance)
             instance.must("GetEventIndicators", values, count)
             commands = zip(instance.get(*run.signals)[states:], limits)
-            wanted = [[u > pair[0], u < pair[1]] for u, pair in commands if pair]
-            assert [value > 0 for value in values] == list(np.ravel(wanted))
+            expected = [[u > pair[0], u < pair[1]] for u, pair in commands if pair]
+            assert [value > 0 for value in values] == list(np.ravel(expected))
             assert 0 not in list(values)
             instance.must("EnterContinuousTimeMode")

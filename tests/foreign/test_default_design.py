@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from design_oracle import made
+from design_oracle import design_and_report
 
 # Published plants: the source, A, B, C, and the number of actuators whose faults the measurements can tell apart.
 PLANTS = {
@@ -40,14 +40,14 @@ def peaks(plant, gains):
     gain = np.vstack([gains["L_x"], gains["L_f"]])
     a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
     observer = a_0 + np.vstack([b, np.zeros((m, m))]) @ k - gain @ np.hstack([c, np.zeros((p, m))])
-    found = np.zeros(2)
+    peak = np.zeros(2)
     speeds = np.abs(np.concatenate([np.linalg.eigvals(a), np.linalg.eigvals(observer)]))
     for w in np.geomspace(1e-3 * speeds[speeds > 1e-9].min(), 1e2 * speeds.max(), 3000):
         response = c @ np.linalg.solve(1j * w * np.eye(n) - a, b)
         controller = k @ np.linalg.solve(1j * w * np.eye(n + m) - observer, gain)
         for at, opened in enumerate((controller @ response, response @ controller)):
-            found[at] = max(found[at], np.linalg.norm(np.linalg.inv(np.eye(len(opened)) - opened), 2))
-    return found
+            peak[at] = max(peak[at], np.linalg.norm(np.linalg.inv(np.eye(len(opened)) - opened), 2))
+    return peak
 
 
 # The measurements with different units, so that the peak of S is judged in the units that make it least.
@@ -77,12 +77,12 @@ def designed(aso_ftc, tmp_path):
 def test_a_published_plant_without_requirements_has_a_green_design(designed, name):
     report = designed(written(PLANTS[name]) + 'actuator_faults = "all"\nrobustness.tolerance = 0.02\n')
     gains = {gain["name"]: np.array(gain["values"]) for gain in report["gains"]}
-    found = peaks(PLANTS[name], gains)
+    peak = peaks(PLANTS[name], gains)
     stated = [point["s_peak"] for point in report["robustness"]["points"]]
-    np.testing.assert_allclose(found, stated, rtol=0.01)
+    np.testing.assert_allclose(peak, stated, rtol=0.01)
     judged = [point["judged"] for point in report["robustness"]["points"]]
     assert max(judged) <= 2.0 and report["verdict"]["level"] == "green"
-    assert found.max() <= 2.0 or name == "helicopter"
+    assert peak.max() <= 2.0 or name == "helicopter"
     assert all("bandwidth" in report[part]["method"] for part in ("feedback", "observer"))
 
 
@@ -108,8 +108,8 @@ def test_units_of_states_and_measurements_do_not_change_the_loop(designed):
     scaled = [(state @ a @ np.linalg.inv(state)).tolist(), (state @ b).tolist(), (output @ c @ np.linalg.inv(state)).tolist()]
     one, other = (designed(written(plant) + 'actuator_faults = "all"\n') for plant in (PLANTS["two masses"], scaled))
     for part in ("feedback", "observer"):
-        found, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
-        np.testing.assert_allclose(found, expected, rtol=1e-6)
+        poles, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
+        np.testing.assert_allclose(poles, expected, rtol=1e-6)
 
 
 def test_a_sampled_eigenvalue_of_zero_leaves_the_observer_the_same_in_other_units_of_time(designed):
@@ -132,8 +132,8 @@ def test_integrators_in_other_coordinates_get_the_loop_of_the_integrators(design
     tail = 'actuator_faults = "all"\nrobustness.cases = 0\nrobustness.tolerance = 1e-6\n'
     one, other = (designed(head + written(plant) + tail) for plant in (PLANTS["double integrator"], other))
     for part in ("feedback", "observer"):
-        found, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
+        poles, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
+        np.testing.assert_allclose(poles, expected, rtol=1e-5)
 
 
 def test_a_sampled_design_without_requirements_is_slower_than_its_samples(designed):
@@ -290,7 +290,7 @@ actuator_faults = "all"
 
 
 def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_remedy_works(aso_ftc, tmp_path):
-    _, report = made(aso_ftc, tmp_path, AIRLINER)
+    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER)
     slowest = -max(pole[0] for pole in report["observer"]["eigenvalues"])
     (warning,) = report["warnings"]
     time = float(warning.split("settle in ")[1].split(" s")[0])
@@ -298,6 +298,6 @@ def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_re
     # The weak direction of the gain at rest, which the estimate of it is slow for.
     a, b, c = (np.array(tomllib.loads(AIRLINER)[name], float) for name in "ABC")
     assert np.linalg.cond(c @ np.linalg.solve(a, b)) > 1e5
-    _, report = made(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
+    _, report = design_and_report(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
     assert [fault["name"] for fault in report["plant"]["faults"]] == ["f_rudder"] and not report["warnings"]
     assert -max(pole[0] for pole in report["observer"]["eigenvalues"]) > 100 * slowest

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_are
 
-from design_oracle import Matrices, made
+from design_oracle import Matrices, design_and_report
 
 # A heated tank, a pendulum that falls, a cart with its position and speed.
 TANK = ([[-0.01]], [[0.02]], [[1]])
@@ -26,14 +26,14 @@ def plant_text(plant, inputs, outputs, more=""):
     return "\n".join(lines) + "\n"
 
 
-def command_dynamics(own):
+def command_dynamics(design):
     """The continuous controller: x' = M x + L y, u = K x with the states [x_hat; f_hat]."""
-    gain = np.hstack([own.K_x, own.K_f])
-    dynamics = np.block([[own.A, own.F_a], [np.zeros((own.q, own.n)), own.A_f]])
-    correction = np.vstack([own.L_x, own.L_f])
-    entry = np.vstack([own.B, np.zeros((own.q, own.B.shape[1]))])
-    seen = np.hstack([own.C, np.zeros((len(own.C), own.q))])
-    return dynamics + entry @ gain - correction @ seen, correction, gain
+    gain = np.hstack([design.K_x, design.K_f])
+    dynamics = np.block([[design.A, design.F_a], [np.zeros((design.q, design.n)), design.A_f]])
+    correction = np.vstack([design.L_x, design.L_f])
+    entry = np.vstack([design.B, np.zeros((design.q, design.B.shape[1]))])
+    output = np.hstack([design.C, np.zeros((len(design.C), design.q))])
+    return dynamics + entry @ gain - correction @ output, correction, gain
 
 
 def response(a, b, c, s):
@@ -54,8 +54,8 @@ def response(a, b, c, s):
 def test_the_peaks_of_a_continuous_loop_are_those_with_the_delays_themselves(
     aso_ftc, tmp_path, plant, inputs, outputs, more
 ):
-    own, report = made(aso_ftc, tmp_path, plant_text(plant, inputs, outputs, more))
-    dynamics, correction, gain = command_dynamics(own)
+    design, report = design_and_report(aso_ftc, tmp_path, plant_text(plant, inputs, outputs, more))
+    dynamics, correction, gain = command_dynamics(design)
     a, b, c = map(np.array, plant)
     peaks = np.zeros(2)
     for w in np.geomspace(1e-4, 1e3, 20_000):
@@ -63,9 +63,9 @@ def test_the_peaks_of_a_continuous_loop_are_those_with_the_delays_themselves(
         late = np.exp(-s * np.array(outputs))[:, None] * np.exp(-s * np.array(inputs))
         g, k = response(a, b, c, s) * late, response(dynamics, correction, gain, s)
         loops = k @ g, g @ k
-        peaks = np.maximum(peaks, [np.linalg.norm(np.linalg.inv(np.eye(len(own)) - own), 2) for own in loops])
-    found = report["robustness"]["delays"]["s_peaks"]
-    np.testing.assert_allclose(found, peaks, rtol=2e-3)
+        peaks = np.maximum(peaks, [np.linalg.norm(np.linalg.inv(np.eye(len(loop)) - loop), 2) for loop in loops])
+    s_peaks = report["robustness"]["delays"]["s_peaks"]
+    np.testing.assert_allclose(s_peaks, peaks, rtol=2e-3)
     # The loop of the other figures has delays of ten states each.
     np.testing.assert_allclose([point["s_peak"] for point in report["robustness"]["points"]], peaks, rtol=2e-3)
     assert report["robustness"]["delays"]["difference"] < 1
@@ -104,21 +104,21 @@ def test_a_sampled_loop_with_the_delays_themselves_has_the_stated_peak_and_rejec
     aso_ftc, tmp_path, plant, inputs, outputs, period, estimator
 ):
     more = f'sample_time = {period}\nestimator = "{estimator}"'
-    own, report = made(aso_ftc, tmp_path, plant_text(plant, inputs, outputs, more))
+    design, report = design_and_report(aso_ftc, tmp_path, plant_text(plant, inputs, outputs, more))
     c = np.array(plant[2])
     # With one command and one measurement only the sum of the delays counts.
     phi, late, early, k = held(plant, inputs[0] + outputs[0], period)
-    n, order, q = len(phi), own.n, own.q
-    a_0 = np.block([[own.A, own.F_a], [np.zeros((q, order)), own.A_f]])
-    seen, gain = np.hstack([own.C, np.zeros((1, q))]), np.hstack([own.K_x, own.K_f])
-    entry = np.vstack([own.B, np.zeros((q, 1))])
-    correction = np.vstack([own.L_x, own.L_f])
+    n, order, q = len(phi), design.n, design.q
+    a_0 = np.block([[design.A, design.F_a], [np.zeros((q, order)), design.A_f]])
+    output, gain = np.hstack([design.C, np.zeros((1, q))]), np.hstack([design.K_x, design.K_f])
+    entry = np.vstack([design.B, np.zeros((q, 1))])
+    correction = np.vstack([design.L_x, design.L_f])
     # States: x, the commands of the last k + 1 samples (newest first), prediction of [x_hat; f_hat].
     size = n + k + 1 + order + q
     whole, added = np.zeros((size, size)), np.zeros((size, 1))
     estimate = np.zeros((order + q, size))
     estimate[:, n + k + 1 :] = np.eye(order + q)
-    innovation = -seen @ estimate
+    innovation = -output @ estimate
     innovation[:, :n] += c
     if estimator == "current":
         corrected = estimate + correction @ innovation
@@ -159,9 +159,9 @@ def test_a_loop_that_only_the_approximation_holds_stable_is_red(aso_ftc, tmp_pat
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
     assert done.returncode == 1, done.stderr
     assert "does not hold: plant and controller are stable together" in done.stdout
-    own = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
-    dynamics, correction, gain = command_dynamics(own)
-    loop = np.block([[own.A, own.B @ gain], [correction @ own.C, dynamics]])
+    design = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+    dynamics, correction, gain = command_dynamics(design)
+    loop = np.block([[design.A, design.B @ gain], [correction @ design.C, dynamics]])
     assert max(np.linalg.eigvals(loop).real) < 0
     assert "no controller has a peak of S below 5.7" in done.stdout  # e^1.9 - 1
 
@@ -173,19 +173,19 @@ def test_the_worst_plant_keeps_its_delays_and_is_designed(aso_ftc, tmp_path):
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--worst-case", worst)
     assert done.returncode in (0, 1), done.stderr
     assert "B[2][1]" in done.stdout
-    found = tomllib.loads(worst.read_text(encoding="utf-8"))
-    assert np.shape(found["A"]) == (2, 2) and found["measurements"][1]["delay"] == 0.4
-    assert 0.35 * 0.999 <= found["B"][1][0] <= 0.65 * 1.001 and found["B"][1][0] != 0.5
+    plant = tomllib.loads(worst.read_text(encoding="utf-8"))
+    assert np.shape(plant["A"]) == (2, 2) and plant["measurements"][1]["delay"] == 0.4
+    assert 0.35 * 0.999 <= plant["B"][1][0] <= 0.65 * 1.001 and plant["B"][1][0] != 0.5
     assert aso_ftc("design", worst, "--out", tmp_path / "other.toml").returncode in (0, 1)
 
 
 def test_weights_are_those_of_the_states_of_the_plant(aso_ftc, tmp_path):
     """Q and W of two states: the regulator of the plant with zeros for the delay."""
     weights = "feedback.Q = [1, 0.1]\nfeedback.R = [1]\nobserver.W = [0.01, 0.1, 1]\nobserver.V = [0.1, 0.1]"
-    own, _ = made(aso_ftc, tmp_path, plant_text(CART, [0.1], [0, 0], weights))
+    design, _ = design_and_report(aso_ftc, tmp_path, plant_text(CART, [0.1], [0, 0], weights))
     q = np.diag([1, 0.1, 0, 0, 0])
-    p = solve_continuous_are(own.A, own.B, q, np.eye(1))
-    np.testing.assert_allclose(own.K_x, -own.B.T @ p, rtol=1e-6, atol=1e-9)
+    p = solve_continuous_are(design.A, design.B, q, np.eye(1))
+    np.testing.assert_allclose(design.K_x, -design.B.T @ p, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -216,10 +216,10 @@ def test_a_shift_register_is_a_plant_and_the_delay_that_takes_its_place_is_named
     rest = 'sample_time = 0.1\nactuator_faults = "all"\nC = [[1{}]]\n'
     a = [[0.9, 0, 0, 0.1], [0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]
     text = f'matrices = "sampled"\nA = {a}\nB = [[0], [1], [0], [0]]\n' + rest.format(", 0, 0, 0")
-    registers, report = made(aso_ftc, tmp_path, text)
+    registers, report = design_and_report(aso_ftc, tmp_path, text)
     assert any("`delay = 0.3` in the actuator" in warning for warning in report["warnings"]), report["warnings"]
     np.testing.assert_array_equal(registers.A, a)
     text = 'matrices = "sampled"\nA = [[0.9]]\nB = [[0.1]]\nactuators = [{ name = "u", delay = 0.3 }]\n' + rest.format("")
-    own, report = made(aso_ftc, tmp_path, text)
-    assert report["verdict"]["level"] == "green" and own.K_x.shape == (1, 4)
-    np.testing.assert_allclose(own.A[0, 0], 0.9, rtol=1e-12)
+    design, report = design_and_report(aso_ftc, tmp_path, text)
+    assert report["verdict"]["level"] == "green" and design.K_x.shape == (1, 4)
+    np.testing.assert_allclose(design.A[0, 0], 0.9, rtol=1e-12)

@@ -84,8 +84,8 @@ def test_the_levels_move_as_the_report_predicts(aso_ftc, python, tanks, tmp_path
             curve, size = designed.response(fault, level)
             part = np.interp(times, curve["times"], curve["values"], right=0.0)
             predicted += BOTH[f"plant.{fault}"] / size * part
-        found = table[f"plant.{level}"][300:600] - operating
-        assert abs(found - predicted).max() < 0.12 * abs(predicted).max(), level
+        deviation = table[f"plant.{level}"][300:600] - operating
+        assert abs(deviation - predicted).max() < 0.12 * abs(predicted).max(), level
 
 
 def test_without_compensation_the_same_faults_move_the_levels_permanently(
@@ -105,23 +105,23 @@ def test_losses_of_effectiveness_of_both_pumps_are_estimated(aso_ftc, python, ta
     table, _ = coupled(python, designed, tanks, settings)
     slowest = -max(re for re, _ in plane(designed.report["feedback"]["required"]))
     for (name, loss), fault, pump in zip(losses.items(), ("f_1", "f_2"), ("Q_1", "Q_2")):
-        found = table[designed.loss(fault)]
-        assert found[after(table, 300 + 5 / slowest)] == pytest.approx(loss, rel=0.02), name
+        estimate = table[designed.loss(fault)]
+        assert estimate[after(table, 300 + 5 / slowest)] == pytest.approx(loss, rel=0.02), name
         command = table[f"controller.{pump}"][-1]
         # The excitation threshold reduces it by u_e^2 / (u^2 + u_e^2).
-        seen = loss * command**2 / (command**2 + 1e-6**2)
-        assert found[-1] == pytest.approx(seen, rel=1e-6)
+        expected = loss * command**2 / (command**2 + 1e-6**2)
+        assert estimate[-1] == pytest.approx(expected, rel=1e-6)
     for level, operating in LEVELS.items():
         assert table[f"plant.{level}"][-1] == pytest.approx(operating, abs=1e-8)
     stable = designed.report["effectiveness"]
-    assert all(own["largest_stable_loss"] > losses[f"E_{k + 1}"] for k, own in enumerate(stable))
+    assert all(entry["largest_stable_loss"] > losses[f"E_{k + 1}"] for k, entry in enumerate(stable))
 
 
 def plane(eigenvalues, period=1.0):
     """Eigenvalues in 1/s of a loop that is sampled every `period` s."""
     return [
         (value.real, value.imag)
-        for value in np.log([complex(*own) for own in eigenvalues]) / period
+        for value in np.log([complex(*pair) for pair in eigenvalues]) / period
     ]
 
 
@@ -191,7 +191,7 @@ def test_without_friction_the_servo_moves_as_the_report_predicts(aso_ftc, python
     table, _ = coupled(python, designed, servo, settings, "--stop-time", 1, "--step", 1e-4)
     must_settle(table, designed, "f_u", 3, 0.1)
     times = table["time"] - 0.1
-    for name, found in (
+    for name, response in (
         ("theta", table["plant.theta"]),
         ("omega", table["plant.omega"]),
         ("error of f_u", table["controller.f_hat"] - 3),
@@ -199,7 +199,7 @@ def test_without_friction_the_servo_moves_as_the_report_predicts(aso_ftc, python
         curve, size = designed.response("f_u", name)
         fine = (times >= 0) & (times <= curve["times"][-1])
         predicted = 3 / size * np.interp(times[fine], curve["times"], curve["values"])
-        assert abs(found[fine] - predicted).max() < 0.01 * abs(predicted).max(), name
+        assert abs(response[fine] - predicted).max() < 0.01 * abs(predicted).max(), name
     assert abs(table["plant.theta"][-1]) < 1e-6
 
 
@@ -239,9 +239,9 @@ def test_only_the_ramp_model_follows_a_growing_fault_without_lag(
     error = table[designed.estimate("f_u")] - rate * np.maximum(table["time"] - 0.05, 0)
     late = after(table, 0.05 + 10 / 40)
     assert error[late] == pytest.approx(-rate * lag, abs=1e-4)
-    (bound,) = (own for own in designed.report["bounds"] if own["error"] == "error of f_u")
+    (bound,) = (entry for entry in designed.report["bounds"] if entry["error"] == "error of f_u")
     assert abs(error).max() <= rate * bound["gain_of_rate"]
     assert (abs(table["plant.theta"][-1]) < 1e-4) == (lag == 0)
     if name == "ramp":
-        found = table[designed.estimate("f_u_rate")][late]
-        assert found == pytest.approx(rate, rel=1e-3)
+        estimate = table[designed.estimate("f_u_rate")][late]
+        assert estimate == pytest.approx(rate, rel=1e-3)

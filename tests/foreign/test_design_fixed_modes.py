@@ -96,8 +96,8 @@ def test_kalman_filters_of_detectable_plants_are_those_of_scipy(aso_ftc, tmp_pat
         a_0 = np.block([[a, -b], [np.zeros((1, 7))]])
         expected = solve_continuous_are(a_0.T, c_0.T, w, v) @ c_0.T @ np.linalg.inv(v)
     report = reported(aso_ftc, tmp_path, text)
-    found = np.vstack([gain(report, "L_x"), -gain(report, "L_f")])
-    assert found == pytest.approx(expected, rel=1e-7, abs=1e-7 * np.abs(expected).max())
+    gains = np.vstack([gain(report, "L_x"), -gain(report, "L_f")])
+    assert gains == pytest.approx(expected, rel=1e-7, abs=1e-7 * np.abs(expected).max())
     assert "(A, C) is detectable" in [check["condition"] for check in report["checks"]]
 
 
@@ -111,14 +111,14 @@ def test_only_the_movable_eigenvalues_are_assigned(aso_ftc, tmp_path, sampled):
     a, b, c = stabilisable(rng)
     text = matrices(A=a, B=b, C=c) + 'actuator_faults = "all"\nrobustness.cases = 10\n'
     text += f"feedback.eigenvalues = [-3, {REQUESTED}, -4, -5]\nobserver.region = {{ decay = 1 }}\n"
-    wanted = np.array([-5, -4, -3, *FIXED])
+    expected = np.array([-5, -4, -3, *FIXED])
     if sampled:
         text += f"sample_time = {PERIOD}\n"
         a, b = zero_order_hold(a, b)
-        wanted = np.exp(wanted * PERIOD)
-    found = np.linalg.eigvals(a + b @ gain(reported(aso_ftc, tmp_path, text), "K_x"))
-    for value in wanted:
-        assert np.abs(found - value).min() < 1e-7
+        expected = np.exp(expected * PERIOD)
+    eigenvalues = np.linalg.eigvals(a + b @ gain(reported(aso_ftc, tmp_path, text), "K_x"))
+    for value in expected:
+        assert np.abs(eigenvalues - value).min() < 1e-7
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -128,21 +128,21 @@ def test_an_observer_assigns_what_the_measurements_show(aso_ftc, tmp_path, sampl
     b = b[:, :1]
     text = matrices(A=a, B=b, C=c) + 'actuator_faults = "all"\nrobustness.cases = 10\n'
     text += f"feedback.region = {{ decay = 0.1 }}\nobserver.eigenvalues = [{REQUESTED}, -6, -7, -8, -9]\n"
-    wanted = np.array([-6, -7, -8, -9, *FIXED])
+    expected = np.array([-6, -7, -8, -9, *FIXED])
     if sampled:
         text += f'sample_time = {PERIOD}\nestimator = "prediction"\n'
         a, b = zero_order_hold(a, b)
-        wanted = np.exp(wanted * PERIOD)
+        expected = np.exp(expected * PERIOD)
     report = reported(aso_ftc, tmp_path, text)
     a_0 = np.block([[a, -b], [np.zeros((1, 6)), np.eye(1) if sampled else np.zeros((1, 1))]])
     l = np.vstack([gain(report, "L_x"), -gain(report, "L_f")])
     closed = a_0 - l @ np.hstack([c, np.zeros((1, 1))])
-    found, vectors = np.linalg.eig(closed)
+    eigenvalues, vectors = np.linalg.eig(closed)
     # What rounding the entries of the loop does to its worst conditioned eigenvalue (Bauer and Fike 1960).
     rounding = np.finfo(float).eps * np.linalg.norm(closed) * np.linalg.cond(vectors)
     assert rounding < 1e-4
-    for value in wanted:
-        assert np.abs(found - value).min() < rounding
+    for value in expected:
+        assert np.abs(eigenvalues - value).min() < rounding
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -159,10 +159,10 @@ def test_regions_and_norms_are_met_where_the_fixed_modes_are_inside(aso_ftc, tmp
     text += f"sample_time = {PERIOD}\n" if sampled else ""
     report = reported(aso_ftc, tmp_path, text)
     for table, decay in (("feedback", 2), ("observer", 3)):
-        found = np.array([complex(*pair) for pair in report[table]["eigenvalues"]])
-        found = np.log(found) / PERIOD if sampled else found
-        assert (found.real < -decay).all() and np.abs(found + 4).min() < 1e-9
-        assert sampled or (np.abs(found + 10) < 8).all()
+        eigenvalues = np.array([complex(*pair) for pair in report[table]["eigenvalues"]])
+        eigenvalues = np.log(eigenvalues) / PERIOD if sampled else eigenvalues
+        assert (eigenvalues.real < -decay).all() and np.abs(eigenvalues + 4).min() < 1e-9
+        assert sampled or (np.abs(eigenvalues + 10) < 8).all()
     assert sum("keeps its eigenvalue" in warning for warning in report["warnings"]) == 2
 
 
@@ -256,5 +256,5 @@ def test_noise_does_not_reach_a_mode_that_no_gain_moves(aso_ftc, tmp_path):
     covariance = solve_continuous_lyapunov(a, -b @ b.T)
     row = np.array([0, *k[0], k_f[0, 0]])
     expected = np.sqrt(row @ covariance @ row)
-    found = next(own["value"] for own in report["robustness"]["noise_together"] if own["name"] == "u1")
-    assert found == pytest.approx(expected, rel=1e-9)
+    rms = next(entry["value"] for entry in report["robustness"]["noise_together"] if entry["name"] == "u1")
+    assert rms == pytest.approx(expected, rel=1e-9)

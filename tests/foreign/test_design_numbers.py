@@ -49,7 +49,7 @@ def case(request, aso_ftc, tmp_path_factory):
 
 def numbers(report, name):
     """A matrix of the report."""
-    return np.array([own for own in report["gains"] if own["name"] == name][0]["values"])
+    return np.array([matrix for matrix in report["gains"] if matrix["name"] == name][0]["values"])
 
 
 def complex_numbers(pairs):
@@ -70,58 +70,58 @@ def faults(designed):
 
 def stated_faults(designed):
     """Positions of the faults that the report has, without the rates."""
-    return [faults(designed).index(own["name"]) for own in designed.report["plant"]["faults"]]
+    return [faults(designed).index(fault["name"]) for fault in designed.report["plant"]["faults"]]
 
 
 def test_the_design_file_has_the_gains_of_the_report_and_the_fmu_reads_it(case, tmp_path):
-    designed, own, _ = case
+    designed, matrices, _ = case
     for name in ("K_x", "K_f", "L_x", "L_f"):
-        assert (numbers(designed.report, name) == getattr(own, name)).all()
+        assert (numbers(designed.report, name) == getattr(matrices, name)).all()
     unpacked = extract(str(designed.fmu), unzipdir=str(tmp_path))
     starts = {v.name: v.start for v in read_model_description(unpacked).modelVariables}
     for name in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"):
-        for (i, j), value in np.ndenumerate(getattr(own, name)):
+        for (i, j), value in np.ndenumerate(getattr(matrices, name)):
             assert float(starts[f"{name}[{i + 1},{j + 1}]"]) == value
-    interface = {own["name"]: own["start"] for own in designed.report["interface"]}
+    interface = {variable["name"]: variable["start"] for variable in designed.report["interface"]}
     assert {name: starts[name] for name in interface} == interface
 
 
 def test_the_eigenvalues_of_both_loops_are_those_of_the_plant_file(case):
-    designed, own, _ = case
-    for name, dynamics in (("feedback", own.fed_back), ("observer", own.error_dynamics)):
+    designed, matrices, _ = case
+    for name, dynamics in (("feedback", matrices.fed_back), ("observer", matrices.error_dynamics)):
         loop, wish = designed.report[name], designed.plant_file[name]
-        found = np.sort_complex(np.linalg.eigvals(dynamics))
-        assert found == pytest.approx(complex_numbers(loop["eigenvalues"]), rel=1e-8)
+        eigenvalues = np.sort_complex(np.linalg.eigvals(dynamics))
+        assert eigenvalues == pytest.approx(complex_numbers(loop["eigenvalues"]), rel=1e-8)
         if "eigenvalues" in wish:
-            wanted = np.sort(wish["eigenvalues"])
-            wanted = wanted if own.period is None else np.exp(wanted * own.period)
-            assert complex_numbers(loop["required"]) == pytest.approx(wanted, rel=1e-14)
-            assert found == pytest.approx(wanted, rel=1e-8) and loop["pole_error"] < 1e-9
+            required = np.sort(wish["eigenvalues"])
+            required = required if matrices.period is None else np.exp(required * matrices.period)
+            assert complex_numbers(loop["required"]) == pytest.approx(required, rel=1e-14)
+            assert eigenvalues == pytest.approx(required, rel=1e-8) and loop["pole_error"] < 1e-9
     a = np.array(designed.report["plant"]["matrices"][0]["values"])
     stated = complex_numbers(designed.report["plant"]["eigenvalues"])
     assert np.sort_complex(np.linalg.eigvals(a)) == pytest.approx(stated, abs=1e-9)
 
 
 def test_the_sampled_plant_is_the_matrix_exponential(case):
-    designed, own, _ = case
+    designed, matrices, _ = case
     a, b, _, *_ = (np.array(m["values"]) for m in designed.report["plant"]["matrices"])
     n, m = b.shape
-    if own.period is None:
-        assert (own.A[:n, :n] == a).all() and (own.B[:n] == b).all()
+    if matrices.period is None:
+        assert (matrices.A[:n, :n] == a).all() and (matrices.B[:n] == b).all()
         return
-    held = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * own.period)
-    assert own.A[:n, :n] == pytest.approx(held[:n, :n], rel=1e-13)
-    assert own.B[:n] == pytest.approx(held[:n, n:], rel=1e-13)
-    assert own.F_a[:n, :m] == pytest.approx(own.B[:n], rel=1e-13), "a fault of each pump"
+    held = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * matrices.period)
+    assert matrices.A[:n, :n] == pytest.approx(held[:n, :n], rel=1e-13)
+    assert matrices.B[:n] == pytest.approx(held[:n, n:], rel=1e-13)
+    assert matrices.F_a[:n, :m] == pytest.approx(matrices.B[:n], rel=1e-13), "a fault of each pump"
     shown = {m["name"]: np.array(m["values"]) for m in designed.report["plant"]["matrices"]}
     assert (shown["F_a"][:, :m] == b).all()
-    if own.filtered:
-        part = 1 - np.exp(-designed.plant_file["filter"] * own.period)
+    if matrices.filtered:
+        part = 1 - np.exp(-designed.plant_file["filter"] * matrices.period)
         assert designed.design["filter"] == pytest.approx([part] * 3, rel=1e-14)
 
 
 def test_the_ranks_are_full(case):
-    designed, own, _ = case
+    designed, matrices, _ = case
     a, b, c, *_ = (np.array(m["values"]) for m in designed.report["plant"]["matrices"])
     powers = [np.linalg.matrix_power(a / np.linalg.norm(a), k) for k in range(len(a))]
     reached = np.linalg.matrix_rank(np.hstack([power @ b for power in powers]))
@@ -130,48 +130,48 @@ def test_the_ranks_are_full(case):
     assert controllable["holds"] and controllable["explanation"].startswith(f"rank {reached} of ")
     assert reached == len(a)
     # For constant faults: no invariant zero at 0, or at 1 for the sampled plant.
-    shift = 0.0 if own.period is None else 1.0
+    shift = 0.0 if matrices.period is None else 1.0
     first = stated_faults(designed)
     pencil = np.block(
         [
-            [own.A - shift * np.eye(own.n), own.F_a[:, first]],
-            [own.C, np.zeros((len(own.C), len(first)))],
+            [matrices.A - shift * np.eye(matrices.n), matrices.F_a[:, first]],
+            [matrices.C, np.zeros((len(matrices.C), len(first)))],
         ]
     )
     scale = abs(pencil).max(axis=0)
-    assert np.linalg.matrix_rank(pencil / scale) == own.n + len(first)
+    assert np.linalg.matrix_rank(pencil / scale) == matrices.n + len(first)
     assert checks["the augmented observer exists"]["holds"]
 
 
 def test_the_compensation_cancels_the_faults(case):
-    designed, own, _ = case
+    designed, matrices, _ = case
     n = len(designed.report["plant"]["states"])
-    wanted = -np.linalg.pinv(own.B[:n]) @ own.F_a[:n]
-    assert own.K_f == pytest.approx(wanted, abs=1e-12)
+    expected = -np.linalg.pinv(matrices.B[:n]) @ matrices.F_a[:n]
+    assert matrices.K_f == pytest.approx(expected, abs=1e-12)
     stable = [c for c in designed.report["checks"] if c["condition"].startswith("plant and con")][0]
-    eigenvalues = np.linalg.eigvals(closed_loop(own)[0])
-    worst = eigenvalues.real.max() if own.period is None else abs(eigenvalues).max() - 1
+    eigenvalues = np.linalg.eigvals(closed_loop(matrices)[0])
+    worst = eigenvalues.real.max() if matrices.period is None else abs(eigenvalues).max() - 1
     assert stable["value"] == pytest.approx(worst, rel=1e-6) and worst < 0
 
 
 PARTS = 32
 
 
-def between_samples(designed, own, samples):
+def between_samples(designed, matrices, samples):
     """Sums of the moduli of the loop's responses to faults that are an impulse, and a step, of one part of
     an interval; of the states the largest over the parts at which they are read."""
     shown = {m["name"]: np.array(m["values"]) for m in designed.report["plant"]["matrices"]}
-    (n, m), q, whole = shown["B"].shape, own.q, own.n
+    (n, m), q, whole = shown["B"].shape, matrices.q, matrices.n
     held = np.zeros((n + m + q, n + m + q))
-    held[:n] = np.hstack([shown["A"], shown["B"], own.F_a[:n] * 0])
+    held[:n] = np.hstack([shown["A"], shown["B"], matrices.F_a[:n] * 0])
     # A fault that does not act on the plant's states acts on the filter, which sees it at the samples.
     held[:n, n + m : n + m + shown["F_a"].shape[1]] = shown["F_a"]
-    step = expm(held * own.period / PARTS)[:n]
+    step = expm(held * matrices.period / PARTS)[:n]
     # Columns: the part of the impulse, then the fault.
     wide = PARTS * q
     kind = np.tile(np.eye(q), PARTS)
     part = np.repeat(np.arange(PARTS), q)
-    found = []
+    gains = []
     for lasts in (False, True):
         x, x_hat, f_hat = np.zeros((whole, wide)), np.zeros((whole, wide)), np.zeros((q, wide))
         sums = np.zeros((PARTS, n, wide))
@@ -180,19 +180,19 @@ def between_samples(designed, own, samples):
 
             def fault(i, first=k == 0):
                 if lasts:
-                    return kind * (own.period / PARTS) * ((part < i) | (not first))
+                    return kind * (matrices.period / PARTS) * ((part < i) | (not first))
                 return kind * (first & (part == i))
 
-            innovation = own.C @ (x - x_hat)
-            seen, faults_seen = x_hat, f_hat
-            if own.current:
-                seen, faults_seen = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
-            u = own.K_x @ seen + own.K_f @ faults_seen
-            errors += abs(np.vstack([x - seen, faults_seen - fault(0)]))
-            late = (1 - own.current) * innovation
-            x_hat = own.A @ seen + own.B @ u + own.F_a @ faults_seen + own.L_x @ late
-            f_hat = own.A_f @ faults_seen + own.L_f @ late
-            filtered = own.A[n:] @ x + own.F_a[n:] @ fault(0)
+            innovation = matrices.C @ (x - x_hat)
+            estimate, faults_seen = x_hat, f_hat
+            if matrices.current:
+                estimate, faults_seen = x_hat + matrices.L_x @ innovation, f_hat + matrices.L_f @ innovation
+            u = matrices.K_x @ estimate + matrices.K_f @ faults_seen
+            errors += abs(np.vstack([x - estimate, faults_seen - fault(0)]))
+            late = (1 - matrices.current) * innovation
+            x_hat = matrices.A @ estimate + matrices.B @ u + matrices.F_a @ faults_seen + matrices.L_x @ late
+            f_hat = matrices.A_f @ faults_seen + matrices.L_f @ late
+            filtered = matrices.A[n:] @ x + matrices.F_a[n:] @ fault(0)
             own_x = x[:n]
             for i in range(PARTS):
                 sums[i] += abs(own_x)
@@ -200,22 +200,22 @@ def between_samples(designed, own, samples):
             x = np.vstack([own_x, filtered])
         each = lambda rows: rows.reshape(*rows.shape[:-1], PARTS, q).sum(axis=-2)
         filters = np.zeros((whole - n, q))
-        found.append(np.vstack([each(sums).max(axis=0), filters, each(errors)]))
-    return found
+        gains.append(np.vstack([each(sums).max(axis=0), filters, each(errors)]))
+    return gains
 
 
 def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
     """The gain from the rate of a constant fault is the integral of the step response. In a sampled loop
     faults change, and states are seen, between the samples too."""
-    designed, own, horizon = case
-    if own.period is None:
-        system = closed_loop(own)
-        times, impulse, step = responses(system, own.period, horizon)
-        of_fault = abs(system[3]) + total(times, abs(impulse), own.period)
-        of_rate = total(times, abs(step), own.period)
+    designed, matrices, horizon = case
+    if matrices.period is None:
+        system = closed_loop(matrices)
+        times, impulse, step = responses(system, matrices.period, horizon)
+        of_fault = abs(system[3]) + total(times, abs(impulse), matrices.period)
+        of_rate = total(times, abs(step), matrices.period)
     else:
-        of_fault, of_rate = between_samples(designed, own, horizon)
-    stated = {own["name"]: own for own in designed.plant_file.get("faults", [])}
+        of_fault, of_rate = between_samples(designed, matrices, horizon)
+    stated = {entry["name"]: entry for entry in designed.plant_file.get("faults", [])}
     for bound in designed.report["bounds"]:
         at = outputs(designed).index(bound["error"]), faults(designed).index(bound["fault"])
         # If a fault does not affect a state, both values are rounding errors.
@@ -267,100 +267,100 @@ def between(report, states, commands, fault, times):
 
 def plant_matrix(report, name):
     """A matrix of the plant in continuous time."""
-    return np.array(next(own["values"] for own in report["plant"]["matrices"] if own["name"] == name))
+    return np.array(next(matrix["values"] for matrix in report["plant"]["matrices"] if matrix["name"] == name))
 
 
 def test_the_responses_to_changes_of_faults_are_those_of_scipy(case):
     """States, errors and commands, each fault alone and all together; between samples, too."""
-    designed, own, _ = case
-    system = closed_loop(own)
+    designed, matrices, _ = case
+    system = closed_loop(matrices)
     names, order = outputs(designed), len(system[0])
     actuators = [f"command {actuator['name']}" for actuator in designed.design["actuators"]]
     together = [steps for steps in designed.report["steps"] if len(steps["parts"]) > 1]
     assert len(together) == (len(stated_faults(designed)) > 1)
     for steps in designed.report["steps"]:
-        direction = np.zeros(own.q)
+        direction = np.zeros(matrices.q)
         for part in steps["parts"]:
             direction[faults(designed).index(part["name"])] = part["value"] / steps["size"]
         rows = np.hstack([system[2], system[3] @ direction[:, None]])
-        rows = np.vstack([rows, np.hstack([commands(own), np.zeros((len(actuators), 1))])])
+        rows = np.vstack([rows, np.hstack([commands(matrices), np.zeros((len(actuators), 1))])])
         every = [*names, *actuators]
         shown = [curve["name"] for curve in steps["curves"]]
         assert set(actuators) <= set(shown)
         for curve in steps["curves"]:
             at, times = every.index(curve["name"]), np.array(curve["times"])
             some = times[::7]
-            samples = some if own.period is None else np.floor(some / own.period + 1e-6) * own.period
-            change = (direction, steps["rate"], steps["size"], own.period, samples)
+            samples = some if matrices.period is None else np.floor(some / matrices.period + 1e-6) * matrices.period
+            change = (direction, steps["rate"], steps["size"], matrices.period, samples)
             states = driven(system, *change)[:, : order + 1]
-            wanted = states @ rows[at]
-            within = np.flatnonzero(some - samples > 1e-6 * (own.period or np.inf))
-            if own.period is not None:
+            expected = states @ rows[at]
+            within = np.flatnonzero(some - samples > 1e-6 * (matrices.period or np.inf))
+            if matrices.period is not None:
                 is_state = at < len(designed.report["plant"]["states"])
                 assert (len(within) > 0) == (is_state or curve["name"] in actuators)
                 if is_state:
                     u = states[within] @ rows[len(names) :].T
                     fault = direction * steps["size"]
                     elapsed = (some - samples)[within]
-                    wanted[within] = between(designed.report, states[within], u, fault, elapsed)[:, at]
-            found = np.array(curve["values"])
+                    expected[within] = between(designed.report, states[within], u, fault, elapsed)[:, at]
+            values = np.array(curve["values"])
             # If the fault does not affect an error, the error is due to rounding.
-            band = 1e-5 * abs(found).max() + 1e-17 * steps["size"]
-            assert found[::7] == pytest.approx(wanted, abs=band), curve["name"]
-            assert abs(found).max() <= abs(curve["peak"]) * (1 + 1e-12)
-            assert abs(found).max() == pytest.approx(abs(curve["peak"]), rel=1e-2)
-            distance = abs(found - found[-1])
+            band = 1e-5 * abs(values).max() + 1e-17 * steps["size"]
+            assert values[::7] == pytest.approx(expected, abs=band), curve["name"]
+            assert abs(values).max() <= abs(curve["peak"]) * (1 + 1e-12)
+            assert abs(values).max() == pytest.approx(abs(curve["peak"]), rel=1e-2)
+            distance = abs(values - values[-1])
             last = np.flatnonzero(distance > 0.02 * distance.max())[-1]
             assert times[last] <= curve["settling_time"] <= times[last + 1]
 
 
-def error_response(designed, own, frequency):
+def error_response(designed, matrices, frequency):
     """From the faults to the errors of their estimates."""
-    response = frequency_response(closed_loop(own), own.period, frequency)[2 * own.n :]
+    response = frequency_response(closed_loop(matrices), matrices.period, frequency)[2 * matrices.n :]
     return response[np.ix_(stated_faults(designed), stated_faults(designed))]
 
 
-def rate_response(designed, own, frequency):
+def rate_response(designed, matrices, frequency):
     """From the rates of the faults to the errors of their estimates."""
-    response = frequency_response(closed_loop(own), own.period, frequency)[2 * own.n :]
-    point = 1j * frequency if own.period is None else np.exp(1j * frequency * own.period)
-    response = response @ np.linalg.inv(point * np.eye(own.q) - own.A_f)
+    response = frequency_response(closed_loop(matrices), matrices.period, frequency)[2 * matrices.n :]
+    point = 1j * frequency if matrices.period is None else np.exp(1j * frequency * matrices.period)
+    response = response @ np.linalg.inv(point * np.eye(matrices.q) - matrices.A_f)
     return response[np.ix_(stated_faults(designed), stated_faults(designed))]
 
 
 def test_the_singular_values_are_those_of_numpy(case):
-    designed, own, _ = case
-    error = lambda w: error_response(designed, own, w)
-    rate = lambda w: rate_response(designed, own, w)
-    wanted = {
+    designed, matrices, _ = case
+    error = lambda w: error_response(designed, matrices, w)
+    rate = lambda w: rate_response(designed, matrices, w)
+    expected = {
         "faults to their estimates": lambda w: error(w) + np.eye(len(stated_faults(designed))),
         "faults to the errors of their estimates": error,
         "rates of the faults to the errors of their estimates": rate,
     }
     curves = {curve["name"]: curve for curve in designed.report["frequency"]}
-    assert set(curves) == set(wanted)
-    for name, response in wanted.items():
+    assert set(curves) == set(expected)
+    for name, response in expected.items():
         frequencies = curves[name]["frequencies"]
         values = [np.linalg.svd(response(w), compute_uv=False) for w in frequencies]
-        found = np.transpose(curves[name]["singular_values"])
-        assert found == pytest.approx(np.array(values), rel=1e-5, abs=1e-9)
+        sigma = np.transpose(curves[name]["singular_values"])
+        assert sigma == pytest.approx(np.array(values), rel=1e-5, abs=1e-9)
 
 
 def test_the_norms_are_those_of_numpy_and_scipy(case):
-    designed, own, _ = case
+    designed, matrices, _ = case
     norms = {norm["name"]: norm["value"] for norm in designed.report["certificate"]["norms"]}
-    size = lambda w: np.linalg.norm(rate_response(designed, own, w), 2)
-    highest = 1e5 if own.period is None else np.pi / own.period
+    size = lambda w: np.linalg.norm(rate_response(designed, matrices, w), 2)
+    highest = 1e5 if matrices.period is None else np.pi / matrices.period
     grid = np.geomspace(1e-6 * highest, highest, 2000)
     at = grid[np.argmax([size(w) for w in grid])]
-    found = minimize_scalar(lambda w: -size(w), bounds=(0.9 * at, min(1.1 * at, highest)))
-    assert norms["H-infinity"] == pytest.approx(max(-found.fun, size(at)), rel=2e-3)
-    rows = own.n + np.array(stated_faults(designed))
-    rate = -np.eye(own.n + own.q)[:, rows]
-    if own.current:
-        _, c_0, gain = own.augmented
+    optimum = minimize_scalar(lambda w: -size(w), bounds=(0.9 * at, min(1.1 * at, highest)))
+    assert norms["H-infinity"] == pytest.approx(max(-optimum.fun, size(at)), rel=2e-3)
+    rows = matrices.n + np.array(stated_faults(designed))
+    rate = -np.eye(matrices.n + matrices.q)[:, rows]
+    if matrices.current:
+        _, c_0, gain = matrices.augmented
         rate = rate - gain @ c_0 @ rate
-    covariance = lyapunov(own.error_dynamics.T, rate @ rate.T, own.period)
+    covariance = lyapunov(matrices.error_dynamics.T, rate @ rate.T, matrices.period)
     covariance = covariance[np.ix_(rows, rows)]
     assert norms["H2"] == pytest.approx(np.sqrt(np.trace(covariance)), rel=1e-6)
     largest = np.linalg.eigvalsh(covariance)[-1]
@@ -368,19 +368,19 @@ def test_the_norms_are_those_of_numpy_and_scipy(case):
 
 
 def test_theorem_1_is_that_of_scipy(case):
-    designed, own, _ = case
+    designed, matrices, _ = case
     certificate = designed.report["certificate"]
-    if own.period is not None:
+    if matrices.period is not None:
         assert "continuous time" in certificate["printed"]["reason"]
         return
     bounds = [fault.get("bound") for fault in designed.plant_file.get("faults", [{}])]
-    if own.A_f.any() or None in bounds:
+    if matrices.A_f.any() or None in bounds:
         assert any(text in certificate["printed"]["reason"] for text in ("constant", "`bound`"))
         return
-    printed, dynamics, beta = certificate["printed"], own.error_dynamics, 30.0
+    printed, dynamics, beta = certificate["printed"], matrices.error_dynamics, 30.0
     assert printed["beta"] == beta == np.linalg.norm(bounds)
     p = lyapunov(dynamics, printed["alpha"] * beta * np.eye(len(dynamics)), None)
-    fault = np.vstack([own.F_a, np.zeros((own.q, own.q))])
+    fault = np.vstack([matrices.F_a, np.zeros((matrices.q, matrices.q))])
     delta = 2 / printed["alpha"] * np.linalg.norm(p @ fault, 2)
     assert printed["delta"] == pytest.approx(delta, rel=1e-6)
     assert np.array(printed["p"]) == pytest.approx(p, rel=1e-6, abs=1e-6 * abs(p).max())
@@ -401,17 +401,17 @@ def test_the_largest_stable_loss_is_where_an_eigenvalue_becomes_unstable(aso_ftc
     text += '[[faults]]\nname = "f_loss"\nloss_of = "u"\nleast_command = 1.0\n'
     file.write_text(text, encoding="utf-8")
     designed = Designed(aso_ftc, file, tmp_path)
-    own = Matrices(designed.design)
-    unstable = lambda loss: np.linalg.eigvals(closed_loop(own, [loss])[0]).real.max() > 0
+    matrices = Matrices(designed.design)
+    unstable = lambda loss: np.linalg.eigvals(closed_loop(matrices, [loss])[0]).real.max() > 0
     low, high = 0.0, 1.0
     for loss in np.linspace(0, 1, 2001):
         if unstable(loss):
             high = loss
             break
         low = loss
-    (found,) = designed.report["effectiveness"]
-    assert found["actuator"] == "u"
-    assert low - 1e-3 <= found["largest_stable_loss"] <= high + 1e-3
+    (effectiveness,) = designed.report["effectiveness"]
+    assert effectiveness["actuator"] == "u"
+    assert low - 1e-3 <= effectiveness["largest_stable_loss"] <= high + 1e-3
 
 
 def test_bounds_and_predictions_bracket_the_simulation(aso_ftc, python, packed, tmp_path):
@@ -430,7 +430,7 @@ def test_bounds_and_predictions_bracket_the_simulation(aso_ftc, python, packed, 
     names = ["x_p", "theta", "v_p", "omega"]
     shown = {name: np.ptp(late[f"plant.{name}"]) / 2 for name in names}
     shown["error of f_fric"] = abs(late["controller.f_hat"] - friction).max()
-    bounds = {own["error"]: own["largest"] for own in designed.report["bounds"]}
+    bounds = {bound["error"]: bound["largest"] for bound in designed.report["bounds"]}
     for name in ("x_p", "theta", "error of f_fric"):
         assert shown[name] <= bounds[name] <= 3 * shown[name]
     jump, glide = designed.report["steps"]
@@ -442,12 +442,12 @@ def test_bounds_and_predictions_bracket_the_simulation(aso_ftc, python, packed, 
 
 
 def test_an_fmu_is_made_without_a_compiler(aso_ftc, tmp_path):
-    made = [tmp_path / name for name in ("with.fmu", "without.fmu")]
-    for fmu, environment in zip(made, ({}, {"env": {"PATH": "/nonexistent"}})):
+    fmus = [tmp_path / name for name in ("with.fmu", "without.fmu")]
+    for fmu, environment in zip(fmus, ({}, {"env": {"PATH": "/nonexistent"}})):
         arguments = (PENDULUM, "--out", tmp_path / "design.toml", "--fmu", fmu)
         done = aso_ftc("design", *arguments, **environment)
         assert done.returncode == 1 and "verdict: red" in done.stdout, done.stderr
-    assert made[0].read_bytes() == made[1].read_bytes()
+    assert fmus[0].read_bytes() == fmus[1].read_bytes()
 
 
 @pytest.mark.parametrize("period", [0.001, 0.004])

@@ -56,15 +56,15 @@ def test_exactly_the_names_of_the_controllers_own_variables_are_refused(aso_ftc,
     if variant == "filtered":
         # The position of a mass without a spring hides the offset of its sensor.
         text = text.replace("[0, 0]]", "[-2, -1]]")
-    own = variables(aso_ftc, tmp_path, text)
-    if own is None:
+    reserved = variables(aso_ftc, tmp_path, text)
+    if reserved is None:
         pytest.fail("the plant file itself is refused")
     actuator = "u" if variant == "sampled" else "u1"
     named = lambda name: text.replace('["y"]', json.dumps([name])).replace(
         'sensor = "y"', f"sensor = {json.dumps(name)}"
     )
     arrays = {}
-    for name in set(own) - {"y", actuator}:
+    for name in set(reserved) - {"y", actuator}:
         arrays.setdefault(name.partition("[")[0], name)
     for name in arrays.values():
         assert variables(aso_ftc, tmp_path, named(name)) is None, name
@@ -81,10 +81,10 @@ def test_exactly_the_names_of_the_controllers_own_variables_are_refused(aso_ftc,
         "A_f",
         "x_hat",
         "der(y)",
-    } - set(own)
+    } - set(reserved)
     for name in free:
-        found = variables(aso_ftc, tmp_path, named(name))
-        assert found is not None and name in found, name
+        names = variables(aso_ftc, tmp_path, named(name))
+        assert names is not None and name in names, name
 
 
 def test_a_cart_without_friction_is_linearised_as_one_that_nothing_holds(aso_ftc, tmp_path):
@@ -100,11 +100,11 @@ observer.eigenvalues = [-30, -33, -36, -39, -42]
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json")
     assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
-    found = {own["name"]: np.array(own["values"]) for own in report["plant"]["matrices"]}
+    matrices = {matrix["name"]: np.array(matrix["values"]) for matrix in report["plant"]["matrices"]}
     a, b = linearised_pendulum()
     # The expected values are differences, with a step of 1e-6.
-    assert found["A"] == pytest.approx(a, abs=1e-7) and found["B"] == pytest.approx(b, abs=1e-8)
-    assert found["B"][:, 0] == pytest.approx([0, 0, 0.3205, -1.0095], abs=5e-5)
+    assert matrices["A"] == pytest.approx(a, abs=1e-7) and matrices["B"] == pytest.approx(b, abs=1e-8)
+    assert matrices["B"][:, 0] == pytest.approx([0, 0, 0.3205, -1.0095], abs=5e-5)
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +145,9 @@ def test_an_fmu_that_needs_python_and_states_no_step_is_designed_for(aso_ftc, tm
     )
     assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
-    found = {own["name"]: np.array(own["values"]) for own in report["plant"]["matrices"]}
+    matrices = {matrix["name"]: np.array(matrix["values"]) for matrix in report["plant"]["matrices"]}
     a, b = linearised_pendulum()
-    assert found["A"] == pytest.approx(a, abs=1e-6) and found["B"] == pytest.approx(b, abs=1e-7)
+    assert matrices["A"] == pytest.approx(a, abs=1e-6) and matrices["B"] == pytest.approx(b, abs=1e-7)
 
 
 def test_an_fmu_whose_library_is_missing_names_the_option_and_one_that_fails_to_load_its_line(
@@ -167,7 +167,7 @@ def test_an_fmu_whose_library_is_missing_names_the_option_and_one_that_fails_to_
 
 def test_an_fmu_without_a_step_is_linearised_like_one_with_a_step(aso_ftc, tmp_path):
     """DcServo by steps, with and without its stepSize; held by friction no step gives a result."""
-    found = []
+    matrices = []
     for step in ((), ((r' stepSize="[^"]*"', ""),)):
         changes = (NO_EXCHANGE, NO_DERIVATIVES, *step)
         poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
@@ -175,8 +175,8 @@ def test_an_fmu_without_a_step_is_linearised_like_one_with_a_step(aso_ftc, tmp_p
         (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
         done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json")
         assert done.returncode == 0, done.stderr
-        found.append(json.loads(done.stdout)["plant"]["matrices"])
-    for one, other in zip(*found, strict=True):
+        matrices.append(json.loads(done.stdout)["plant"]["matrices"])
+    for one, other in zip(*matrices, strict=True):
         assert np.array(one["values"]) == pytest.approx(np.array(other["values"]), rel=1e-9, abs=1e-9)
     (tmp_path / "plant.toml").write_text(text.replace("friction = 0", "friction = 1"), encoding="utf-8")
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml")

@@ -37,11 +37,11 @@ def curve(numbers, identifier):
     kind, *place = identifier.split("-")
     place = [int(part) - 1 for part in place]
     if kind == "step":
-        own = numbers["steps"][place[0]]["curves"][place[1]]
-        places, lists = own["times"], [own["values"]]
+        entry = numbers["steps"][place[0]]["curves"][place[1]]
+        places, lists = entry["times"], [entry["values"]]
     else:
-        own = (numbers["robustness"]["curves"] if kind == "sensitivity" else numbers["frequency"])[place[0]]
-        places, lists = own["frequencies"], own["singular_values"]
+        entry = (numbers["robustness"]["curves"] if kind == "sensitivity" else numbers["frequency"])[place[0]]
+        places, lists = entry["frequencies"], entry["singular_values"]
     first = next(k for k, at in enumerate(places) if at > 0)
     return places[first:], [values[first:] for values in lists]
 
@@ -98,7 +98,7 @@ def assert_reads_the_numbers(page, numbers, identifier, share, ends=None):
     places, lists = curve(numbers, identifier)
     at, *values = legend(page, identifier)
     index = min(range(len(places)), key=lambda k: abs(places[k] - at))
-    assert at == nine(places[index]) and values == [nine(own[index]) for own in lists], identifier
+    assert at == nine(places[index]) and values == [nine(series[index]) for series in lists], identifier
     low, high = ends or (places[0], places[-1])
     expected = nearest(places, low * (high / low) ** share)
     # The pointer is on a whole pixel of the axis, and the ends of what was dragged are on whole pixels of the whole axis.

@@ -164,7 +164,7 @@ def test_an_fmu_that_cannot_be_linearised_is_refused_with_the_missing_capability
 
 def test_the_method_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):
     """By derivatives, by differences of the equations, by steps from an FMU state."""
-    found = []
+    designs = []
     for changes, states in (
         ((), ""),
         ((NO_DERIVATIVES,), ""),
@@ -174,10 +174,10 @@ def test_the_method_of_linearisation_does_not_change_the_design(aso_ftc, tmp_pat
         (tmp_path / "plant.toml").write_text(states + SERVO, encoding="utf-8")
         done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
         assert done.returncode == 0, done.stderr
-        found.append(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+        designs.append(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
     for name in ("K_x", "K_f", "L_x", "L_f"):
-        for other in found[1:]:
-            assert np.array(other[name]) == pytest.approx(np.array(found[0][name]), rel=1e-9)
+        for other in designs[1:]:
+            assert np.array(other[name]) == pytest.approx(np.array(designs[0][name]), rel=1e-9)
 
 
 @pytest.mark.parametrize(("name", "line"), [("friction", 2), ("u", 3), ("theta_m", 4)])
@@ -233,13 +233,13 @@ def test_an_old_output_survives_a_refusal(aso_ftc, tmp_path):
 
 
 def test_the_files_are_the_same_every_time(aso_ftc, tmp_path):
-    made = []
+    runs = []
     for folder in (tmp_path / "first", tmp_path / "second"):
         arguments = ("--out", folder / "design.toml", "--fmu", folder / "Mine.fmu")
         done = aso_ftc("design", ROOT / "fmu-controller" / "pendulum.toml", *arguments)
         assert done.returncode == 1 and "verdict: red" in done.stdout, done.stderr
-        made.append([path.read_bytes() for path in sorted(folder.iterdir())])
-    assert len(made[0]) == 3 and made[0] == made[1]
+        runs.append([path.read_bytes() for path in sorted(folder.iterdir())])
+    assert len(runs[0]) == 3 and runs[0] == runs[1]
 
 
 def test_no_output_is_an_input_by_path_link_or_case(aso_ftc, tmp_path):

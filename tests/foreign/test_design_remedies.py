@@ -2,7 +2,7 @@
 
 import pytest
 
-from design_oracle import made
+from design_oracle import design_and_report
 
 TROLLEY = """A = [[0, 1], [0, -1]]
 B = [[0], [1]]
@@ -67,19 +67,19 @@ def test_a_refused_plant_file_with_the_remedy_of_its_message_is_designed(aso_ftc
     (text, old, new), message, *remedies = case
     assert old in text
     refused = text.replace(old, new)
-    own, error = made(aso_ftc, tmp_path, refused)
-    assert own is None and message in error, error
+    design, error = design_and_report(aso_ftc, tmp_path, refused)
+    assert design is None and message in error, error
     for old, new in remedies:
         assert old in refused
         refused = refused.replace(old, new)
-    own, report = made(aso_ftc, tmp_path, refused)
-    assert own is not None, report
+    design, report = design_and_report(aso_ftc, tmp_path, refused)
+    assert design is not None, report
 
 
 def test_a_sampled_feedback_of_the_least_norm_needs_no_region(aso_ftc, tmp_path):
     for region in ("", "feedback.region = { decay = 1.0 }\n"):
-        own, report = made(aso_ftc, tmp_path, SAMPLED.replace(FEEDBACK, LEAST["feedback"] + region))
-        assert own is not None, report
+        design, report = design_and_report(aso_ftc, tmp_path, SAMPLED.replace(FEEDBACK, LEAST["feedback"] + region))
+        assert design is not None, report
         norm = report["feedback"]["norm"]
         assert norm["norm"] >= 0.999 * norm["lower_bound"]
 
@@ -95,13 +95,13 @@ robustness.tolerance = 0.0
 
 
 def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path):
-    _, report = made(aso_ftc, tmp_path, REMEDIED)
+    _, report = design_and_report(aso_ftc, tmp_path, REMEDIED)
     verdict = report["verdict"]
     assert verdict["level"] == "amber" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
     for remedy in verdict["remedies"]:
         names = {line.split(" = ")[0] for line in remedy["lines"]}
         changed = [line for line in REMEDIED.splitlines() if line.split(" = ")[0] not in names]
-        _, other = made(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
+        _, other = design_and_report(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
         peaks = [point["judged"] for point in other["robustness"]["points"]]
         for peak in peaks:
             assert f"{peak:.3f}"[:4] in remedy["change"], (peak, remedy)

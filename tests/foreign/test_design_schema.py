@@ -42,10 +42,10 @@ def reports(aso_ftc, tmp_path_factory):
     folder = tmp_path_factory.mktemp("reports")
     for plant in ("DcServo", "ThreeTank"):
         packed_plant(aso_ftc, plant)
-    found = {file: report(aso_ftc, ROOT / file, folder / str(k)) for k, file in enumerate(EXAMPLES)}
+    table = {file: report(aso_ftc, ROOT / file, folder / str(k)) for k, file in enumerate(EXAMPLES)}
     (folder / "small.toml").write_text(SMALL, encoding="utf-8")
-    found["small"] = report(aso_ftc, folder / "small.toml", folder / "small", "--fmu", folder / "Small.fmu")
-    return found
+    table["small"] = report(aso_ftc, folder / "small.toml", folder / "small", "--fmu", folder / "Small.fmu")
+    return table
 
 
 def test_the_schema_is_a_schema():
@@ -54,8 +54,8 @@ def test_the_schema_is_a_schema():
 
 def test_reports_of_all_kinds_are_valid(reports):
     validator = Draft202012Validator(SCHEMA)
-    for name, found in reports.items():
-        problems = [f"{name}: {error.json_path}: {error.message}" for error in validator.iter_errors(found)]
+    for name, document in reports.items():
+        problems = [f"{name}: {error.json_path}: {error.message}" for error in validator.iter_errors(document)]
         assert not problems, problems[:5]
     assert reports["small"]["interface"] and reports["examples/three-tank/plant.toml"]["sampling"]
 
@@ -77,5 +77,5 @@ def test_a_report_with_a_missing_or_another_property_is_not_valid(reports):
 def test_every_property_has_a_description():
     definitions = [SCHEMA, *SCHEMA["$defs"].values()]
     for definition in definitions:
-        for name, own in definition.get("properties", {}).items():
-            assert own.get("description"), name
+        for name, entry in definition.get("properties", {}).items():
+            assert entry.get("description"), name

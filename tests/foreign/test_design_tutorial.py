@@ -31,7 +31,7 @@ def runs(aso_ftc, python, tmp_path_factory):
     """The output of both runs of the tutorial, by name, and the report of the design."""
     packed_plant(aso_ftc, "DcServo")
     results = tmp_path_factory.mktemp("results")
-    found, report = {}, None
+    tables, report = {}, None
     for command in COMMANDS[3:7]:
         program, arguments = command.split(" ", 1)
         arguments = arguments.replace("results/servo", str(results)).split()
@@ -43,8 +43,8 @@ def runs(aso_ftc, python, tmp_path_factory):
             done = python(*arguments, cwd=ROOT)
         assert done.returncode == 0, done.stderr
     for path in results.glob("*.csv"):
-        found[path.stem] = table(path)
-    return found, json.loads(report)
+        tables[path.stem] = table(path)
+    return tables, json.loads(report)
 
 
 def test_the_commands_of_the_page_are_those_run_here():
@@ -75,14 +75,14 @@ def test_the_table_of_the_page_has_the_results(runs):
 
 def test_the_text_repeats_the_numbers_of_the_report(runs):
     report = runs[1]
-    (k_x,) = next(own["values"] for own in report["gains"] if own["name"] == "K_x")
+    (k_x,) = next(gain["values"] for gain in report["gains"] if gain["name"] == "K_x")
     assert f"K_x = [{k_x[0]:.4f}, {k_x[1]:.6f}]" in TEXT
     slow, fast = sorted((re for re, _ in report["plant"]["eigenvalues"]), key=abs)
     assert abs(slow) < 1e-9 and f"0 and {fast:.1f}" in TEXT
     curves = {curve["name"]: curve for curve in report["steps"][0]["curves"]}
     assert f"turns by up to {curves['theta']['peak']:.4f} rad" in TEXT
     assert f"2 % after {curves['error of f_u']['settling_time']:.4f} s" in TEXT
-    bounds = {own["error"]: own["gain_of_rate"] for own in report["bounds"]}
+    bounds = {bound["error"]: bound["gain_of_rate"] for bound in report["bounds"]}
     assert f"at most {bounds['error of f_u']:.4f} V" in TEXT
 
 

@@ -39,14 +39,14 @@ REGULATORS = [
 def test_weights_give_the_linear_quadratic_regulator_of_scipy(wanting, file, states, commands):
     wish = f"feedback.Q = {states}\nfeedback.R = {commands}"
     designed = wanting(file, (FEEDBACK[file], wish))
-    own, q, r = Matrices(designed.design), np.diag(states), np.diag(commands)
-    if own.period is None:
-        p = solve_continuous_are(own.A, own.B, q, r)
-        wanted = -np.linalg.solve(r, own.B.T @ p)
+    matrices, q, r = Matrices(designed.design), np.diag(states), np.diag(commands)
+    if matrices.period is None:
+        p = solve_continuous_are(matrices.A, matrices.B, q, r)
+        expected = -np.linalg.solve(r, matrices.B.T @ p)
     else:
-        p = solve_discrete_are(own.A, own.B, q, r)
-        wanted = -np.linalg.solve(r + own.B.T @ p @ own.B, own.B.T @ p @ own.A)
-    assert own.K_x == pytest.approx(wanted, rel=1e-7)
+        p = solve_discrete_are(matrices.A, matrices.B, q, r)
+        expected = -np.linalg.solve(r + matrices.B.T @ p @ matrices.B, matrices.B.T @ p @ matrices.A)
+    assert matrices.K_x == pytest.approx(expected, rel=1e-7)
     assert designed.report["feedback"]["method"].startswith("Linear-quadratic regulator")
     assert designed.report["feedback"]["required"] == []
 
@@ -66,16 +66,16 @@ def test_intensities_give_the_kalman_filter_of_scipy(wanting, file, estimator, p
     if estimator:
         wish = f'estimator = "{estimator}"\n{wish}'
     designed = wanting(file, (OBSERVER[file], wish))
-    own, w, v = Matrices(designed.design), np.diag(process), np.diag(measured)
-    a_0, c_0, found = own.augmented
-    if own.period is None:
+    matrices, w, v = Matrices(designed.design), np.diag(process), np.diag(measured)
+    a_0, c_0, gain = matrices.augmented
+    if matrices.period is None:
         p = solve_continuous_are(a_0.T, c_0.T, w, v)
-        wanted = p @ c_0.T @ np.linalg.inv(v)
+        expected = p @ c_0.T @ np.linalg.inv(v)
     else:
         p = solve_discrete_are(a_0.T, c_0.T, w, v)
-        wanted = p @ c_0.T @ np.linalg.inv(c_0 @ p @ c_0.T + v)
-        wanted = wanted if own.current else a_0 @ wanted
-    assert found == pytest.approx(wanted, rel=1e-6, abs=1e-9 * abs(wanted).max())
+        expected = p @ c_0.T @ np.linalg.inv(c_0 @ p @ c_0.T + v)
+        expected = expected if matrices.current else a_0 @ expected
+    assert gain == pytest.approx(expected, rel=1e-6, abs=1e-9 * abs(expected).max())
     assert designed.report["observer"]["method"].startswith("Kalman filter")
 
 
@@ -87,10 +87,10 @@ def test_the_eigenvalues_satisfy_all_parts_of_a_region(wanting):
         (FEEDBACK[PENDULUM], f"feedback.region = {region}"),
         (OBSERVER[PENDULUM], f"observer.region = {observer}"),
     )
-    own = Matrices(designed.design)
+    matrices = Matrices(designed.design)
     for name, dynamics, decay, center, radius in (
-        ("feedback", own.A + own.B @ own.K_x, 3.0, -12.0, 8.0),
-        ("observer", own.error_dynamics, 100.0, -800.0, 600.0),
+        ("feedback", matrices.A + matrices.B @ matrices.K_x, 3.0, -12.0, 8.0),
+        ("observer", matrices.error_dynamics, 100.0, -800.0, 600.0),
     ):
         values = np.linalg.eigvals(dynamics)
         assert (values.real < -decay).all()
@@ -106,9 +106,9 @@ def test_a_sampled_loop_has_the_required_decay_rate(wanting):
         (FEEDBACK[TANKS], "feedback.region = { decay = 0.03 }"),
         (OBSERVER[TANKS], "observer.region = { decay = 0.2 }"),
     )
-    own = Matrices(designed.design)
-    for dynamics, decay in ((own.A + own.B @ own.K_x, 0.03), (own.error_dynamics, 0.2)):
-        assert abs(np.linalg.eigvals(dynamics)).max() < np.exp(-decay * own.period)
+    matrices = Matrices(designed.design)
+    for dynamics, decay in ((matrices.A + matrices.B @ matrices.K_x, 0.03), (matrices.error_dynamics, 0.2)):
+        assert abs(np.linalg.eigvals(dynamics)).max() < np.exp(-decay * matrices.period)
 
 
 def largest_gain(a, b, c, d, highest):
@@ -117,16 +117,16 @@ def largest_gain(a, b, c, d, highest):
     return max(map(gain, np.concatenate([[0], np.geomspace(1e-3, highest, 2000)])))
 
 
-def observer_gain(own):
+def observer_gain(matrices):
     """From the rate of the fault to the error of its estimate."""
-    rate = np.eye(own.n + own.q)[:, own.n :]
-    return largest_gain(own.error_dynamics, rate, rate.T, 0, 1e6)
+    rate = np.eye(matrices.n + matrices.q)[:, matrices.n :]
+    return largest_gain(matrices.error_dynamics, rate, rate.T, 0, 1e6)
 
 
-def feedback_gain(own):
+def feedback_gain(matrices):
     """From the fault to measurements and command."""
-    a, m = own.A + own.B @ own.K_x, own.B.shape[1]
-    return largest_gain(a, own.F_a, np.vstack([own.C, own.K_x]), np.zeros((len(own.C) + m, 1)), 1e4)
+    a, m = matrices.A + matrices.B @ matrices.K_x, matrices.B.shape[1]
+    return largest_gain(a, matrices.F_a, np.vstack([matrices.C, matrices.K_x]), np.zeros((len(matrices.C) + m, 1)), 1e4)
 
 
 def test_an_h_infinity_bound_is_met(wanting):
@@ -135,19 +135,19 @@ def test_an_h_infinity_bound_is_met(wanting):
         (FEEDBACK[PENDULUM], "feedback.h_infinity = 2.0\nfeedback.region = { decay = 1.0 }"),
         (OBSERVER[PENDULUM], "observer.h_infinity = 0.01\nobserver.region = { decay = 50.0 }"),
     )
-    own = Matrices(designed.design)
-    assert feedback_gain(own) <= 2.0
-    assert np.linalg.eigvals(own.A + own.B @ own.K_x).real.max() < -1.0
-    assert observer_gain(own) <= 0.01
-    assert np.linalg.eigvals(own.error_dynamics).real.max() < -50.0
+    matrices = Matrices(designed.design)
+    assert feedback_gain(matrices) <= 2.0
+    assert np.linalg.eigvals(matrices.A + matrices.B @ matrices.K_x).real.max() < -1.0
+    assert observer_gain(matrices) <= 0.01
+    assert np.linalg.eigvals(matrices.error_dynamics).real.max() < -50.0
     norms = {norm["name"]: norm["value"] for norm in designed.report["certificate"]["norms"]}
-    assert norms["H-infinity"] == pytest.approx(observer_gain(own), rel=1e-2)
+    assert norms["H-infinity"] == pytest.approx(observer_gain(matrices), rel=1e-2)
 
 
 def test_the_least_h_infinity_norm_is_below_that_of_assigned_eigenvalues(wanting):
     assigned = observer_gain(Matrices(wanting(PENDULUM).design))
     disc = "{ disc = { center = -2100.0, radius = 900.0 } }"
     wish = f'observer.h_infinity = "least"\nobserver.region = {disc}'
-    own = Matrices(wanting(PENDULUM, (OBSERVER[PENDULUM], wish)).design)
-    assert observer_gain(own) < assigned
-    assert (abs(np.linalg.eigvals(own.error_dynamics) + 2100) < 900).all()
+    matrices = Matrices(wanting(PENDULUM, (OBSERVER[PENDULUM], wish)).design)
+    assert observer_gain(matrices) < assigned
+    assert (abs(np.linalg.eigvals(matrices.error_dynamics) + 2100) < 900).all()

@@ -71,7 +71,7 @@ def extended(design, extras, chance):
     return design
 
 
-def made(controller, design, folder):
+def fmu_with(controller, design, folder):
     """The FMU with this design in it."""
     fmu = redesigned(controller, design_text(design), folder / "fmu")
     fmu.design = design
@@ -89,7 +89,7 @@ def begun(fmu, sizes, z, y, values=None):
 @pytest.mark.parametrize("sizes", SIZES, ids=str)
 def test_a_design_of_any_size_has_the_variables_of_that_size(controller, tmp_path, sizes):
     n, m, p, q = sizes
-    fmu = made(controller, random_design(sizes), tmp_path)
+    fmu = fmu_with(controller, random_design(sizes), tmp_path)
     shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
     elements = {
         f"{name}[{i + 1},{j + 1}]"
@@ -108,7 +108,7 @@ def test_a_design_of_any_size_has_the_variables_of_that_size(controller, tmp_pat
 @pytest.mark.parametrize("sizes", SIZES, ids=str)
 def test_a_design_of_any_size_describes_itself_validly(controller, tmp_path, sizes, limited):
     design = random_design(sizes, [[-1.0, 2.0]] * sizes[1] if limited else None)
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     etree.XMLSchema(etree.parse(SCHEMA)).assertValid(
         etree.parse(fmu.folder / "modelDescription.xml")
     )
@@ -121,18 +121,18 @@ def test_a_design_of_any_size_describes_itself_validly(controller, tmp_path, siz
 def test_a_step_of_a_design_of_any_size_is_the_matrix_exponential(controller, tmp_path, sizes):
     n, m, p, q = sizes
     design = random_design(sizes)
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     z, y, slope = np.linspace(-1, 1.5, n + q), np.linspace(0.5, -0.7, p), np.linspace(2, -3, p)
     with begun(fmu, sizes, z, y) as instance:
         read = read_matrices(instance)
         assert all((read[name] == design[name]).all() for name in MATRICES)
         instance.set_slopes(**{f"y{k + 1}": slope[k] for k in range(p)})
         instance.step(0.0, 0.05)
-        found = instance.get(*vector("x_hat", n), *vector("f_hat", q))
-        wanted = propagated(design, z, y, slope, 0.05, True, True)
-        assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+        estimate = instance.get(*vector("x_hat", n), *vector("f_hat", q))
+        expected = propagated(design, z, y, slope, 0.05, True, True)
+        assert estimate == pytest.approx(expected, rel=1e-9, abs=1e-12)
         assert instance.get(*vector("u", m)) == pytest.approx(
-            command(design, found, True), rel=1e-9
+            command(design, estimate, True), rel=1e-9
         )
 
 
@@ -152,21 +152,21 @@ def test_with_limited_actuators_the_observer_follows_scipys_integration(
 ):
     n, m, p, q = sizes
     design = random_design(sizes, limits)
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     pairs = [pair or [-np.inf, np.inf] for pair in limits]
     z, y, slope = np.linspace(-1, 1.5, n + q), np.linspace(0.5, -0.7, p), np.linspace(2, -3, p)
     times = np.linspace(0, 1, round(1 / size) + 1)
-    wanted = saturated(design, z, y, slope, times, pairs)
-    commands = np.array([command(design, z, True, pairs) for z in wanted])
+    expected = saturated(design, z, y, slope, times, pairs)
+    commands = np.array([command(design, z, True, pairs) for z in expected])
     at_limit = (commands == np.transpose(pairs)[0]) | (commands == np.transpose(pairs)[1])
     assert (np.diff(at_limit, axis=0)).any(), "a limit is reached or left"
     with begun(fmu, sizes, z, y) as instance:
-        for time, estimate, u in zip(times, wanted[1:], commands[1:]):
+        for time, estimate, u in zip(times, expected[1:], commands[1:]):
             instance.set({f"y{j + 1}": y[j] + time * slope[j] for j in range(p)})
             instance.set_slopes(**{f"y{j + 1}": slope[j] for j in range(p)})
             instance.step(time, size)
-            found = instance.get(*vector("x_hat", n), *vector("f_hat", q))
-            assert found == pytest.approx(estimate, rel=1e-6, abs=1e-7)
+            outputs = instance.get(*vector("x_hat", n), *vector("f_hat", q))
+            assert outputs == pytest.approx(estimate, rel=1e-6, abs=1e-7)
             assert instance.get(*vector("u", m)) == pytest.approx(u, rel=1e-6, abs=1e-6)
 
 
@@ -177,8 +177,8 @@ def test_the_shipped_controller_with_limits_follows_scipys_integration(controlle
     design["actuators"][0]["limits"], design["t_on"] = limits, 0.0
     fmu = redesigned(controller, design_text(design), tmp_path / "fmu")
     y, slope, times = np.array([0.001, -0.002]), np.array([0.3, -0.2]), np.linspace(0, 0.01, 101)
-    wanted = saturated(design, np.zeros(5), y, slope, times, [limits])
-    commands = {float(command(design, z, True, [limits])[0]) for z in wanted}
+    expected = saturated(design, np.zeros(5), y, slope, times, [limits])
+    commands = {float(command(design, z, True, [limits])[0]) for z in expected}
     assert set(limits) <= commands, "the command goes from one limit to the other"
     with Instance(fmu) as instance:
         instance.start()
@@ -188,13 +188,13 @@ def test_the_shipped_controller_with_limits_follows_scipys_integration(controlle
             instance.set_slopes(x_p=slope[0], theta=slope[1])
             instance.step(k * size, size)
             assert -40 <= instance.get("u")[0] <= 30
-        found = instance.get("x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]", "f_hat")
-    assert found == pytest.approx(list(wanted[-1]), rel=1e-6)
+        estimate = instance.get("x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]", "f_hat")
+    assert estimate == pytest.approx(list(expected[-1]), rel=1e-6)
 
 
 def test_limits_can_be_changed_during_the_run_and_must_be_in_order(controller, tmp_path):
     sizes = (1, 1, 1, 1)
-    fmu = made(controller, random_design(sizes, [[-0.3, 0.4]]), tmp_path)
+    fmu = fmu_with(controller, random_design(sizes, [[-0.3, 0.4]]), tmp_path)
     with begun(fmu, sizes, [9.0, 9.0], [0.0]) as instance:
         instance.step(0.0, 0.01)
         side = "u_min" if instance.get("u") == [-0.3] else "u_max"
@@ -209,13 +209,13 @@ def test_limits_can_be_changed_during_the_run_and_must_be_in_order(controller, t
 
 def test_the_initial_command_of_a_limited_actuator_depends_on_its_limits_too(controller, tmp_path):
     sizes = (2, 2, 2, 2)
-    fmu = made(controller, random_design(sizes, [[-0.5, 0.6], [-0.2, 1.5]]), tmp_path)
+    fmu = fmu_with(controller, random_design(sizes, [[-0.5, 0.6], [-0.2, 1.5]]), tmp_path)
     for unknown in fmu.description.initialUnknowns:
         names = {variable.name for variable in unknown.dependencies}
         for j, name in enumerate(vector("u", 2)):
-            own = {f"u_min[{j + 1}]", f"u_max[{j + 1}]"}
+            limits = {f"u_min[{j + 1}]", f"u_max[{j + 1}]"}
             if unknown.variable.name == name:
-                assert own <= names and f"K_x[{j + 1},1]" in names
+                assert limits <= names and f"K_x[{j + 1},1]" in names
                 assert not any(other.startswith(f"K_x[{2 - j},") for other in names)
     with begun(fmu, sizes, [9.0, 9.0, 9.0, 9.0], [0.0, 0.0]) as instance:
         assert {tuple(instance.get("u[1]", "u[2]"))} <= {

@@ -93,26 +93,26 @@ def points(sampled):
 @pytest.mark.parametrize("method", ["cusum", "chi-square"])
 def test_residuals_are_white_and_see_neither_commands_nor_what_is_decoupled(tmp_path, sampled, method):
     report, file = designed(tmp_path, text(method, sampled, "isolation = true\n"))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     a, b, c = plant(sampled)
     w, v = noise()
-    rows = np.cumsum([0, *(test["residuals"] for test in own.tests)])
+    rows = np.cumsum([0, *(test["residuals"] for test in detector.tests)])
     assert [test["decoupled"][0]["exact"] for test in report["tests"]] == [True, True]
     for s in points(sampled):
-        from_u, from_y = own.at(s)
+        from_u, from_y = detector.at(s)
         states = np.linalg.inv(s * np.eye(4) - a)
         outputs = c @ states @ b
         assert np.abs(from_u + from_y @ outputs[:, :2]).max() < 1e-9 * np.abs(from_u).max()
         spectrum = from_y @ (v + c @ states @ w @ states.conj().T @ c.T) @ from_y.conj().T
         effect = from_y @ outputs
-        for k, own_test in enumerate(own.tests):
+        for k, own_test in enumerate(detector.tests):
             part = slice(rows[k], rows[k + 1])
             identity = np.eye(rows[k + 1] - rows[k])
             assert np.abs(spectrum[part, part] - identity).max() < 1e-8, own_test
             scale = np.abs(from_y[part]).max() * np.abs(outputs).max()
             assert np.abs(effect[part, [1, 0][k]]).max() < 1e-9 * scale, "the other fault"
             assert np.abs(effect[part, 2]).max() < 1e-9 * scale, "the disturbance"
-    assert [test["reacts"] for test in own.tests] == [[True, False], [False, True]]
+    assert [test["reacts"] for test in detector.tests] == [[True, False], [False, True]]
     assert report["reacts"] == [[True, False], [False, True]]
 
 
@@ -156,24 +156,24 @@ def test_the_threshold_of_a_window_is_the_quantile_of_scipy(tmp_path):
         assert report["false_alarm_interval"] == pytest.approx(200.0, rel=1e-6)
 
 
-def alarms(own, reset, fault, runs, samples, generator):
+def alarms(detector, reset, fault, runs, samples, generator):
     """The sample of the first alarm of each run with noise and, from sample `reset` on, a fault; `samples` if there is
     none. Sums and windows start again at `reset` if they had an alarm before."""
     a, b, c = plant(True)
     w, v = noise()
-    x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(own.a)))
+    x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(detector.a)))
     root_w, root_v = np.sqrt(np.diag(w)), np.sqrt(np.diag(v))
-    sums = [np.zeros((runs, 2 if "drift" in test else test["residuals"])) for test in own.tests]
+    sums = [np.zeros((runs, 2 if "drift" in test else test["residuals"])) for test in detector.tests]
     first = np.full(runs, samples)
     for k in range(-200, samples):
         y = x @ c.T + root_v * generator.standard_normal((runs, 3))
-        r = x_r @ own.c.T + y @ own.d_y.T
-        x_r = x_r @ own.a.T + y @ own.b_y.T
+        r = x_r @ detector.c.T + y @ detector.d_y.T
+        x_r = x_r @ detector.a.T + y @ detector.b_y.T
         x = x @ a.T + root_w * generator.standard_normal((runs, 4))
         if k >= reset:
             x = x + b[:, :2] @ fault
         at = 0
-        for test, own_sums in zip(own.tests, sums, strict=True):
+        for test, own_sums in zip(detector.tests, sums, strict=True):
             part = r[:, at:at + test["residuals"]]
             at += test["residuals"]
             if "drift" in test:
@@ -195,17 +195,17 @@ def alarms(own, reset, fault, runs, samples, generator):
 @pytest.mark.parametrize("method", ["cusum", "chi-square"])
 def test_false_alarms_and_delays_of_simulated_runs_are_the_predicted_ones(tmp_path, method):
     report, file = designed(tmp_path, text(method, True, "isolation = true\n"))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     generator = np.random.default_rng(1)
     runs, samples = 1000, 400
-    found = np.mean(alarms(own, 0, np.zeros(2), runs, samples, generator) < samples)
+    fraction = np.mean(alarms(detector, 0, np.zeros(2), runs, samples, generator) < samples)
     predicted = 1.0 - np.exp(-samples * T / report["false_alarm_interval"])
     low, high = scipy.stats.binom.interval(0.999, runs, predicted)
-    assert low <= found * runs <= high, (found, predicted)
+    assert low <= fraction * runs <= high, (fraction, predicted)
     for fault, entry in enumerate(report["faults"]):
         column = np.zeros(2)
         column[fault] = entry["size"]
-        delays = alarms(own, 0, column, runs, 400, generator)
+        delays = alarms(detector, 0, column, runs, 400, generator)
         # The first sample with the fault is at its start: half a sample less than on average.
         mean = (delays.mean() + 0.5) * T
         error = delays.std() * T / np.sqrt(runs)
@@ -221,7 +221,7 @@ def test_a_disturbance_that_the_measurements_show_late_is_a_random_walk_with_its
     run = subprocess.run([COMMAND, "design", "plant.toml"], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 2 and "expected `bound`" in run.stderr, run.stderr
     report, file = designed(tmp_path, text("cusum", False, "", hidden + "bound = 0.5\n"))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     a, _, c = plant(False)
     e = np.array([[0.0], [0.0], [0.0], [1.0]])
     for test in report["tests"]:
@@ -229,14 +229,14 @@ def test_a_disturbance_that_the_measurements_show_late_is_a_random_walk_with_its
         assert not decoupled["exact"] and decoupled["size"] == 0.5
         assert 0.0 < decoupled["largest_mean"]
     # At s = 0 there is no effect.
-    effect = own.at(1e-9)[1] @ c @ np.linalg.inv(-a) @ e
+    effect = detector.at(1e-9)[1] @ c @ np.linalg.inv(-a) @ e
     assert np.abs(effect).max() < 1e-6
     # The step response, averaged over intervals: from the whole system with the integral of r.
-    n = len(own.a)
+    n = len(detector.a)
     whole = np.block([
         [a, np.zeros((4, n + 2)), e],
-        [own.b_y @ c, own.a, np.zeros((n, 2)), np.zeros((n, 1))],
-        [own.d_y @ c, own.c, np.zeros((2, 2)), np.zeros((2, 1))],
+        [detector.b_y @ c, detector.a, np.zeros((n, 2)), np.zeros((n, 1))],
+        [detector.d_y @ c, detector.c, np.zeros((2, 2)), np.zeros((2, 1))],
         [np.zeros((1, 4 + n + 3))],
     ])
     period = report["sample_time"]

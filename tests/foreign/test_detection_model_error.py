@@ -42,7 +42,7 @@ def sizes(plant=PLANT):
 
 def worst(value, plant, generator):
     """The largest of a value over the corners of the tolerances, by flips of one entry, from several corners on."""
-    sizes_, found = sizes(plant), -np.inf
+    sizes_, peak = sizes(plant), -np.inf
     for _ in range(4):
         signs = [np.sign(generator.standard_normal(size.shape)) for size in sizes_]
         at = lambda: value([m + s * size for m, s, size in zip(matrices(plant), signs, sizes_, strict=True)])
@@ -56,8 +56,8 @@ def worst(value, plant, generator):
                         largest, better = flipped, True
                     else:
                         sign[place] *= -1
-        found = max(found, largest)
-    return found
+        peak = max(peak, largest)
+    return peak
 
 
 def perturbed(generator, plant=PLANT):
@@ -67,44 +67,46 @@ def perturbed(generator, plant=PLANT):
     return [m + part(m.shape) * size for m, size in zip(matrices(plant), sizes(plant), strict=True)]
 
 
-def means(own, plant, period, samples):
+def means(detector, plant, period, samples):
     """The effect of a command in one sample on the tested residuals of later samples: samples x residuals x commands.
 
     A continuous filter is simulated with commands held over `period` s; its residuals are integrals over such times
     divided by the root of the period."""
     a, b, c = plant
-    n, k, q, m = len(a), len(own.a), len(own.c), b.shape[1]
-    whole = np.block([[a, np.zeros((n, k + q))], [own.b_y @ c, own.a, np.zeros((k, q))], [own.d_y @ c, own.c, np.zeros((q, q))]])
-    column = np.vstack([b, own.b_u, own.d_u])
+    n, k, q, m = len(a), len(detector.a), len(detector.c), b.shape[1]
+    whole = np.block(
+        [[a, np.zeros((n, k + q))], [detector.b_y @ c, detector.a, np.zeros((k, q))], [detector.d_y @ c, detector.c, np.zeros((q, q))]]
+    )
+    column = np.vstack([b, detector.b_u, detector.d_u])
     if period is None:
         held = scipy.linalg.expm(np.block([[a, b], [np.zeros((m, n + m))]]) * T)
-        whole = np.block([[held[:n, :n], np.zeros((n, k))], [own.b_y @ c, own.a]])
-        column, read = np.vstack([held[:n, n:], own.b_u]), np.hstack([own.d_y @ c, own.c])
-        first = own.d_u
+        whole = np.block([[held[:n, :n], np.zeros((n, k))], [detector.b_y @ c, detector.a]])
+        column, read = np.vstack([held[:n, n:], detector.b_u]), np.hstack([detector.d_y @ c, detector.c])
+        first = detector.d_u
     else:
         step = scipy.linalg.expm(np.block([[whole, column], [np.zeros((m, n + k + q + m))]]) * period)
         rows = slice(n + k, n + k + q)
         whole, column = step[: n + k, : n + k], step[: n + k, n + k + q :]
         read, first = step[rows, : n + k] / np.sqrt(period), step[rows, n + k + q :] / np.sqrt(period)
-    found = [first]
+    effects = [first]
     for _ in range(samples):
-        found.append(read @ column)
+        effects.append(read @ column)
         column = whole @ column
-    return np.array(found)
+    return np.array(effects)
 
 
 @pytest.mark.parametrize("plant", [PLANT, OSCILLATING])
 @pytest.mark.parametrize(("method", "sampled"), [("cusum", True), ("cusum", False), ("chi-square", True)])
 def test_no_plant_within_the_tolerances_has_a_larger_mean_and_the_bound_is_near(tmp_path, method, sampled, plant):
     report, file = designed(tmp_path, text(method, sampled, plant))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     generator = np.random.default_rng(3)
 
     def reached(plant_):
-        effects = means(own, plant_, None if sampled else report["sample_time"], 250)
+        effects = means(detector, plant_, None if sampled else report["sample_time"], 250)
         # The worst commands have the signs of the effects: each residual by itself.
         each = np.abs(effects).sum(axis=0) @ SIZE
-        rows = np.split(each, np.cumsum([test["residuals"] for test in own.tests])[:-1])
+        rows = np.split(each, np.cumsum([test["residuals"] for test in detector.tests])[:-1])
         return np.array([np.linalg.norm(row) for row in rows])
 
     stated = np.array([test["model_error"] for test in report["tests"]])
@@ -118,13 +120,13 @@ def test_no_plant_within_the_tolerances_has_a_larger_mean_and_the_bound_is_near(
 
 def test_the_worst_commands_give_no_more_alarms_than_the_noise_alone_may(tmp_path):
     report, file = designed(tmp_path, text("cusum", True))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     generator = np.random.default_rng(5)
-    drifts, thresholds = (np.array([test[name] for test in own.tests]) for name in ("drift", "threshold"))
+    drifts, thresholds = (np.array([test[name] for test in detector.tests]) for name in ("drift", "threshold"))
     bias = np.array([test["model_error"] for test in report["tests"]])
     plants = [perturbed(generator) for _ in range(50)]
-    steady = [means(own, plant, None, 100).sum(axis=0) for plant in plants]
-    root_w, root_v = (np.sqrt(np.diag(own)) for own in noise())
+    steady = [means(detector, plant, None, 100).sum(axis=0) for plant in plants]
+    root_w, root_v = (np.sqrt(np.diag(covariance)) for covariance in noise())
     runs, samples = 500, 400
     allowed = 1.0 - np.exp(-samples * T / 200.0)
     for test in range(2):
@@ -133,13 +135,13 @@ def test_the_worst_commands_give_no_more_alarms_than_the_noise_alone_may(tmp_pat
         held = scipy.linalg.expm(np.block([[a, b], [np.zeros((2, 6))]]) * T)
         # A constant command that moves the mean of this residual as far as it can.
         u = SIZE * np.sign(steady[at][test])
-        x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(own.a)))
+        x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(detector.a)))
         sums, simple = np.zeros((2, runs, 2)), np.zeros((2, runs, 2))
         over = np.zeros((2, runs), dtype=bool)
         for _ in range(samples):
             y = x @ c.T + root_v * generator.standard_normal((runs, 3))
-            r = x_r @ own.c.T + own.d_u @ u + y @ own.d_y.T
-            x_r = x_r @ own.a.T + own.b_u @ u + y @ own.b_y.T
+            r = x_r @ detector.c.T + detector.d_u @ u + y @ detector.d_y.T
+            x_r = x_r @ detector.a.T + detector.b_u @ u + y @ detector.b_y.T
             x = x @ held[:4, :4].T + held[:4, 4:] @ u + root_w * generator.standard_normal((runs, 4))
             both = np.array([r, -r])
             sums, simple = np.maximum(0.0, sums + both - drifts), np.maximum(0.0, simple + both - (drifts - bias))
@@ -179,7 +181,7 @@ def test_tanks_with_other_pipes_stay_below_the_bound_though_their_levels_at_rest
     start = np.array([drops.sum(), drops[2], drops[1] + drops[2]])
     fmu = packed_plant(aso_ftc, "ThreeTank")
     report, file = designed(tmp_path, TANK.format(fmu=fmu, levels=list(start)))
-    own = Filter(file["detection"])
+    detector = Filter(file["detection"])
     largest = np.zeros(2)
     # The corners of the limits, and random cases within: the first ones of those that the report counts.
     number = uniform(report["parameter_cases"]["seed"])
@@ -187,10 +189,10 @@ def test_tanks_with_other_pipes_stay_below_the_bound_though_their_levels_at_rest
     for part in [*itertools.product([-1, 1], repeat=3), *within]:
         mu = nominal * (1 + 0.02 * np.array(part))
         for command in ([-2e-6, 2e-6], [2e-6, 2e-6], [-2e-6, -2e-6]):
-            h, x_r, u = start.copy(), np.zeros(len(own.a)), np.array(command)
+            h, x_r, u = start.copy(), np.zeros(len(detector.a)), np.array(command)
             for _ in range(700):
-                r = own.c @ x_r + own.d_u @ u + own.d_y @ (h - start)
-                x_r = own.a @ x_r + own.b_u @ u + own.b_y @ (h - start)
+                r = detector.c @ x_r + detector.d_u @ u + detector.d_y @ (h - start)
+                x_r = detector.a @ x_r + detector.b_u @ u + detector.b_y @ (h - start)
                 for _ in range(2):
                     q_13, q_32, q_20 = flow(mu, np.array([h[0] - h[2], h[2] - h[1], h[1]]))
                     inflow = q + u
@@ -214,8 +216,8 @@ def test_a_member_of_a_family_stays_below_the_bound(tmp_path):
     report, file = designed(tmp_path, text("cusum", True, extra=FAMILY).replace(f"tolerance = {TOLERANCE}", "tolerance = 0.0"))
     a, b, c = matrices()
     a[0, 0], a[1, 1] = -0.55, -0.42
-    own = Filter(file["detection"])
-    each = np.abs(means(own, (a, b, c), None, 250)).sum(axis=0) @ SIZE
+    detector = Filter(file["detection"])
+    each = np.abs(means(detector, (a, b, c), None, 250)).sum(axis=0) @ SIZE
     stated = np.array([test["model_error"] for test in report["tests"]])
     assert (each <= stated).all() and (stated < 1.05 * each).all(), (each, stated)
 
@@ -255,8 +257,8 @@ GONE = ('[reconfiguration]\nactuators = "all"\nstuck_at = { u1 = 0.3 }\n', ("", 
 @pytest.mark.parametrize(("extra", "change"), [REFERENCE, GONE], ids=["reference", "reconfiguration"])
 @pytest.mark.parametrize("sampled", [True, False])
 def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change, sampled):
-    own = text("cusum", sampled, extra=extra).replace(*change)
-    (tmp_path / "plant.toml").write_text(own, encoding="utf-8")
+    plant_file = text("cusum", sampled, extra=extra).replace(*change)
+    (tmp_path / "plant.toml").write_text(plant_file, encoding="utf-8")
     files = ("--fmu", "Detecting.fmu", "--from", ROOT / "dist/AsoController.fmu", "--certificate-time", "0")
     run = subprocess.run([COMMAND, "design", "plant.toml", *files], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
@@ -265,12 +267,12 @@ def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change,
     names = ["u1", "u2", "residual[1]", "residual[2]"]
     fmu, references = started(tmp_path / "Detecting.fmu", tmp_path / "unpacked")
     # Measurements held over a step; the filter of the design file by scipy, with the commands of the FMU.
-    own, generator = Filter(section), np.random.default_rng(2)
+    detector, generator = Filter(section), np.random.default_rng(2)
     step = 0.001 if not sampled else T
-    state, integral, due, found, expected = np.zeros(len(own.a)), np.zeros(2), period, [], []
-    k = len(own.a)
-    both = np.hstack([own.b_u, own.b_y]), np.hstack([own.d_u, own.d_y])
-    whole = np.block([[own.a, np.zeros((k, 2)), both[0]], [own.c, np.zeros((2, 2)), both[1]], [np.zeros((5, k + 7))]])
+    state, integral, due, residuals, expected = np.zeros(len(detector.a)), np.zeros(2), period, [], []
+    k = len(detector.a)
+    both = np.hstack([detector.b_u, detector.b_y]), np.hstack([detector.d_u, detector.d_y])
+    whole = np.block([[detector.a, np.zeros((k, 2)), both[0]], [detector.c, np.zeros((2, 2)), both[1]], [np.zeros((5, k + 7))]])
     held = scipy.linalg.expm(whole * step)
     y, commands = np.zeros(3), []
     for at in range(40 if sampled else 2000):
@@ -288,21 +290,21 @@ def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change,
         commands.append(values[:2])
         if sampled:
             # The sample at the start is not tested; that at the end of this step has the new commands.
-            expected.append(own.c @ state + own.d_u @ u + own.d_y @ y)
-            state = own.a @ state + own.b_u @ u + own.b_y @ y
-            found.append(values[2:])
+            expected.append(detector.c @ state + detector.d_u @ u + detector.d_y @ y)
+            state = detector.a @ state + detector.b_u @ u + detector.b_y @ y
+            residuals.append(values[2:])
             continue
         moved = held @ np.concatenate([state, integral, u, y])
         state, integral = moved[:k], moved[k : k + 2]
         if (at + 1) * step > due - 1e-9:
-            found.append(values[2:])
+            residuals.append(values[2:])
             expected.append(integral / np.sqrt(period))
             integral, due = np.zeros(2), due + period
     fmu.terminate()
     fmu.freeInstance()
-    found, expected = np.array(found), np.array(expected)
+    residuals, expected = np.array(residuals), np.array(expected)
     assert np.ptp(np.array(commands), axis=0).min() > 0.1, "the commands move"
-    assert np.abs(found).max() > 1.0 and np.abs(found - expected).max() < (1e-9 if sampled else 0.02) * np.abs(found).max()
+    assert np.abs(residuals).max() > 1.0 and np.abs(residuals - expected).max() < (1e-9 if sampled else 0.02) * np.abs(residuals).max()
 
 
 def started(path, folder):

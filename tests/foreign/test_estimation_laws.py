@@ -75,24 +75,24 @@ def designed(aso_ftc, tmp_path):
     )
 
 
-def command(own, x, f, limits):
-    u = (own.gains["K_x"] @ x + own.gains["K_f"] @ [f])[0]
+def command(design, x, f, limits):
+    u = (design.gains["K_x"] @ x + design.gains["K_f"] @ [f])[0]
     return np.clip(u, *limits)
 
 
 @pytest.mark.parametrize("limited", [False, True])
 def test_fast_adaptive_follows_the_law_with_the_derivative_of_the_error(designed, limited):
-    own = designed("fast-adaptive", LIMITED if limited else "")
+    design = designed("fast-adaptive", LIMITED if limited else "")
     limits = LIMITS if limited else (-np.inf, np.inf)
-    f, sigma, gamma = np.linalg.pinv(C @ F_A), own.parameters["sigma"], own.parameters["gamma"]
+    f, sigma, gamma = np.linalg.pinv(C @ F_A), design.parameters["sigma"], design.parameters["gamma"]
     # Zhang, Jiang, Cocquempot (2008): f_hat' = -Gamma F (e_y' + sigma e_y), e_y = C x_hat - y.
-    gain = own.gains["L_x"] - F_A @ (gamma * f)
-    assert np.allclose(own.gains["P_f"], gamma * f) and np.allclose(own.gains["L_f"], sigma * gamma * f)
+    gain = design.gains["L_x"] - F_A @ (gamma * f)
+    assert np.allclose(design.gains["P_f"], gamma * f) and np.allclose(design.gains["L_f"], sigma * gamma * f)
 
     def slopes(_, z, y):
         x, f_hat = z[:3], z[3]
         e_y = C @ x - y
-        x_rate = A @ x + B[:, 0] * command(own, x, f_hat, limits) + F_A[:, 0] * f_hat - gain @ e_y
+        x_rate = A @ x + B[:, 0] * command(design, x, f_hat, limits) + F_A[:, 0] * f_hat - gain @ e_y
         return [*x_rate, *(-gamma * f @ (C @ x_rate + sigma * e_y))]
 
     y = measured()
@@ -101,35 +101,35 @@ def test_fast_adaptive_follows_the_law_with_the_derivative_of_the_error(designed
     rows = []
     for k in range(STEPS):
         z = solve_ivp(slopes, (0, T), z, args=(y[k],), rtol=1e-10, atol=1e-12, max_step=T / 20).y[:, -1]
-        rows.append([*z, command(own, z[:3], z[3], limits)])
+        rows.append([*z, command(design, z[:3], z[3], limits)])
         # e_y' at the jump of the measurements.
         z[3] += (gamma * f @ (y[k + 1] - y[k]))[0]
     commands = np.array(rows)[:, 4]
     assert not limited or set(LIMITS) <= set(commands) and len(set(commands)) > 5
-    assert np.allclose(own.run()[1:], rows, rtol=1e-6, atol=1e-6)
+    assert np.allclose(design.run()[1:], rows, rtol=1e-6, atol=1e-6)
 
 
 def test_the_error_of_fast_adaptive_is_strictly_positive_real(designed):
-    own = designed("fast-adaptive")
-    f, gamma = np.linalg.pinv(C @ F_A), own.parameters["gamma"]
-    a_l = A - (own.gains["L_x"] - F_A @ (gamma * f)) @ C
+    design = designed("fast-adaptive")
+    f, gamma = np.linalg.pinv(C @ F_A), design.parameters["gamma"]
+    a_l = A - (design.gains["L_x"] - F_A @ (gamma * f)) @ C
     # F C (j w I - A_L)^-1 F_a has a positive real part.
     for w in np.logspace(-3, 4, 200):
         response = f @ C @ np.linalg.solve(1j * w * np.eye(3) - a_l, F_A)
         assert response[0, 0].real > 0
-    eigenvalues = np.array(own.report["observer"]["eigenvalues"])
+    eigenvalues = np.array(design.report["observer"]["eigenvalues"])
     assert np.min(np.abs(eigenvalues[:, 0] + gamma)) < 1e-6 * gamma
 
 
 def test_proportional_integral_follows_its_law_and_a_ramp_without_a_lag(designed):
-    own = designed("proportional-integral")
-    l_x, l_f, p_f = (own.gains[name] for name in ("L_x", "L_f", "P_f"))
+    design = designed("proportional-integral")
+    l_x, l_f, p_f = (design.gains[name] for name in ("L_x", "L_f", "P_f"))
 
     def slopes(_, z, y):
         x, integral = z[:3], z[3:]
         e = y - C @ x
         f_hat = integral + p_f @ e
-        u = own.gains["K_x"] @ x + own.gains["K_f"] @ f_hat
+        u = design.gains["K_x"] @ x + design.gains["K_f"] @ f_hat
         return [*(A @ x + B @ u + F_A @ f_hat + (l_x - F_A @ p_f) @ e), *(l_f @ e)]
 
     y = measured()
@@ -137,19 +137,19 @@ def test_proportional_integral_follows_its_law_and_a_ramp_without_a_lag(designed
     for k in range(STEPS):
         z = solve_ivp(slopes, (0, T), z, args=(y[k],), rtol=1e-11, atol=1e-13).y[:, -1]
         f_hat = z[3:] + p_f @ (y[k] - C @ z[:3])
-        rows.append([*z[:3], *f_hat, *(own.gains["K_x"] @ z[:3] + own.gains["K_f"] @ f_hat)])
-    assert np.allclose(own.run()[1:], rows, rtol=1e-7, atol=1e-7)
+        rows.append([*z[:3], *f_hat, *(design.gains["K_x"] @ z[:3] + design.gains["K_f"] @ f_hat)])
+    assert np.allclose(design.run()[1:], rows, rtol=1e-7, atol=1e-7)
 
     def loop(t, z):
         x, rest = z[:3], slopes(t, z[3:], C @ z[:3])
         f_hat = z[6:] + p_f @ C @ (x - z[3:6])
-        u = own.gains["K_x"] @ z[3:6] + own.gains["K_f"] @ f_hat
+        u = design.gains["K_x"] @ z[3:6] + design.gains["K_f"] @ f_hat
         return [*(A @ x + B @ u + F_A[:, 0] * t), *rest]
 
     end = solve_ivp(loop, (0, 8), np.zeros(7), rtol=1e-9, atol=1e-11).y[:, -1]
     f_hat = end[6] + (p_f @ C @ (end[:3] - end[3:6]))[0]
     assert abs(f_hat - 8) < 1e-5
-    assert own.report["estimation"]["errors"][0]["ramp"] < 1e-9
+    assert design.report["estimation"]["errors"][0]["ramp"] < 1e-9
 
 
 def sampled():
@@ -166,55 +166,55 @@ def sampled_measurements():
     return np.vstack([y[:1], y[:-1]])
 
 
-def recursion(own, law):
+def recursion(design, law):
     """x_hat[k|k], f_hat[k] and u[k] of x_hat[k+1|k] = A x_hat[k|k-1] + B u + F_a f_hat + L e."""
     a, f_a, f = sampled()
-    gain = a @ own.gains["L_x"]
+    gain = a @ design.gains["L_x"]
     x, last, rows = np.array([0.3, -0.2, 0.0]), 0.0, []
     for y in sampled_measurements():
         e = y - C @ x
         last = law((f @ e)[0], last)
-        corrected = x + own.gains["L_x"] @ e
-        u = command(own, corrected, last, (-np.inf, np.inf))
+        corrected = x + design.gains["L_x"] @ e
+        u = command(design, corrected, last, (-np.inf, np.inf))
         rows.append([*corrected, last, u])
         x = a @ x + f_a[:, 0] * (u + last) + gain @ e
     return rows
 
 
 def test_sliding_mode_follows_its_law(designed):
-    own = designed("sliding-mode", f"sample_time = {T}\n")
-    rho, delta = own.parameters["rho"], own.parameters["delta"]
+    design = designed("sliding-mode", f"sample_time = {T}\n")
+    rho, delta = design.parameters["rho"], design.parameters["delta"]
     assert rho == 4.0
-    expected = recursion(own, lambda s, _: rho * s / (abs(s) + delta))
-    assert np.allclose(own.run(), expected, rtol=1e-9, atol=1e-9)
+    expected = recursion(design, lambda s, _: rho * s / (abs(s) + delta))
+    assert np.allclose(design.run(), expected, rtol=1e-9, atol=1e-9)
     assert np.max(np.abs(expected), axis=0)[3] > 0.5 * rho, "beyond the boundary layer"
 
 
 def test_learning_follows_its_law(designed):
-    own = designed("learning", f"sample_time = {T}\n")
-    kept = own.parameters["K_1"]
-    slope = own.gains["L_f"] @ np.linalg.pinv(sampled()[2])
-    expected = recursion(own, lambda s, last: kept * last + slope[0, 0] * s)
-    assert np.allclose(own.run(), expected, rtol=1e-9, atol=1e-9)
+    design = designed("learning", f"sample_time = {T}\n")
+    k_1 = design.parameters["K_1"]
+    slope = design.gains["L_f"] @ np.linalg.pinv(sampled()[2])
+    expected = recursion(design, lambda s, last: k_1 * last + slope[0, 0] * s)
+    assert np.allclose(design.run(), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("law", ["proportional-integral", "fast-adaptive"])
 def test_a_sampled_law_with_a_direct_term_reads_the_corrected_estimate(designed, law):
-    own = designed(law, f"sample_time = {T}\n")
+    design = designed(law, f"sample_time = {T}\n")
     a, f_a, f = sampled()
     x, integral, rows = np.array([0.3, -0.2, 0.0]), 0.0, []
-    gamma = 1 - np.exp(-T * own.parameters.get("gamma", 0))
+    gamma = 1 - np.exp(-T * design.parameters.get("gamma", 0))
     for y in sampled_measurements():
         e = y - C @ x
         # The law in terms of the error before the correction.
         before = integral + gamma * (f @ e)[0]
-        corrected, integral = x + own.gains["L_x"] @ e, integral + (own.gains["L_f"] @ e)[0]
-        f_hat = integral + (own.gains["P_f"] @ (y - C @ corrected))[0]
+        corrected, integral = x + design.gains["L_x"] @ e, integral + (design.gains["L_f"] @ e)[0]
+        f_hat = integral + (design.gains["P_f"] @ (y - C @ corrected))[0]
         assert law != "fast-adaptive" or abs(f_hat - before) < 1e-9
-        u = command(own, corrected, f_hat, (-np.inf, np.inf))
+        u = command(design, corrected, f_hat, (-np.inf, np.inf))
         rows.append([*corrected, f_hat, u])
         x = a @ corrected + f_a[:, 0] * (u + integral)
-    assert np.allclose(own.run(), rows, rtol=1e-9, atol=1e-9)
+    assert np.allclose(design.run(), rows, rtol=1e-9, atol=1e-9)
 
 
 def test_the_fmu_names_the_direct_dependence_of_its_command(designed):
@@ -281,20 +281,20 @@ def compared(aso_ftc, file, page):
 def test_all_laws_of_the_three_tanks_are_compared_on_one_page(aso_ftc, tmp_path):
     page = tmp_path / "laws.html"
     packed_plant(aso_ftc, "ThreeTank")
-    found = compared(aso_ftc, ROOT / "examples/three-tank/plant.toml", page)
-    assert len(found) == 5 and all(one["result"] for one in found.values())
-    errors = {law: one["result"]["estimation"]["errors"][0] for law, one in found.items()}
+    comparison = compared(aso_ftc, ROOT / "examples/three-tank/plant.toml", page)
+    assert len(comparison) == 5 and all(one["result"] for one in comparison.values())
+    errors = {law: one["result"]["estimation"]["errors"][0] for law, one in comparison.items()}
     assert errors["proportional-integral"]["ramp"] < 1e-6 < errors["augmented"]["ramp"]
     assert 0.009 < errors["sliding-mode"]["constant"] < 0.011
     text = page.read_text(encoding="utf-8")
-    assert all(law in text for law in found) and "disk margin" in text
+    assert all(law in text for law in comparison) and "disk margin" in text
 
 
 def test_on_the_pendulum_the_laws_that_need_direct_faults_do_not_exist(aso_ftc, tmp_path):
-    found = compared(aso_ftc, ROOT / "fmu-controller/pendulum.toml", tmp_path / "laws.html")
-    missing = {law for law, one in found.items() if one["reason"]}
+    comparison = compared(aso_ftc, ROOT / "fmu-controller/pendulum.toml", tmp_path / "laws.html")
+    missing = {law for law, one in comparison.items() if one["reason"]}
     assert missing == {"fast-adaptive", "sliding-mode", "learning"}
-    assert all("rank C F_a is 0, expected 1" in found[law]["reason"] for law in missing)
+    assert all("rank C F_a is 0, expected 1" in comparison[law]["reason"] for law in missing)
 
 
 def test_a_comparison_overwrites_nothing_of_others(aso_ftc, tmp_path):

@@ -155,12 +155,12 @@ def test_the_levels_are_those_of_scipy_including_faults_and_overflow(plants, ste
         output=["h_1", "h_2", "h_3", "y_1", "y_2", "y_3", "q_over"],
     )
     times = result["time"]
-    wanted = levels(np.array([0.4, 0.2, 0.3]), times, 1200.0)
-    found = table(result, ["h_1", "h_2", "h_3"])
-    assert (wanted[:, 0] == BRIM).any() and result["q_over"].max() > 0
-    assert found == pytest.approx(wanted, abs=1e-7)
+    expected = levels(np.array([0.4, 0.2, 0.3]), times, 1200.0)
+    simulated = table(result, ["h_1", "h_2", "h_3"])
+    assert (expected[:, 0] == BRIM).any() and result["q_over"].max() > 0
+    assert simulated == pytest.approx(expected, abs=1e-7)
     bias = np.outer(times >= BIAS["t_bias"], [BIAS["b_1"], 0, BIAS["b_3"]])
-    assert table(result, ["y_1", "y_2", "y_3"]) == pytest.approx(found + bias, abs=1e-15)
+    assert table(result, ["y_1", "y_2", "y_3"]) == pytest.approx(simulated + bias, abs=1e-15)
 
 
 def test_cvode_gives_the_levels_of_the_co_simulation(plants):
@@ -192,11 +192,11 @@ def test_the_directional_derivatives_of_the_tanks_give_the_linear_model(plants, 
     with slave(plants["ThreeTank"], tmp_path, dict(zip(states, h))) as (instance, names):
         drops = [h[0] - h[2], h[2] - h[1], h[1]]
         a, b, c = np.array(MU) * PIPE * np.sqrt(GRAVITY / 2 / np.array(drops)) / AREA
-        wanted = [[-a, 0, a], [0, -b - c, b], [a, b, -a - b]]
-        found = jacobian(instance, names, slopes, states)
-        assert found == pytest.approx(np.array(wanted), rel=1e-13)
-        found = jacobian(instance, names, slopes, inputs)
-        assert found == pytest.approx(np.array([[1, 0], [0, 1], [0, 0]]) / AREA, rel=1e-14)
+        expected = [[-a, 0, a], [0, -b - c, b], [a, b, -a - b]]
+        matrix = jacobian(instance, names, slopes, states)
+        assert matrix == pytest.approx(np.array(expected), rel=1e-13)
+        matrix = jacobian(instance, names, slopes, inputs)
+        assert matrix == pytest.approx(np.array([[1, 0], [0, 1], [0, 0]]) / AREA, rel=1e-14)
         assert (jacobian(instance, names, measured, states) == np.eye(3)).all()
 
 
@@ -273,13 +273,13 @@ def servo_by_fmpy(plants, **options):
 
 
 def test_the_servo_moves_as_by_scipy_including_stick_slip_and_faults(plants):
-    wanted = servo_by_scipy()
+    expected = servo_by_scipy()
     for interval in (HOLD, HOLD / 5):
         result = servo_by_fmpy(plants, fmi_type="CoSimulation", output_interval=interval)
         assert set(result["regime"]) == {-1, 0, 1}
-        found = table(result, NAMES)[:: round(HOLD / interval)]
-        assert np.ptp(wanted, axis=0)[1] > 50
-        assert (abs(found - wanted).max(axis=0) < 1e-9 * np.ptp(wanted, axis=0)).all()
+        simulated = table(result, NAMES)[:: round(HOLD / interval)]
+        assert np.ptp(expected, axis=0)[1] > 50
+        assert (abs(simulated - expected).max(axis=0) < 1e-9 * np.ptp(expected, axis=0)).all()
 
 
 def test_cvode_gives_the_motion_of_the_servo_in_co_simulation(plants):
@@ -307,8 +307,8 @@ def test_the_directional_derivatives_of_the_servo_without_friction_give_the_line
     damping = VISCOUS + K**2 / RESISTANCE
     with slave(plants["DcServo"], tmp_path, {"friction": False}) as (instance, names):
         slopes = ["der(theta)", "der(omega)"]
-        found = jacobian(instance, names, slopes, NAMES)
-        assert found == pytest.approx(np.array([[0, 1], [0, -damping / INERTIA]]), rel=1e-14)
-        found = jacobian(instance, names, slopes, ["u"])
-        assert found == pytest.approx(np.array([[0], [K / RESISTANCE / INERTIA]]), rel=1e-14)
+        matrix = jacobian(instance, names, slopes, NAMES)
+        assert matrix == pytest.approx(np.array([[0, 1], [0, -damping / INERTIA]]), rel=1e-14)
+        matrix = jacobian(instance, names, slopes, ["u"])
+        assert matrix == pytest.approx(np.array([[0], [K / RESISTANCE / INERTIA]]), rel=1e-14)
         assert (jacobian(instance, names, ["theta_m"], NAMES) == [[1, 0]]).all()

@@ -77,9 +77,9 @@ def test_cvode_gives_the_solution_of_the_van_der_pol_equation(examples):
     solution = solve_ivp(
         van_der_pol, (0, 20), [2, 0], "DOP853", result["time"], rtol=1e-12, atol=1e-12
     )
-    found = np.array([result["x0"], result["x1"]])
-    assert abs(found - solution.y).max() < 1e-5
-    assert result["der(x1)"] == pytest.approx(van_der_pol(0, found)[1], abs=1e-12)
+    states = np.array([result["x0"], result["x1"]])
+    assert abs(states - solution.y).max() < 1e-5
+    assert result["der(x1)"] == pytest.approx(van_der_pol(0, states)[1], abs=1e-12)
 
 
 @pytest.mark.parametrize("interval", [0.01, 0.1, 1.0, 20.0])
@@ -97,9 +97,9 @@ def test_co_simulation_integrates_the_van_der_pol_equation_to_the_tolerance_of_t
     solution = solve_ivp(
         van_der_pol, (0, 20), [2, 0], "DOP853", result["time"], rtol=1e-12, atol=1e-12
     )
-    found = np.array([result["x0"], result["x1"]])
+    states = np.array([result["x0"], result["x1"]])
     # The oscillator multiplies local errors, by less than 100 in four periods.
-    assert abs(found - solution.y).max() < 100 * tolerance
+    assert abs(states - solution.y).max() < 100 * tolerance
 
 
 def test_the_directional_derivatives_of_the_van_der_pol_oscillator_give_its_jacobian(
@@ -108,8 +108,8 @@ def test_the_directional_derivatives_of_the_van_der_pol_oscillator_give_its_jaco
     with slave(examples["VanDerPol"], tmp_path, {"x0": 0.7, "x1": -1.3}) as (instance, names):
         for known, column in {"x0": [0, 2 * 0.7 * 1.3 - 1], "x1": [1, 1 - 0.7**2]}.items():
             slopes = [names["x1"], names["der(x1)"]]
-            found = instance.getDirectionalDerivative(slopes, [names[known]], [1.0])
-            assert found == pytest.approx(column, rel=1e-15)
+            derivatives = instance.getDirectionalDerivative(slopes, [names[known]], [1.0])
+            assert derivatives == pytest.approx(column, rel=1e-15)
 
 
 def euler_ball(size, e=0.7, v_min=0.1):
@@ -157,8 +157,8 @@ def test_the_ball_follows_the_closed_form_for_every_step(examples, tmp_path, e, 
     with slave(examples["BouncingBall"], tmp_path, {"e": e}) as (ball, names):
         for k in range(round(3.0 / size)):
             ball.doStep(k * size, size)
-            found = ball.getReal([names["h"], names["v"]])
-            assert found == pytest.approx(closed_form_ball((k + 1) * size, e), abs=1e-9)
+            state = ball.getReal([names["h"], names["v"]])
+            assert state == pytest.approx(closed_form_ball((k + 1) * size, e), abs=1e-9)
 
 
 def test_cvode_and_the_co_simulation_give_the_same_flights_of_the_ball(examples):
@@ -200,10 +200,10 @@ class VelocityForm:
         rest = self.gain * (error - self.derivative * (measurement - last[2]))
         last_rest = 0.0 if last[1] is None else last[1]
         automatic = last[0] + rest - last_rest + self.gain * self.integral * error
-        wanted = {0: 0.0, 1: manual, 2: automatic}[mode]
-        command = limited(wanted, self.limit)
+        demand = {0: 0.0, 1: manual, 2: automatic}[mode]
+        command = limited(demand, self.limit)
         self.before = (command, rest, measurement)
-        return command, abs(wanted) > self.limit
+        return command, abs(demand) > self.limit
 
 
 PARAMETERS = {"K": 2.0, "T_i": 0.7, "T_d": 0.05, "T_s": 0.1, "u_max": 3.0}
@@ -232,14 +232,14 @@ def test_the_pid_agrees_with_its_velocity_form_in_all_modes_and_at_the_limits(ex
     modes = [[0, 1, 2][(k // 23) % 3] for k in range(400)]
     rows = drive(examples["Pid"], tmp_path, 400, 0.1, lambda k: (*signals[k], modes[k]))
     oracle = VelocityForm(*PARAMETERS.values())
-    seen = set()
+    statuses = set()
     for k, (command, samples, status) in enumerate(rows):
         expected, at_limit = oracle.sample(modes[k], *signals[k])
         assert command == pytest.approx(expected, abs=1e-9)
         assert samples == k + 1
         assert status == WORDS[modes[k]] + (", limited" if at_limit else "")
-        seen.add(status)
-    assert seen == {"off", "manual", "automatic", "manual, limited", "automatic, limited"}
+        statuses.add(status)
+    assert statuses == {"off", "manual", "automatic", "manual, limited", "automatic, limited"}
 
 
 def test_the_pid_in_automatic_mode_is_the_sum_of_its_three_terms(examples, tmp_path):
@@ -270,9 +270,9 @@ def test_the_table_agrees_with_numpy_between_at_and_outside_of_its_rows(examples
         for point in points:
             lookup.setReal([names[x]], [point])
             for name in outputs:
-                [found] = lookup.getReal([names[name]])
+                [value] = lookup.getReal([names[name]])
                 expected = np.interp(point, table[x], table[name])
-                assert found == pytest.approx(expected, rel=1e-14)
+                assert value == pytest.approx(expected, rel=1e-14)
 
 
 def test_a_new_crate_is_tested_packed_and_simulated_outside_of_the_workspace(

@@ -11,7 +11,7 @@ from design_file import MATRICES, design_text, vector
 from excitation import restore, serialized
 from named_equations import evaluated, losses, size_of, state_names
 from observer_oracle import element_name
-from test_designs import SCHEMA, begun, made, random_design
+from test_designs import SCHEMA, begun, fmu_with, random_design
 
 # Sizes, limits that some command reaches or leaves, extras of `random_design`.
 CASES = [
@@ -29,7 +29,7 @@ IN_TIME = CASES[:5]
 @pytest.fixture(params=CASES, ids=str)
 def fmu(request, controller, tmp_path):
     """The FMU of a design."""
-    return made(controller, random_design(*request.param), tmp_path)
+    return fmu_with(controller, random_design(*request.param), tmp_path)
 
 
 def stated(design):
@@ -56,9 +56,9 @@ def test_it_has_exactly_the_variables_of_its_entries(fmu):
         for j in range(columns)
     }
     always |= {*vector("x_hat_0", n), *vector("f_hat_0", q), "t_on", "monitor"}
-    limits = [own for own in fmu.names(causality="parameter") if own.startswith(("u_min", "u_max"))]
-    found = set(fmu.names(causality="parameter")) - set(limits)
-    assert found == always | stated(design)
+    limits = [parameter for parameter in fmu.names(causality="parameter") if parameter.startswith(("u_min", "u_max"))]
+    parameters = set(fmu.names(causality="parameter")) - set(limits)
+    assert parameters == always | stated(design)
     outputs = {*state_names(design), *vector("u", m), *(name for name, *_ in losses(design))}
     assert set(fmu.names(causality="output")) == outputs
     assert ("T_s" in fmu.variables) == ("sample_time" in design)
@@ -82,17 +82,17 @@ def test_the_estimate_starts_at_the_operating_point(fmu):
         names = {"states": vector("x_op", n), "actuators": vector("u_op", m)}
         names["measurements"] = vector("y_op", p)
         for signals, parameters in names.items():
-            wanted = [signal.get("operating", 0.0) for signal in design[signals]]
+            expected = [signal.get("operating", 0.0) for signal in design[signals]]
             if "operating" in design["states"][0]:
-                assert instance.get(*parameters) == wanted
-        wanted = [signal.get("operating", 0.0) for signal in design["states"]]
-        assert instance.get(*vector("x_hat_0", n)) == wanted
+                assert instance.get(*parameters) == expected
+        expected = [signal.get("operating", 0.0) for signal in design["states"]]
+        assert instance.get(*vector("x_hat_0", n)) == expected
 
 
 @pytest.mark.parametrize("size", [0.005, 0.05, 0.25])
 @pytest.mark.parametrize("case", IN_TIME, ids=str)
 def test_steps_with_slopes_of_the_measurements_equal_scipys(controller, tmp_path, case, size):
-    fmu = made(controller, random_design(*case), tmp_path)
+    fmu = fmu_with(controller, random_design(*case), tmp_path)
     design = fmu.design
     n, m, p, q = size_of(design)
     z, y, slope = np.linspace(-1, 1.5, n + q), np.linspace(0.5, -0.7, p), np.linspace(2, -3, p)
@@ -101,10 +101,10 @@ def test_steps_with_slopes_of_the_measurements_equal_scipys(controller, tmp_path
     times = np.linspace(0, 1, round(1 / size) + 1)
     with begun(fmu, size_of(design), z, y) as instance:
         parameters = fmu.names(type="Real", causality="parameter")
-        given = dict(zip(parameters, instance.get(*parameters))) | {"inputs": names}
+        constants = dict(zip(parameters, instance.get(*parameters))) | {"inputs": names}
 
         def at(time, z):
-            values = given | dict(zip([*names, *states], [*(y + time * slope), *z]))
+            values = constants | dict(zip([*names, *states], [*(y + time * slope), *z]))
             return evaluated(values, design, (True, True))
 
         right = lambda time, z: [at(time, z)[f"der({name})"] for name in states]
@@ -112,30 +112,30 @@ def test_steps_with_slopes_of_the_measurements_equal_scipys(controller, tmp_path
         start = [*z, *(y if "filter" in design else [])]
         done = solve_ivp(right, (0, 1), start, t_eval=times, **options)
         assert done.success
-        for time, end, wanted in zip(times, times[1:], done.y.T[1:]):
+        for time, end, expected in zip(times, times[1:], done.y.T[1:]):
             instance.set(dict(zip(names, y + time * slope)))
             instance.set_slopes(**dict(zip(names, slope)))
             instance.step(time, size)
-            assert instance.get(*states) == pytest.approx(wanted, rel=1e-6, abs=1e-7)
-            exact = at(end, wanted)
-            found = dict(zip(outputs, instance.get(*outputs)))
-            wanted = {name: exact[name] for name in outputs}
-            assert found == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+            assert instance.get(*states) == pytest.approx(expected, rel=1e-6, abs=1e-7)
+            exact = at(end, expected)
+            results = dict(zip(outputs, instance.get(*outputs)))
+            expected = {name: exact[name] for name in outputs}
+            assert results == pytest.approx(expected, rel=1e-6, abs=1e-6)
             present = at(end, instance.get(*states))
-            wanted = [present[f"der({name})"] for name in states]
-            assert instance.slopes_of(*states) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+            expected = [present[f"der({name})"] for name in states]
+            assert instance.slopes_of(*states) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 def test_the_slope_of_a_loss_is_the_derivative_of_its_quotient(controller, tmp_path):
-    fmu = made(controller, random_design((2, 2, 1, 2), None, "e"), tmp_path)
+    fmu = fmu_with(controller, random_design((2, 2, 1, 2), None, "e"), tmp_path)
     (name, k, j, least), *_ = losses(fmu.design)
     with begun(fmu, (2, 2, 1, 2), [1.0, -0.5, 0.3, 0.7], [0.4]) as instance:
         instance.step(0.0, 0.1)
         u, f = instance.get(f"u[{j + 1}]")[0], instance.get(f"f_hat[{k + 1}]")[0]
         du, df = instance.slopes_of(f"u[{j + 1}]", f"f_hat[{k + 1}]")
         scale = u * u + least * least
-        wanted = -(du * f + u * df) / scale + u * f * 2 * u * du / scale**2
-        assert instance.slopes_of(name) == pytest.approx([wanted], rel=1e-12)
+        expected = -(du * f + u * df) / scale + u * f * 2 * u * du / scale**2
+        assert instance.slopes_of(name) == pytest.approx([expected], rel=1e-12)
 
 
 def test_a_step_is_rolled_back_with_the_same_bits(fmu):
@@ -158,7 +158,7 @@ def test_an_invalid_filter_rate_stops_the_initialization(controller, tmp_path):
     for extras, value in (("w", 0.0), ("w", -1.0), ("cw", 1.01)):
         folder = tmp_path / f"{extras}{value}"
         folder.mkdir()
-        fmu = made(controller, random_design((1, 1, 1, 1), None, extras), folder)
+        fmu = fmu_with(controller, random_design((1, 1, 1, 1), None, extras), folder)
         with Instance(fmu) as instance:
             assert instance.set_one("filter", value) == OK
             assert instance.call("EnterInitializationMode") == ERROR

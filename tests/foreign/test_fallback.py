@@ -100,17 +100,17 @@ def effects(m):
 
 def test_in_each_case_the_loop_with_the_observer_decays_as_reported(vehicle, masses):
     for design, report, _ in (vehicle, masses):
-        loop, found = Equations(design, design["fallback"]), report["fallback"]
-        assert ("K_f" in design["fallback"]) == found["compensates"]
+        loop, fallback = Equations(design, design["fallback"]), report["fallback"]
+        assert ("K_f" in design["fallback"]) == fallback["compensates"]
         names = [signal["name"] for signal in report["plant"]["actuators"]]
-        assert [case["name"] for case in found["cases"]] == ["all actuators", *(f"without {name}" for name in names)]
-        for case, effect in zip(found["cases"], effects(loop.m)):
+        assert [case["name"] for case in fallback["cases"]] == ["all actuators", *(f"without {name}" for name in names)]
+        for case, effect in zip(fallback["cases"], effects(loop.m)):
             assert -np.linalg.eigvals(loop.whole(effect)).real.max() == pytest.approx(case["decay"], rel=1e-6)
             fed_back = loop.a + loop.b * effect @ matrix(design["fallback"], "K_x")
             assert -np.linalg.eigvals(fed_back).real.max() == pytest.approx(case["feedback_decay"], rel=1e-6)
-        assert found["decay"] == min(case["decay"] for case in found["cases"]) > 0
+        assert fallback["decay"] == min(case["decay"] for case in fallback["cases"]) > 0
         intact = Equations(design).whole(np.ones(loop.m))
-        assert -np.linalg.eigvals(intact).real.max() == pytest.approx(found["intact_decay"], rel=1e-6)
+        assert -np.linalg.eigvals(intact).real.max() == pytest.approx(fallback["intact_decay"], rel=1e-6)
 
 
 def test_one_lyapunov_matrix_serves_all_losses_whose_sum_is_at_most_one(vehicle, masses):
@@ -137,7 +137,7 @@ def test_price_and_rest_are_those_of_the_loop(vehicle, masses):
             return np.sqrt(np.diag(c @ solve_continuous_lyapunov(a, -b @ b.T) @ c.T))
 
         operating = [signal["operating"] for signal in report["plant"]["actuators"]]
-        stuck = {own["gone"]: own["stuck_at"] for own in design["reconfigurations"]}
+        stuck = {entry["gone"]: entry["stuck_at"] for entry in design["reconfigurations"]}
         names = [signal["name"] for signal in report["plant"]["actuators"]]
         for at, (case, effect) in enumerate(zip(report["fallback"]["cases"], effects(loop.m))):
             closed = loop.whole(effect)
@@ -172,9 +172,9 @@ class Run:
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
-        self.actuators = [own["name"] for own in design["actuators"]]
-        self.operating = np.array([own.get("operating", 0.0) for own in design["actuators"]])
-        self.measurements = [own["name"] for own in design["measurements"]]
+        self.actuators = [actuator["name"] for actuator in design["actuators"]]
+        self.operating = np.array([actuator.get("operating", 0.0) for actuator in design["actuators"]])
+        self.measurements = [measurement["name"] for measurement in design["measurements"]]
 
     def get(self, *names):
         return np.array(self.fmu.getReal([self.references[name] for name in names]))
@@ -253,8 +253,8 @@ def test_two_thrusters_that_are_gone_have_no_gains_so_that_the_controller_falls_
     run.set("actuator_gone[1]", False)
     drive(run, plant, 0.06, lambda u: u)
     assert run.number() == 3
-    found = vehicle[1]["reconfiguration"]["by_fallback"]
-    assert [own["actuators"] for own in found][0] == ["T1", "T2"] and len(found) == 6
+    cases = vehicle[1]["reconfiguration"]["by_fallback"]
+    assert [case["actuators"] for case in cases][0] == ["T1", "T2"] and len(cases) == 6
 
 
 def test_at_the_switch_the_estimates_continue_and_the_commands_change_by_the_gains(masses, tmp_path):
@@ -291,10 +291,10 @@ def test_at_the_switch_the_estimates_continue_and_the_commands_change_by_the_gai
 @pytest.mark.parametrize("gone", [(0, 2), (1, 3)])
 def test_without_two_forces_the_others_have_the_effect_of_all(masses, tmp_path, gone):
     design, report, fmu = masses
-    names = [own["name"] for own in design["actuators"]]
-    own = next(own for own in design["combinations"] if own["gone"] == [names[at] for at in gone])
+    names = [actuator["name"] for actuator in design["actuators"]]
+    gains = next(entry for entry in design["combinations"] if entry["gone"] == [names[at] for at in gone])
     b, k_x = matrix(design, "B"), matrix(design, "K_x")
-    assert abs(b @ matrix(own, "K_x") - b @ k_x).max() < 1e-12 and abs(matrix(own, "K_x")[list(gone)]).max() == 0
+    assert abs(b @ matrix(gains, "K_x") - b @ k_x).max() < 1e-12 and abs(matrix(gains, "K_x")[list(gone)]).max() == 0
     assert len(report["reconfiguration"]["several"]) == 6
     run, plant = Run(design, fmu, tmp_path, 0.01), Plant(design, 0.01)
     stuck = np.array([{"a": 0.5, "c": -0.3}.get(name, 0.0) for name in names])
@@ -303,7 +303,7 @@ def test_without_two_forces_the_others_have_the_effect_of_all(masses, tmp_path, 
     drive(run, plant, 25.0, lambda u: np.where(np.isin(np.arange(4), gone), stuck, u))
     assert run.number() == gone[0] + 1
     assert abs(plant.x).max() < 1e-4
-    commands = run.operating + matrix(own, "K_s") @ (stuck - run.operating)[list(gone)]
+    commands = run.operating + matrix(gains, "K_s") @ (stuck - run.operating)[list(gone)]
     commands[list(gone)] = stuck[list(gone)]
     assert run.get(*names) == pytest.approx(commands, abs=1e-3)
     # A third one has no gains: the fall-back.
@@ -346,11 +346,11 @@ def test_a_sampled_controller_has_the_gains_of_its_case(sampled, transfer_time, 
         if k > 0:
             e = y - c @ x_hat
             x_hat, f_hat = x_hat + l_x @ e, f_hat + l_f @ e
-        own = gains if switched else design
-        k_f = matrix(own, "K_f") if "K_f" in own else np.zeros((4, 1))
-        u = matrix(own, "K_x") @ x_hat + k_f @ f_hat
+        law = gains if switched else design
+        k_f = matrix(law, "K_f") if "K_f" in law else np.zeros((4, 1))
+        u = matrix(law, "K_x") @ x_hat + k_f @ f_hat
         if switched and stuck:
-            u += np.reshape(matrix(own, "K_s"), (4, -1)) @ held
+            u += np.reshape(matrix(law, "K_s"), (4, -1)) @ held
         if transfer_time is not None:
             left = last - u if k == 20 else np.exp(-0.05 / transfer_time) * left
             u, last = u + left, u + left
@@ -378,8 +378,8 @@ def test_in_model_exchange_the_fall_back_takes_effect_at_an_event(masses, tmp_pa
     model.setupExperiment(startTime=0.0)
     model.enterInitializationMode()
     model.exitInitializationMode()
-    actuators = [own["name"] for own in design["actuators"]]
-    operating = np.array([own.get("operating", 0.0) for own in design["actuators"]])
+    actuators = [actuator["name"] for actuator in design["actuators"]]
+    operating = np.array([actuator.get("operating", 0.0) for actuator in design["actuators"]])
     before, after = Equations(design), Equations(design, design["fallback"])
     effect = np.array([1.0, 0.0, 1.0, 1.0])
 
@@ -433,15 +433,15 @@ def test_a_loss_that_is_smaller_may_have_a_feedback_where_an_actuator_that_is_go
     assert "plant.toml:8" in done.stderr
     done = designed(aso_ftc, tmp_path, one + "loss = 0.3\nregion.decay = 0.1\n")
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)["fallback"]
-    assert found["cases"][1]["name"] == "u1 with a loss of 0.3" and found["decay"] >= 0.1
-    assert found["k_x"] == [[pytest.approx(-2)]] and "intact controller" in found["method"]
+    fallback = json.loads(done.stdout)["fallback"]
+    assert fallback["cases"][1]["name"] == "u1 with a loss of 0.3" and fallback["decay"] >= 0.1
+    assert fallback["k_x"] == [[pytest.approx(-2)]] and "intact controller" in fallback["method"]
     # The intact gain is too small for a faster decay: one from the inequalities.
     done = designed(aso_ftc, tmp_path, one + "loss = 0.3\nregion.decay = 0.6\n", "--force")
     assert done.returncode in (0, 1), done.stderr
-    found = json.loads(done.stdout)["fallback"]
-    gain = found["k_x"][0][0]
-    assert "by linear matrix inequalities" in found["method"] and found["decay"] >= 0.6
+    fallback = json.loads(done.stdout)["fallback"]
+    gain = fallback["k_x"][0][0]
+    assert "by linear matrix inequalities" in fallback["method"] and fallback["decay"] >= 0.6
     assert 1 + gain < -0.6 and 1 + 0.7 * gain < -0.6
 
 

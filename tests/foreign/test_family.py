@@ -24,21 +24,21 @@ def spring(k):
 
 def gains(report):
     """The gains by name."""
-    return {own["name"]: np.array(own["values"]) for own in report["gains"]}
+    return {gain["name"]: np.array(gain["values"]) for gain in report["gains"]}
 
 
 def controller(report):
     """A, B, C of the continuous controller of the nominal plant: z' = A z + B y, u = C z."""
-    own = gains(report)
-    k, l = np.hstack([own["K_x"], own["K_f"]]), np.vstack([own["L_x"], own["L_f"]])
-    a_0 = np.block([[spring(1.0), -own["K_f"] * B], [np.zeros((1, 5))]])
+    matrices = gains(report)
+    k, l = np.hstack([matrices["K_x"], matrices["K_f"]]), np.vstack([matrices["L_x"], matrices["L_f"]])
+    a_0 = np.block([[spring(1.0), -matrices["K_f"] * B], [np.zeros((1, 5))]])
     return a_0 + np.vstack([B, [[0]]]) @ k - l @ np.eye(l.shape[1], 5), l, k
 
 
 def closed(report, a):
     """The loop of a member with the controller."""
-    own, l, k = controller(report)
-    return np.block([[a, B @ k], [l @ np.eye(l.shape[1], 4), own]])
+    a_c, l, k = controller(report)
+    return np.block([[a, B @ k], [l @ np.eye(l.shape[1], 4), a_c]])
 
 
 def decrease(p, a):
@@ -84,7 +84,7 @@ def certified(designed):
 
 def test_with_one_measurement_the_members_are_stable_but_have_no_common_p(report):
     assert report["family"]["whole"]["reason"].endswith("soft spring, stiff spring")
-    assert all(own["instability"] < 0 for own in report["family"]["members"])
+    assert all(member["instability"] < 0 for member in report["family"]["members"])
 
 
 def test_one_p_proves_stability_of_the_whole_loop_of_all_members(certified):
@@ -108,16 +108,16 @@ def test_v_decreases_while_the_spring_changes_fast(certified):
 
 
 def test_each_member_has_its_own_stability_and_peaks_of_s(report):
-    members = {own["name"]: own for own in report["family"]["members"]}
+    members = {entry["name"]: entry for entry in report["family"]["members"]}
     assert set(members) == set(SPRINGS)
-    own, l, k = controller(report)
+    a_c, l, k = controller(report)
     for name, stiffness in SPRINGS.items():
         member, a = members[name], spring(stiffness)
         assert member["instability"] == pytest.approx(np.linalg.eigvals(closed(report, a)).real.max(), rel=1e-6)
         peaks = {"input": 0.0, "output": 0.0}
         for w in 1j * np.logspace(-2, 2, 2000):
             plant = C @ np.linalg.solve(w * np.eye(4) - a, B)
-            back = k @ np.linalg.solve(w * np.eye(5) - own, l)
+            back = k @ np.linalg.solve(w * np.eye(5) - a_c, l)
             for point, loop in (("input", back @ plant), ("output", plant @ back)):
                 s = np.linalg.inv(np.eye(len(loop)) - loop)
                 peaks[point] = max(peaks[point], np.linalg.norm(s, 2))
@@ -139,12 +139,12 @@ def test_a_member_that_the_controller_does_not_stabilise_makes_the_verdict_red(d
     weights = ("feedback.region = { decay = 0.15 }", "feedback.Q = [1, 1, 1, 1]\nfeedback.R = [1]")
     done = designed(weights, ("[-2, 2, 0, 0]", "[-2, 2, 3, 0]"))
     assert done.returncode == 1, done.stderr
-    found = json.loads(done.stdout)
-    member = {own["name"]: own for own in found["family"]["members"]}["stiff spring"]
+    report = json.loads(done.stdout)
+    member = {entry["name"]: entry for entry in report["family"]["members"]}["stiff spring"]
     assert member["instability"] > 0 and member["margins"] is None
-    assert found["family"]["feedback"] is None
-    assert "stiff spring" in found["family"]["whole"]["reason"]
-    assert any("not stable with the member stiff spring" in reason for reason in found["verdict"]["reasons"])
+    assert report["family"]["feedback"] is None
+    assert "stiff spring" in report["family"]["whole"]["reason"]
+    assert any("not stable with the member stiff spring" in reason for reason in report["verdict"]["reasons"])
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,6 @@ def preload(tmp_path_factory):
 def test_a_failed_call_leaves_whole_files_or_a_sentence_that_names_it(scenario, preload, tmp_path):
     bench = Bench(scenario, preload, tmp_path / scenario.name, 1)
     with ThreadPoolExecutor(1) as pool:
-        found = [sweep(bench, kind, 2, pool) for kind in KINDS if str(kind) in CHOSEN and scenario.has(kind.calls)]
-    assert sum(own.faults for own in found) > 0
-    assert [f"{own.scenario}, {own.kind}, {text}" for own in found for text in own.broken] == []
+        sweeps = [sweep(bench, kind, 2, pool) for kind in KINDS if str(kind) in CHOSEN and scenario.has(kind.calls)]
+    assert sum(one.faults for one in sweeps) > 0
+    assert [f"{one.scenario}, {one.kind}, {text}" for one in sweeps for text in one.broken] == []

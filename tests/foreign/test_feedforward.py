@@ -53,8 +53,8 @@ def held(a, b, time):
 def silent(a, b, output, k, period):
     """The slowest left eigenvectors W of the feedback, and N_r with W' [B N_r; I] = 0."""
     n, t = len(a), len(output)
-    kept, factor = (np.eye(t), period) if period else (np.zeros((t, t)), 1.0)
-    feedback = np.block([[a, np.zeros((n, t))], [-factor * output, kept]]) + np.vstack([b, np.zeros((t, b.shape[1]))]) @ k
+    integrator, factor = (np.eye(t), period) if period else (np.zeros((t, t)), 1.0)
+    feedback = np.block([[a, np.zeros((n, t))], [-factor * output, integrator]]) + np.vstack([b, np.zeros((t, b.shape[1]))]) @ k
     values, vectors = np.linalg.eig(feedback.T)
     slowest = np.argsort(-(abs(values) if period else values.real))[:t]
     w = vectors[:, slowest]
@@ -84,17 +84,17 @@ def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
     """A plant under the FMU after a step of both references: states, commands, integrals at each communication step."""
     phi, gamma = held(plant[0], plant[1], PERIOD)
     _, xi = held(plant[0], disturbance[:, None], PERIOD)
-    own = Stepped(fmu, folder, [("r_p_1", STEP[0]), ("r_p_2", STEP[1])])
+    controller = Stepped(fmu, folder, [("r_p_1", STEP[0]), ("r_p_2", STEP[1])])
     x, rows = np.zeros(4), []
     for k in range(round(end / PERIOD) + 1):
-        u = np.array([own.get("F_1"), own.get("F_2")])
-        rows.append(np.concatenate([x, u, [own.get("x_i[1]"), own.get("x_i[2]")]]))
+        u = np.array([controller.get("F_1"), controller.get("F_2")])
+        rows.append(np.concatenate([x, u, [controller.get("x_i[1]"), controller.get("x_i[2]")]]))
         following = phi @ x + gamma @ u + xi[:, 0]
         # A sampled controller takes the measurements at the end of the step, a continuous one during it.
         x = following if is_sampled else x
         for j in range(2):
-            own.set(f"p_{j + 1}", x[j])
-        own.step(k * PERIOD, PERIOD)
+            controller.set(f"p_{j + 1}", x[j])
+        controller.step(k * PERIOD, PERIOD)
         x = following
     return np.array(rows)
 
@@ -102,24 +102,24 @@ def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
 def continuous(design, plant, disturbance, count):
     """The same for a continuous controller that holds its measurements during a step, by matrix exponentials."""
     names = ("A", "B", "C", "F_a", "K_x", "K_f", "K_i", "N_r", "H", "L_x", "L_f")
-    own = {key: np.array(value, float) for key, value in design.items() if key in names}
+    matrices = {key: np.array(value, float) for key, value in design.items() if key in names}
     n, q, t = 4, 1, 2
-    k = np.hstack([own["K_x"], own["K_f"], own["K_i"]])
+    k = np.hstack([matrices["K_x"], matrices["K_f"], matrices["K_i"]])
     dynamics = np.zeros((n + q + t, n + q + t))
-    dynamics[:n, : n + q] = np.hstack([own["A"] - own["L_x"] @ own["C"], own["F_a"]])
-    dynamics[n : n + q, :n] = -own["L_f"] @ own["C"]
-    dynamics[:n] += own["B"] @ k
+    dynamics[:n, : n + q] = np.hstack([matrices["A"] - matrices["L_x"] @ matrices["C"], matrices["F_a"]])
+    dynamics[n : n + q, :n] = -matrices["L_f"] @ matrices["C"]
+    dynamics[:n] += matrices["B"] @ k
     inputs = np.block([
-        [own["L_x"], own["B"] @ own["N_r"]],
-        [own["L_f"], np.zeros((q, t))],
-        [-own["H"], np.eye(t)],
+        [matrices["L_x"], matrices["B"] @ matrices["N_r"]],
+        [matrices["L_f"], np.zeros((q, t))],
+        [-matrices["H"], np.eye(t)],
     ])
     step, entry = held(dynamics, inputs, PERIOD)
     phi, gamma = held(plant[0], plant[1], PERIOD)
     _, xi = held(plant[0], disturbance[:, None], PERIOD)
     z, x, rows = np.zeros(n + q + t), np.zeros(n), []
     for _ in range(count):
-        u = k @ z + own["N_r"] @ STEP
+        u = k @ z + matrices["N_r"] @ STEP
         rows.append(np.concatenate([x, u, z[-t:]]))
         z = step @ z + entry @ np.concatenate([C @ x, STEP])
         x = phi @ x + gamma @ u + xi[:, 0]
@@ -149,14 +149,14 @@ CASES = {
 def test_the_fmu_is_the_simulation_and_settles_without_error(carts, name, tmp_path):
     kind, design, _, fmu = carts
     plant, disturbance = CASES[name]
-    found = run(fmu, tmp_path, plant, disturbance, kind != "continuous")
+    rows = run(fmu, tmp_path, plant, disturbance, kind != "continuous")
     oracle = continuous if kind == "continuous" else sampled
-    expected = oracle(design, plant, disturbance, len(found))
+    expected = oracle(design, plant, disturbance, len(rows))
     assert np.abs(expected[:, 4:6]).max() > 0.1, "the commands act"
-    assert np.allclose(found, expected, atol=1e-8)
-    assert np.abs(found[-1, :2] - STEP).max() < 1e-5
+    assert np.allclose(rows, expected, atol=1e-8)
+    assert np.abs(rows[-1, :2] - STEP).max() < 1e-5
     if disturbance.any():
-        assert np.abs(found[-1, 6:]).max() > 1e-3, "the integrals hold the constant command"
+        assert np.abs(rows[-1, 6:]).max() > 1e-3, "the integrals hold the constant command"
 
 
 def test_references_leave_the_slowest_modes_at_rest_and_settle_faster(carts, tmp_path):
@@ -265,8 +265,8 @@ def test_one_p_proves_the_loops_of_all_members_with_their_integrals(family):
     for a, b in MEMBERS.values():
         a, b = (held(np.array(a, float), np.array(b, float), period)) if period else (np.array(a, float), np.array(b, float))
         extended = np.block([[a, np.zeros((2, 1))], [-(period or 1.0) * np.eye(1, 2), np.eye(1) if period else np.zeros((1, 1))]])
-        own = extended + np.vstack([b, [[0]]]) @ k
-        shifted = own * np.exp(period) if period else own + np.eye(3)
+        matrix = extended + np.vstack([b, [[0]]]) @ k
+        shifted = matrix * np.exp(period) if period else matrix + np.eye(3)
         assert decreases(feedback, shifted, period), "the decay rate 1/s of the region"
     for share in (0.0, 0.3, 1.0):
         mixed = [(1 - share) * np.array(MEMBERS["nominal"][k], float) + share * np.array(MEMBERS["loaded"][k]) for k in range(2)]
@@ -281,17 +281,17 @@ def test_one_p_proves_the_loops_of_all_members_with_their_integrals(family):
 def test_each_member_settles_on_its_reference(family, name, tmp_path):
     design, report, fmu = family
     assert member_loop(name, design).constant()[0, :2] == pytest.approx([1, 0], abs=1e-9)
-    (instability,) = [own["instability"] for own in report["family"]["members"] if own["name"] == name]
+    (instability,) = [member["instability"] for member in report["family"]["members"] if member["name"] == name]
     values = np.linalg.eigvals(member_loop(name, design).matrices()[0])
     assert instability == pytest.approx(abs(values).max() - 1 if "sample_time" in design else values.real.max(), rel=1e-5)
-    a, b = (np.array(own, float) for own in MEMBERS[name])
+    a, b = (np.array(matrix, float) for matrix in MEMBERS[name])
     phi, gamma = held(a, b, 0.02)
-    own = Stepped(fmu, tmp_path, [("p", 2.0), ("r_p", 2.5)])
+    controller = Stepped(fmu, tmp_path, [("p", 2.0), ("r_p", 2.5)])
     x = np.array([2.0, 0.0])
     for k in range(1000):
-        x = phi @ x + gamma[:, 0] * (own.get("u") + 0.1)
-        own.set("p", x[0])
-        own.step(k * 0.02, 0.02)
+        x = phi @ x + gamma[:, 0] * (controller.get("u") + 0.1)
+        controller.set("p", x[0])
+        controller.step(k * 0.02, 0.02)
     assert x[0] == pytest.approx(2.5, abs=1e-6)
 
 

@@ -93,14 +93,14 @@ def designed(request, aso_ftc, tmp_path_factory):
 
 
 def test_the_peaks_of_s_are_those_of_the_transfer_functions(designed):
-    kind, own = designed
-    points = own.points()
+    kind, loop = designed
+    points = loop.points()
     frequencies = np.geomspace(0.05, 300, 6000)
     peaks = {"input": 0.0, "output": 0.0}
     for w in frequencies:
-        s = 1j * w if kind == "continuous" else np.exp(1j * w * own.design["sample_time"])
-        g, fed = own.plant(s, A, B, C, D, kind)
-        k = own.controller(s, fed, kind)
+        s = 1j * w if kind == "continuous" else np.exp(1j * w * loop.design["sample_time"])
+        g, fed = loop.plant(s, A, B, C, D, kind)
+        k = loop.controller(s, fed, kind)
         for name, product in [("input", k @ g), ("output", g @ k)]:
             s_norm = np.linalg.norm(np.linalg.inv(np.eye(len(product)) - product), 2)
             peaks[name] = max(peaks[name], s_norm)
@@ -110,21 +110,21 @@ def test_the_peaks_of_s_are_those_of_the_transfer_functions(designed):
 
 def test_the_sensitivity_to_an_entry_of_d_is_that_of_another_plant(designed):
     """The effect of D on the peak at the commands, against the peak of a plant with another D and the same controller."""
-    kind, own = designed
-    at = own.points()["input"]["s_frequency"]
-    s = 1j * at if kind == "continuous" else np.exp(1j * at * own.design["sample_time"])
-    k = own.controller(s, D if kind == "continuous" else D / s, kind)
+    kind, loop = designed
+    at = loop.points()["input"]["s_frequency"]
+    s = 1j * at if kind == "continuous" else np.exp(1j * at * loop.design["sample_time"])
+    k = loop.controller(s, D if kind == "continuous" else D / s, kind)
 
     def peak(factor):
-        g, _ = own.plant(s, A, B, C, D * factor, kind)
+        g, _ = loop.plant(s, A, B, C, D * factor, kind)
         return np.linalg.norm(np.linalg.inv(np.eye(1) - k @ g), 2)
 
     expected = (peak(1 + 1e-5) - peak(1 - 1e-5)) / 2e-5
-    found = own.report["robustness"]["sensitivity"][0]
-    assert found["point"] == "input"
-    values = {matrix["name"]: np.array(matrix["values"]) for matrix in found["matrices"]}
+    sensitivity = loop.report["robustness"]["sensitivity"][0]
+    assert sensitivity["point"] == "input"
+    values = {matrix["name"]: np.array(matrix["values"]) for matrix in sensitivity["matrices"]}
     assert values["D"][1, 0] == pytest.approx(expected, rel=1e-3)
-    worst = {matrix["name"]: np.array(matrix["values"]) for matrix in own.report["robustness"]["tolerance"]["worst"]}
+    worst = {matrix["name"]: np.array(matrix["values"]) for matrix in loop.report["robustness"]["tolerance"]["worst"]}
     assert worst["D"][1, 0] / 2 in (pytest.approx(0.9), pytest.approx(1.1))
 
 
@@ -165,8 +165,8 @@ class Run:
 
 
 def test_the_fault_is_estimated_and_cancelled_through_the_feedthrough(designed):
-    kind, own = designed
-    run = Run(own.fmu, 0.0005 if kind == "continuous" else 0.01)
+    kind, loop = designed
+    run = Run(loop.fmu, 0.0005 if kind == "continuous" else 0.01)
     x, estimate = run.run(16.0, 0.7)
     assert estimate[0] == pytest.approx(0.7, rel=1e-3)
     assert abs(x).max() < 1e-4
@@ -175,23 +175,23 @@ def test_the_fault_is_estimated_and_cancelled_through_the_feedthrough(designed):
 def test_a_sampled_controller_follows_its_equations_with_limits(aso_ftc, tmp_path):
     """Fifty samples of measurements without a pattern; the commands reach their limits."""
     text = SAMPLED.replace('["force"]', '[{ name = "force", limits = [-0.4, 0.5], operating = 0.1 }]')
-    own = Designed(aso_ftc, tmp_path, text)
-    run = Run(own.fmu, 0.01)
-    n = len(own.A)
+    controller = Designed(aso_ftc, tmp_path, text)
+    run = Run(controller.fmu, 0.01)
+    n = len(controller.A)
     x_hat, f_hat, y_f, u = np.zeros(n), np.zeros(1), np.zeros(2), np.zeros(1)
-    W = own.design["filter"]
+    W = controller.design["filter"]
     reached = set()
     for k in range(50):
         y = np.array([0.3 * np.sin(0.9 * k), 2.0 * np.cos(0.37 * k * k)])
         if k == 0:
             y = np.zeros(2)
-        given = y - D @ u
-        e = y_f - own.C @ x_hat
-        x, f = x_hat + own.L_x @ e, f_hat + own.L_f @ e
-        u = np.clip(own.K_x @ x + own.K_f @ f, -0.5, 0.4)
+        filter_input = y - D @ u
+        e = y_f - controller.C @ x_hat
+        x, f = x_hat + controller.L_x @ e, f_hat + controller.L_f @ e
+        u = np.clip(controller.K_x @ x + controller.K_f @ f, -0.5, 0.4)
         reached.update(np.round(u, 12).tolist())
-        x_hat, f_hat = own.A @ x + own.B @ u + own.F_a @ f, f
-        y_f = y_f + W * (given - y_f)
+        x_hat, f_hat = controller.A @ x + controller.B @ u + controller.F_a @ f, f
+        y_f = y_f + W * (filter_input - y_f)
         run.slave.setReal([run.names["position"], run.names["acceleration"]], list(y))
         run.slave.doStep(k * 0.01, 0.01)
         assert run.get("force")[0] == pytest.approx(u[0] + 0.1, abs=1e-11), k
@@ -211,15 +211,15 @@ def test_an_fmu_with_feedthrough_gives_the_design_of_its_matrices(aso_ftc, tmp_p
         'robustness.parameters = { "D[1,1]" = 0.2 }\noperating_point = { "D[1,1]" = 0.5 }\n'
     )
     of_matrices = f"A = [[0, 1], [-1, 0]]\nB = [[0], [1]]\nC = [[1, 0]]\nD = [[0.5]]\n{controller}"
-    found = []
+    reports = []
     for name, text in [("fmu", of_fmu), ("matrices", of_matrices)]:
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
         done = aso_ftc("design", tmp_path / f"{name}.toml", "--out", tmp_path / f"{name}-design.toml", "--json")
         assert done.returncode in (0, 1), done.stderr
-        found.append(json.loads(done.stdout))
-    for one, other in zip(found[0]["gains"], found[1]["gains"], strict=True):
+        reports.append(json.loads(done.stdout))
+    for one, other in zip(reports[0]["gains"], reports[1]["gains"], strict=True):
         assert np.allclose(one["values"], other["values"], rtol=1e-6, atol=1e-9), one["name"]
-    [varied] = found[0]["robustness"]["tolerance"]["parameters"]
+    [varied] = reports[0]["robustness"]["tolerance"]["parameters"]
     assert varied["limits"] == pytest.approx([0.4, 0.6]) and varied["worst"] in varied["limits"]
 
 
@@ -232,9 +232,9 @@ def test_a_fault_in_the_acceleration_is_detected_with_the_stated_delay(aso_ftc, 
         )
         folder = tmp_path / kind
         folder.mkdir()
-        own = Designed(aso_ftc, folder, text)
-        run = Run(own.fmu, 0.01)
-        detection = own.report["detection"]
+        controller = Designed(aso_ftc, folder, text)
+        run = Run(controller.fmu, 0.01)
+        detection = controller.report["detection"]
         latest = detection["faults"][0]["delay_90"]
         generator = np.random.default_rng(5)
         deviation = 0.01 if kind == "sampled" else 0.01 / np.sqrt(0.01)

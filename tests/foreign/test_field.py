@@ -30,7 +30,7 @@ def field(python, root, packed, tmp_path):
         steps = ("--steps", "200", "--sink", sink, "--json", out)
         done = python(root / "scripts" / "reference" / "field", folder, *steps, *options, timeout=600)
         verdicts = json.loads(out.read_text())["fmus"] if out.exists() else {}
-        return done.returncode, done.stdout + done.stderr, {path.rsplit("/", 1)[-1]: own for path, own in verdicts.items()}
+        return done.returncode, done.stdout + done.stderr, {path.rsplit("/", 1)[-1]: entry for path, entry in verdicts.items()}
 
     return run
 
@@ -50,16 +50,16 @@ def faulty(root, tmp_path):
 
 
 def words(verdicts):
-    return {question: own["verdict"] for question, own in verdicts.items()}
+    return {question: entry["verdict"] for question, entry in verdicts.items()}
 
 
 def test_our_plant_gives_fmpys_values_alone_and_chained_and_keeps_settings(field, fmus):
     status, said, verdicts = field(fmus)
     assert status == 0, said
     assert list(verdicts) == ["Copy.fmu"], "of two copies the first"
-    found = words(verdicts["Copy.fmu"])
-    assert found.pop("values") in ("bits", "close"), verdicts
-    assert found == {"defaults": "ok", "chained": "same", "set": "kept", "check": "agrees"}, verdicts
+    answers = words(verdicts["Copy.fmu"])
+    assert answers.pop("values") in ("bits", "close"), verdicts
+    assert answers == {"defaults": "ok", "chained": "same", "set": "kept", "check": "agrees"}, verdicts
     for reason in ("1 without a readable description", "1 that are copies of another", "1 of FMI 3.0"):
         assert reason in said, said
 
@@ -85,8 +85,8 @@ def test_a_fault_of_the_command_is_reported_as_a_failure(field, fmus, faulty, be
     limit = ("--time-limit", "5") if "sleep" in before else ()
     status, said, verdicts = field(fmus, "--command", faulty(before, after), *limit)
     assert status == 1, said
-    found = words(verdicts["Copy.fmu"])
-    assert {question: found[question] for question in expected} == expected, verdicts
+    answers = words(verdicts["Copy.fmu"])
+    assert {question: answers[question] for question in expected} == expected, verdicts
     short = [line for line in said.splitlines() if "Copy.fmu: " in line]
     assert {line.split(":")[0] for line in short} == set(expected), said
 

@@ -93,9 +93,9 @@ def test_the_terminal_is_valid_and_has_all_inputs_and_outputs(archives, model):
     with zipfile.ZipFile(path) as archive:
         file = etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
     etree.XMLSchema(etree.parse(schema)).assertValid(file)
-    members = {own.get("variableName") for own in file.iter("TerminalMemberVariable")}
+    members = {member.get("variableName") for member in file.iter("TerminalMemberVariable")}
     variables = fmpy.read_model_description(str(path)).modelVariables
-    assert members == {own.name for own in variables if own.causality in ("input", "output")}
+    assert members == {variable.name for variable in variables if variable.causality in ("input", "output")}
 
 
 def test_the_library_defines_every_function_of_the_header(archives):
@@ -110,7 +110,7 @@ def test_the_library_defines_every_function_of_the_header(archives):
 
 def test_matrices_of_the_controller_are_arrays(archives):
     description = fmpy.read_model_description(str(archives["AsoController"][1]))
-    extents = {own.name: [int(one.start) for one in own.dimensions] for own in description.modelVariables}
+    extents = {variable.name: [int(one.start) for one in variable.dimensions] for variable in description.modelVariables}
     assert extents["A"] == [4, 4] and extents["B"] == [4, 1] and extents["C"] == [2, 4]
     assert extents["x_hat[1]"] == []  # units differ
 

@@ -64,7 +64,7 @@ class CoSimulation:
 
     def reference(self, name):
         """The value reference of a variable."""
-        return next(own.valueReference for own in self.description.modelVariables if own.name == name)
+        return next(variable.valueReference for variable in self.description.modelVariables if variable.name == name)
 
 
 @pytest.fixture(params=MODELS)
@@ -81,7 +81,7 @@ def test_a_step_that_would_not_end_is_discarded_and_a_shorter_one_goes_on(instan
 
 
 def test_a_failed_instantiation_names_the_variable_although_logging_is_off(instance):
-    output = next(own for own in instance.description.modelVariables if own.causality == "output")
+    output = next(variable for variable in instance.description.modelVariables if variable.causality == "output")
     assert instance.instantiate([output.valueReference]) is None
     ((status, text),) = instance.messages
     assert status == ERROR and output.name in text and "intermediateUpdate" in text

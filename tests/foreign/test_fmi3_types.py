@@ -26,7 +26,7 @@ def test_fmpy_reads_the_start_value_of_every_type(fmu):
     assert validate_fmu(str(fmu)) == []
     messages = []
     result = fmpy.simulate_fmu(
-        str(fmu), stop_time=0.2, output_interval=0.1, output=list(OUTPUTS), logger=lambda *own: messages.append(own)
+        str(fmu), stop_time=0.2, output_interval=0.1, output=list(OUTPUTS), logger=lambda *message: messages.append(message)
     )
     assert messages == []
     assert {name: result[name][-1].item() for name in OUTPUTS} == OUTPUTS
@@ -34,21 +34,21 @@ def test_fmpy_reads_the_start_value_of_every_type(fmu):
 
 def test_values_that_fmpy_sets_come_back_exactly(fmu):
     description = fmpy.read_model_description(str(fmu))
-    references = {own.name: own.valueReference for own in description.modelVariables}
-    own = FMU3Slave(
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    instance = FMU3Slave(
         guid=description.guid, unzipDirectory=fmpy.extract(str(fmu)), modelIdentifier="Types", instanceName="types"
     )
-    own.instantiate()
-    own.enterInitializationMode()
-    own.setInt64([references["int64"]], [LONG])
-    own.setBinary([references["bytes"]], [b"\x00\x01\x02\x00"])
-    own.setUInt16([references["row"]], [7, 8, 9])
-    own.exitInitializationMode()
-    assert list(own.getInt64([references["int64_out"]])) == [LONG]
-    assert list(own.getBinary([references["bytes_out"]])) == [b"\x00\x01\x02\x00"]
-    assert list(own.getUInt16([references["row_out"]], 3)) == [7, 8, 9]
-    own.terminate()
-    own.freeInstance()
+    instance.instantiate()
+    instance.enterInitializationMode()
+    instance.setInt64([references["int64"]], [LONG])
+    instance.setBinary([references["bytes"]], [b"\x00\x01\x02\x00"])
+    instance.setUInt16([references["row"]], [7, 8, 9])
+    instance.exitInitializationMode()
+    assert list(instance.getInt64([references["int64_out"]])) == [LONG]
+    assert list(instance.getBinary([references["bytes_out"]])) == [b"\x00\x01\x02\x00"]
+    assert list(instance.getUInt16([references["row_out"]], 3)) == [7, 8, 9]
+    instance.terminate()
+    instance.freeInstance()
 
 
 def test_our_master_reads_what_fmpy_reads(fmu, aso_ftc, tmp_path):

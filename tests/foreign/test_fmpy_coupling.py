@@ -87,5 +87,5 @@ def test_fmpy_and_our_master_agree_in_final_state_and_residual(
     assert len(table["time"]) == round(float(scenario["stop"]) / float(scenario["step"])) + 1
     for name, value in mine["final"].items():
         assert table[name][-1] == pytest.approx(value, rel=1e-9, abs=0), name
-    found = [*mine["residual"].values(), mine["rms"][DIFFERENCE]]
-    assert residual(table, t_on) == pytest.approx(found, rel=1e-9, abs=0)
+    expected = [*mine["residual"].values(), mine["rms"][DIFFERENCE]]
+    assert residual(table, t_on) == pytest.approx(expected, rel=1e-9, abs=0)

@@ -53,19 +53,19 @@ def checked(path):
 
 def container(packed, unpacked, folder):
     """A container with both FMUs, connected, all inputs held over a step (Jacobi)."""
-    made = FMUContainer("loop", packed["plant"].parent)
+    loop = FMUContainer("loop", packed["plant"].parent)
     name_of = {role: path.name for role, path in packed.items()}
     for role, file_name in name_of.items():
-        made.get_fmu(file_name)
+        loop.get_fmu(file_name)
         for name, value in SETTINGS[role].items():
-            made.add_start_value(file_name, name, str(value).lower())
+            loop.add_start_value(file_name, name, str(value).lower())
         for name in real_outputs(unpacked[role].description):
-            made.add_output(file_name, name, f"{role}.{name}")
+            loop.add_output(file_name, name, f"{role}.{name}")
     for source, output, sink, name in LINKS:
-        made.add_link(name_of[source], output, name_of[sink], name)
-    made.add_implicit_rule(auto_input=True, auto_output=False, auto_link=False)
+        loop.add_link(name_of[source], output, name_of[sink], name)
+    loop.add_implicit_rule(auto_input=True, auto_output=False, auto_link=False)
     path = folder / "loop.fmu"
-    made.make_fmu(path, step_size=STEP)
+    loop.make_fmu(path, step_size=STEP)
     return path
 
 
@@ -76,9 +76,9 @@ def test_the_checkers_of_the_toolbox_find_nothing(packed, role, complaints):
 
 
 def test_the_toolbox_lists_every_variable_as_described(packed, unpacked, complaints):
-    made = FMUContainer("loop", packed["plant"].parent)
+    loop = FMUContainer("loop", packed["plant"].parent)
     for role, fmu in unpacked.items():
-        embedded = made.get_fmu(packed[role].name)
+        embedded = loop.get_fmu(packed[role].name)
         listed = {
             port.name: (port.vr, port.type_name, port.causality, port.variability, port.start_value)
             for port in embedded.ports.values()

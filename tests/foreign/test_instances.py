@@ -46,8 +46,8 @@ def test_loading_running_and_unloading_an_fmu_of_fmi_3_leaks_nothing(aso_ftc, ro
     description = fmpy.read_model_description(str(archive))
     unpacked = Path(fmpy.extract(str(archive), tmp_path / "unpacked"))
     (library,) = unpacked.glob("binaries/*/*")
-    floats = [own for own in description.modelVariables if own.type == "Float64" and not own.dimensions]
-    references = [own.valueReference for own in floats if own.causality == "output"][:2]
+    floats = [variable for variable in description.modelVariables if variable.type == "Float64" and not variable.dimensions]
+    references = [variable.valueReference for variable in floats if variable.causality == "output"][:2]
     host = compiled(tmp_path, "host3")
     resources = f"{unpacked / 'resources'}/"
     expect_nothing_left(host, library, description.guid, resources, ROUNDS, THREADS, *references)

@@ -106,11 +106,11 @@ def by_filterpy(method, path, commands, measured, every=1):
     initial = np.array([0.4, 0.2, 0.3, 0.0, 0.0])
     output = np.eye(3, 5)
     if method == "extended":
-        own = ExtendedKalmanFilter(5, 3)
+        estimator = ExtendedKalmanFilter(5, 3)
     else:
         points = MerweScaledSigmaPoints(5, alpha=1.0, beta=0.0, kappa=0.0)
-        own = UnscentedKalmanFilter(5, 3, T, lambda z: z[:3], levels_of, points)
-    own.x, own.P, own.Q, own.R = initial, p, w, v
+        estimator = UnscentedKalmanFilter(5, 3, T, lambda z: z[:3], levels_of, points)
+    estimator.x, estimator.P, estimator.Q, estimator.R = initial, p, w, v
     results = []
     for k, y in enumerate(measured):
         if method == "extended":
@@ -119,20 +119,20 @@ def by_filterpy(method, path, commands, measured, every=1):
                 def advance(z, u=commands[k - 1]):
                     return levels_of(z, u, T)
 
-                own.F = jacobian(advance, own.x)
-                own.predict_x = lambda u, advance=advance: setattr(own, "x", advance(own.x))
-                own.predict()
+                estimator.F = jacobian(advance, estimator.x)
+                estimator.predict_x = lambda u, advance=advance: setattr(estimator, "x", advance(estimator.x))
+                estimator.predict()
             due = slice(None) if k % every == 0 else slice(2)
-            own.update(y[due], lambda _, due=due: output[due], lambda z, due=due: z[:3][due], R=v[due, due])
+            estimator.update(y[due], lambda _, due=due: output[due], lambda z, due=due: z[:3][due], R=v[due, due])
         else:
             if k > 0:
-                own.predict(fx=lambda z, time, u=commands[k - 1]: levels_of(z, u, time))
+                estimator.predict(fx=lambda z, time, u=commands[k - 1]: levels_of(z, u, time))
             # Anew for the predicted estimate, so that they contain the process noise.
-            own.sigmas_f = points.sigma_points(own.x, own.P)
+            estimator.sigmas_f = points.sigma_points(estimator.x, estimator.P)
             due = slice(None) if k % every == 0 else slice(2)
-            own.update(y[due], R=v[due, due], hx=lambda z, due=due: z[:3][due])
-        squared = own.y @ np.linalg.solve(own.S, own.y)
-        results.append(np.concatenate([own.x, np.sqrt(np.diag(own.P)), [squared]]))
+            estimator.update(y[due], R=v[due, due], hx=lambda z, due=due: z[:3][due])
+        squared = estimator.y @ np.linalg.solve(estimator.S, estimator.y)
+        results.append(np.concatenate([estimator.x, np.sqrt(np.diag(estimator.P)), [squared]]))
     return np.array(results)
 
 
@@ -178,10 +178,10 @@ def record():
 def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_path, record, method, every):
     """Also if one of the levels is measured at one of four samples only."""
     commands, measured = record
-    own = by_the_fmu(method, tanks, tmp_path, commands, measured, every=every)
+    estimates = by_the_fmu(method, tanks, tmp_path, commands, measured, every=every)
     theirs = by_filterpy(method, tanks, commands, measured, every=every)
     scale = np.abs(theirs).max(axis=0)
-    assert np.abs((own - theirs) / scale).max() < 1e-6
+    assert np.abs((estimates - theirs) / scale).max() < 1e-6
 
 
 def test_communication_steps_within_a_sample_change_nothing(tanks, tmp_path, record):
@@ -236,9 +236,9 @@ def test_for_a_linear_plant_the_estimates_are_those_of_the_designed_observer(att
     assert done.returncode == 0, done.stderr
     table = np.genfromtxt(path.parent / "results.csv", delimiter=",", names=True, dtype=None, encoding=None, deletechars="")
     for name in ("f_hat", *(f"x_hat[{k}]" for k in (1, 2))):
-        theirs, own = (table[f"{one}.{name}"].astype(float) for one in ("controller", "filter"))
+        theirs, estimates = (table[f"{one}.{name}"].astype(float) for one in ("controller", "filter"))
         assert np.abs(theirs).max() > 0
-        assert np.abs(own - theirs).max() < 1e-6 * np.abs(theirs).max(), name
+        assert np.abs(estimates - theirs).max() < 1e-6 * np.abs(theirs).max(), name
 
 
 def test_far_from_the_operating_point_the_filters_take_no_nonlinearity_for_a_fault(root, aso_ftc, packed_filter, python):

@@ -33,12 +33,12 @@ def designed(aso_ftc, tmp_path_factory):
     return json.loads(done.stdout), Matrices(design)
 
 
-def loop_at_the_measurements(own):
+def loop_at_the_measurements(design):
     """A, B, C of -T at the measurements, with the states of plant and controller."""
-    a, _, _, _ = closed_loop(own)
-    n, q = own.n, own.q
-    b = np.vstack([np.zeros((n, MEASUREMENTS)), own.L_x, own.L_f])
-    return a, b, np.hstack([own.C, np.zeros((MEASUREMENTS, n + q))])
+    a, _, _, _ = closed_loop(design)
+    n, q = design.n, design.q
+    b = np.vstack([np.zeros((n, MEASUREMENTS)), design.L_x, design.L_f])
+    return a, b, np.hstack([design.C, np.zeros((MEASUREMENTS, n + q))])
 
 
 def h_infinity(a, b, c, d, start):
@@ -58,18 +58,18 @@ def h_infinity(a, b, c, d, start):
 
 
 def test_the_gains_are_those_of_scipys_riccati_equations(designed):
-    _, own = designed
+    _, design = designed
     a, b, c = large_plants.chain(STATES, commands=COMMANDS, measurements=MEASUREMENTS)
     p = solve_continuous_are(a, b, np.eye(STATES), np.eye(COMMANDS))
-    assert np.abs(own.K_x + b.T @ p).max() < 1e-9 * np.abs(p).max()
-    a_0, c_0, gain = own.augmented
+    assert np.abs(design.K_x + b.T @ p).max() < 1e-9 * np.abs(p).max()
+    a_0, c_0, gain = design.augmented
     p = solve_continuous_are(a_0.T, c_0.T, np.eye(len(a_0)), 0.01 * np.eye(MEASUREMENTS))
     assert np.abs(gain - p @ c_0.T / 0.01).max() < 1e-8 * np.abs(gain).max()
 
 
 def test_the_eigenvalues_are_those_of_numpy(designed):
-    report, own = designed
-    for name, dynamics in (("feedback", own.fed_back), ("observer", own.error_dynamics)):
+    report, design = designed
+    for name, dynamics in (("feedback", design.fed_back), ("observer", design.error_dynamics)):
         stated = np.array([complex(*pair) for pair in report[name]["eigenvalues"]])
         distances = np.abs(stated[:, None] - np.linalg.eigvals(dynamics)[None, :])
         pairs = linear_sum_assignment(distances)
@@ -77,38 +77,38 @@ def test_the_eigenvalues_are_those_of_numpy(designed):
 
 
 def test_the_peaks_are_h_infinity_norms_and_noise_h2_norms(designed):
-    report, own = designed
-    a, b, c = loop_at_the_measurements(own)
-    (point,) = (own for own in report["robustness"]["points"] if own["point"] == "output")
+    report, design = designed
+    a, b, c = loop_at_the_measurements(design)
+    (point,) = (entry for entry in report["robustness"]["points"] if entry["point"] == "output")
     for name, system in (("s", (a, b, c, np.eye(MEASUREMENTS))), ("t", (a, b, c, 0 * np.eye(MEASUREMENTS)))):
         peak, distance = h_infinity(*system, point[f"{name}_frequency"])
         assert point[f"{name}_peak"] == pytest.approx(peak, rel=2e-4)
         assert distance > 1e-7, "a singular value is larger"
     covariance = solve_continuous_lyapunov(a, -b @ b.T)
-    commands = np.hstack([np.zeros((COMMANDS, STATES)), own.K_x, own.K_f])
+    commands = np.hstack([np.zeros((COMMANDS, STATES)), design.K_x, design.K_f])
     together = [number["value"] for number in report["robustness"]["noise_together"]]
     expected = np.sqrt(np.diag(commands @ covariance @ commands.T))
     assert together[:COMMANDS] == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_worst_case_and_the_longest_hold_are_on_the_limit(designed):
-    report, own = designed
+    report, design = designed
     robustness = report["robustness"]
     worst = robustness["tolerance"]
     values = {matrix["name"]: np.array(matrix["values"]) for matrix in worst["worst"]}
-    n, q = own.n, own.q
-    command, correction = np.hstack([own.K_x, own.K_f]), np.vstack([own.L_x, own.L_f])
-    a_0 = np.block([[own.A, 0 * own.F_a], [np.zeros((q, n + q))]])
-    b_0 = np.vstack([own.B, np.zeros((q, COMMANDS))])
-    f_0 = np.vstack([own.F_a, np.zeros((q, q))])
-    c_0 = np.hstack([own.C, np.zeros((MEASUREMENTS, q))])
+    n, q = design.n, design.q
+    command, correction = np.hstack([design.K_x, design.K_f]), np.vstack([design.L_x, design.L_f])
+    a_0 = np.block([[design.A, 0 * design.F_a], [np.zeros((q, n + q))]])
+    b_0 = np.vstack([design.B, np.zeros((q, COMMANDS))])
+    f_0 = np.vstack([design.F_a, np.zeros((q, q))])
+    c_0 = np.hstack([design.C, np.zeros((MEASUREMENTS, q))])
     controller = a_0 + b_0 @ command - correction @ c_0
     controller[:, n:] += f_0
 
     def dynamics(part):
         a, b, c = (
             nominal + part * (values[name] - nominal)
-            for name, nominal in (("A", own.A), ("B", own.B), ("C", own.C))
+            for name, nominal in (("A", design.A), ("B", design.B), ("C", design.C))
         )
         return np.block([[a, b @ command], [correction @ c, controller]])
 
@@ -128,8 +128,8 @@ def test_the_worst_case_and_the_longest_hold_are_on_the_limit(designed):
             whole = expm(h * np.block([[a, b], [np.zeros((b.shape[1], len(a) + b.shape[1]))]]))
             return whole[: len(a), : len(a)], whole[: len(a), len(a) :]
 
-        (a, b), (k, gain) = held(own.A, own.B), held(controller, correction)
-        return np.abs(np.linalg.eigvals(np.block([[a, b @ command], [gain @ own.C, k]]))).max()
+        (a, b), (k, gain) = held(design.A, design.B), held(controller, correction)
+        return np.abs(np.linalg.eigvals(np.block([[a, b @ command], [gain @ design.C, k]]))).max()
 
     assert radius(0.999 * hold) < 1 < radius(1.001 * hold)
 
@@ -144,9 +144,9 @@ def test_placement_with_50_states_reaches_the_required_eigenvalues_to_the_error_
     done = aso_ftc("design", tmp_path / "chain.toml", *options)
     assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
-    own = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+    design = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
     a, _, _ = large_plants.chain(STATES, seed=1)
-    for name, dynamics, left in (("feedback", own.fed_back, 0.2), ("observer", own.error_dynamics, 0.5)):
+    for name, dynamics, left in (("feedback", design.fed_back, 0.2), ("observer", design.error_dynamics, 0.5)):
         above = np.array(large_plants.shifted(a, left))
         required = np.concatenate([above, above.conj(), [-1.0, -1.2][: len(dynamics) - STATES]])
         if sample_time is not None:

@@ -49,18 +49,18 @@ def linearise(root):
 
 def test_a_cart_pendulum_of_pythonfmu_is_linearised_over_its_fmu_states(linearise, cart_pendulum):
     arguments = ["inputs=u", "outputs=x_p,theta", f"states={STATES}", "step=0.01", *UPRIGHT]
-    found = linearise(cart_pendulum, *arguments)
+    model = linearise(cart_pendulum, *arguments)
     a, b = linearised_pendulum()
     expected = np.hstack([a, b])
     size = abs(expected).max(axis=1, keepdims=True)
     # The expected values are themselves differences, with a step of 1e-6.
-    assert (abs(np.hstack([found["A"], found["B"]]) - expected) < 1e-8 * size).all(), found
-    assert found["relative_error"] < 1e-8
-    assert (np.array(found["C"]) == np.eye(4)[:2]).all()
-    assert abs(np.array(found["D"])).max() == 0
-    assert found["residual"] < 1e-6
-    assert found["x_0"] == dict.fromkeys(STATES.split(","), 0.0)
-    assert "over FMU states in co-simulation" in found["method"]
+    assert (abs(np.hstack([model["A"], model["B"]]) - expected) < 1e-8 * size).all(), model
+    assert model["relative_error"] < 1e-8
+    assert (np.array(model["C"]) == np.eye(4)[:2]).all()
+    assert abs(np.array(model["D"])).max() == 0
+    assert model["residual"] < 1e-6
+    assert model["x_0"] == dict.fromkeys(STATES.split(","), 0.0)
+    assert "over FMU states in co-simulation" in model["method"]
 
 
 def test_without_names_for_the_states_the_error_lists_candidates(linearise, cart_pendulum):

@@ -36,8 +36,8 @@ class Live:
         """The match of the next line that fits."""
         for line in self.process.stdout:
             self.said.append(line)
-            if found := re.search(pattern, line):
-                return found
+            if match := re.search(pattern, line):
+                return match
         raise AssertionError((self.said, self.process.stderr.read()))
 
     def ask(self, path, method="GET", body=None, root=None, **headers):
@@ -52,8 +52,8 @@ class Live:
 
     def do(self, path, body="", status=200):
         """The sentence that answers a request of the page."""
-        found, _, text = self.ask(path, "POST", body.encode(), Content_Type="application/toml")
-        assert found == status, text
+        code, _, text = self.ask(path, "POST", body.encode(), Content_Type="application/toml")
+        assert code == status, text
         return json.loads(text)["answer" if status < 400 else "error"]
 
     def state(self, query=""):
@@ -110,12 +110,12 @@ def test_a_watched_run_keeps_its_bits(aso_ftc, tmp_path):
         for name in ["", "page.css", "page.js", "plots.js", "facts"]:
             assert run.ask(name)[0] == 200
         run.do("continue")
-        seen = []
+        times = []
         while (state := run.state("show=2,3&rows=0"))["outcome"] is None:
-            seen = state["times"] or seen
+            times = state["times"] or times
         out = run.end()
     assert state["time"] == 40 and "reached in 40000 steps" in state["outcome"] and "to repeat it" not in out
-    assert seen == sorted(set(seen)) and not (tmp_path / "seen" / "live.toml").exists()
+    assert times == sorted(set(times)) and not (tmp_path / "seen" / "live.toml").exists()
     assert (tmp_path / "seen" / "results.csv").read_bytes() == (tmp_path / "free" / "results.csv").read_bytes()
 
 
@@ -151,7 +151,7 @@ def test_a_run_with_interventions_is_repeated_bit_for_bit(aso_ftc, tmp_path, alg
                 run.do("step")
                 steps += 1
             reached = run.until(lambda state: state["phase"] == "paused" and state["steps"] == steps)["time"]
-            text = re.sub(r"@(\S+)", lambda found: repr(reached + float(found[1])), fault)
+            text = re.sub(r"@(\S+)", lambda match: repr(reached + float(match[1])), fault)
             assert run.do("scenario", text).startswith("Accepted: it takes effect at t = ")
         assert len(run.until(lambda state: len(state["interventions"]) == 7)["interventions"]) == 7
         run.do("continue")
@@ -162,8 +162,8 @@ def test_a_run_with_interventions_is_repeated_bit_for_bit(aso_ftc, tmp_path, alg
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "live.toml").read_text(encoding="utf-8")
     assert tomllib.loads(text)["scenario"]["set"][0]["value"] == 15 and "# At t = 0 s, to take effect at t = " in text
-    own, again = ((tmp_path / f"{name}.{kind}").read_bytes() for name in ("results", "repeat"))
-    assert own == again
+    results, again = ((tmp_path / f"{name}.{kind}").read_bytes() for name in ("results", "repeat"))
+    assert results == again
 
 
 def test_a_paced_run_that_is_changed_while_it_goes_on_is_repeated_bit_for_bit(aso_ftc, tmp_path):
@@ -178,8 +178,8 @@ def test_a_paced_run_that_is_changed_while_it_goes_on_is_repeated_bit_for_bit(as
         run.end()
     text = (tmp_path / "live.toml").read_text(encoding="utf-8")
     (tmp_path / "live.toml").write_text(text.replace("stop-time = 100.0", "stop-time = 10.0"), encoding="utf-8")
-    own, again = repeated(tmp_path, aso_ftc)
-    assert again.startswith(own) and own.count(b"\n") > 200
+    results, again = repeated(tmp_path, aso_ftc)
+    assert again.startswith(results) and results.count(b"\n") > 200
 
 
 def test_every_kind_of_fault_is_repeated_bit_for_bit(aso_ftc, tmp_path):
@@ -202,8 +202,8 @@ def test_every_kind_of_fault_is_repeated_bit_for_bit(aso_ftc, tmp_path):
         assert len(run.until(lambda state: len(state["interventions"]) == 13)["interventions"]) == 13
         run.do("continue")
         run.end()
-    own, again = repeated(tmp_path, aso_ftc)
-    assert own == again and own.count(b"\n") == 202
+    results, again = repeated(tmp_path, aso_ftc)
+    assert results == again and results.count(b"\n") == 202
 
 
 def test_a_stopped_run_keeps_its_rows(aso_ftc, tmp_path):
@@ -215,8 +215,8 @@ def test_a_stopped_run_keeps_its_rows(aso_ftc, tmp_path):
         out = run.end()
     assert "the run was stopped in the live view at t = 0.005 s" in out and not run.errors
     assert "# The run was stopped at t = 0.005 s" in (tmp_path / "live.toml").read_text(encoding="utf-8")
-    own, again = repeated(tmp_path, aso_ftc)
-    assert own.count(b"\n") == 7 and again.startswith(own) and again.count(b"\n") == 3002
+    results, again = repeated(tmp_path, aso_ftc)
+    assert results.count(b"\n") == 7 and again.startswith(results) and again.count(b"\n") == 3002
 
 
 def test_a_checkpoint_of_a_stopped_run_has_its_interventions(aso_ftc, tmp_path):
@@ -231,9 +231,9 @@ def test_a_checkpoint_of_a_stopped_run_has_its_interventions(aso_ftc, tmp_path):
         run.do("stop")
         run.end()
     assert aso_ftc("run", "--resume", saved).returncode == 0
-    own, whole = repeated(tmp_path, aso_ftc)
+    results, whole = repeated(tmp_path, aso_ftc)
     (rest,) = tmp_path.glob("results-from-*.csv")
-    assert own + rest.read_bytes().split(b"\n", 1)[1] == whole
+    assert results + rest.read_bytes().split(b"\n", 1)[1] == whole
 
 
 def test_a_pause_is_no_lateness_of_a_paced_run(tmp_path):
@@ -345,8 +345,8 @@ def test_a_resumed_run_with_interventions_is_repeated_bit_for_bit_from_its_start
     assert (tmp_path / "live.toml").read_bytes() == first
     done = aso_ftc("run", file)
     assert done.returncode == 0, done.stderr
-    own, rest = (path.read_bytes() for path in (tmp_path / "results.csv", *tmp_path.glob("results-from-*.csv")))
-    assert own + rest.split(b"\n", 1)[1] == (tmp_path / "repeat.csv").read_bytes()
+    results, rest = (path.read_bytes() for path in (tmp_path / "results.csv", *tmp_path.glob("results-from-*.csv")))
+    assert results + rest.split(b"\n", 1)[1] == (tmp_path / "repeat.csv").read_bytes()
 
 
 def test_a_delay_is_refused_where_steps_vary(tmp_path):
@@ -359,12 +359,12 @@ def test_a_delay_is_refused_where_steps_vary(tmp_path):
 
 def test_a_resumed_run_that_is_watched_keeps_its_bits(aso_ftc, tmp_path):
     saved = stopped_after(25, tmp_path, [])
-    free, seen = tmp_path / "free.csv", tmp_path / "seen.csv"
+    free, watched = tmp_path / "free.csv", tmp_path / "seen.csv"
     options = ["--resume", saved, "--checkpoint", tmp_path / "other.state", "--results"]
     assert aso_ftc("run", *options, free).returncode == 0
-    with live(None, seen, start="--live", fmus=options) as run:
+    with live(None, watched, start="--live", fmus=options) as run:
         assert "to repeat it" not in run.end()
-    assert seen.read_bytes() == free.read_bytes() and seen.read_bytes().count(b"\n") > 400
+    assert watched.read_bytes() == free.read_bytes() and watched.read_bytes().count(b"\n") > 400
 
 
 def test_an_unknown_start_of_the_live_view_is_refused(aso_ftc):
@@ -393,11 +393,13 @@ def test_nobody_without_the_token_gets_anything(tmp_path):
 
 def test_other_sites_and_names_are_refused_also_with_the_token(tmp_path):
     with live(tmp_path) as run:
-        own = f"127.0.0.1:{run.port}"
+        address = f"127.0.0.1:{run.port}"
         hosts = ["evil.example", f"evil.example:{run.port}", "127.0.0.1", f"127.0.0.1:{run.port + 1}", f"[::1]:{run.port}"]
-        for host in [*hosts, f"{own}.evil.example", ""]:
+        for host in [*hosts, f"{address}.evil.example", ""]:
             assert run.ask("facts", Host=host)[0] == 403, host
-        for origin in ["null", "http://evil.example", f"https://{own}", f"http://{own}.evil.example", f"http://127.0.0.1:{run.port + 1}"]:
+        for origin in [
+            "null", "http://evil.example", f"https://{address}", f"http://{address}.evil.example", f"http://127.0.0.1:{run.port + 1}",
+        ]:
             assert run.ask("facts", Origin=origin)[0] == 403, origin
             assert run.ask("stop", "POST", b"", Origin=origin, Content_Type="application/toml")[0] == 403, origin
         assert run.ask("stop", "POST", b"", Sec_Fetch_Site="cross-site", Content_Type="application/toml")[0] == 403
@@ -608,8 +610,8 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         run.end()
     done = aso_ftc("run", tmp_path / "run" / "live.toml")
     assert done.returncode == 0, done.stderr
-    own, again = ((tmp_path / "run" / f"{name}.csv").read_bytes() for name in ("results", "repeat"))
-    assert again.startswith(own) and own.count(b"\n") > 500
+    results, again = ((tmp_path / "run" / f"{name}.csv").read_bytes() for name in ("results", "repeat"))
+    assert again.startswith(results) and results.count(b"\n") > 500
 
 
 class Tunnel:

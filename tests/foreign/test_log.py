@@ -101,8 +101,8 @@ def test_a_log_without_noise_gives_the_plant(identify, tmp_path, plant):
     file, done = identify(write(tmp_path / "log.csv", columns(*log(plant, point=3.0))))
     assert done.stderr == ""
     assert distance(matrices(file), plant) < 1e-5
-    found, expected = (np.sort_complex(np.linalg.eigvals(np.array(a, float))) for a in (file["A"], plant[0]))
-    np.testing.assert_allclose(found, expected, atol=2e-4)
+    eigenvalues, expected = (np.sort_complex(np.linalg.eigvals(np.array(a, float))) for a in (file["A"], plant[0]))
+    np.testing.assert_allclose(eigenvalues, expected, atol=2e-4)
     assert file["sample_time"] == PERIOD
     assert "simulated 100.0 %" in (tmp_path / "plant.toml").read_text(encoding="utf-8")
 
@@ -122,16 +122,18 @@ def test_positions_and_their_rates_are_the_states_of_a_mechanical_plant(identify
 
 def loop(plant, design):
     """A of the loop of the plant and the sampled controller of a design for another plant."""
-    (a, b), c, own = sampled(plant), plant[2], Matrices(design)
-    n, n_hat, q = len(a), own.n, own.q
+    (a, b), c, controller = sampled(plant), plant[2], Matrices(design)
+    n, n_hat, q = len(a), controller.n, controller.q
     x, x_hat, f_hat = np.split(np.eye(n + n_hat + q), [n, n + n_hat])
-    innovation = c @ x - own.C @ x_hat
-    present = own.current
-    command = own.K_x @ (x_hat + present * own.L_x @ innovation) + own.K_f @ (f_hat + present * own.L_f @ innovation)
-    x_now, f_now = x_hat + present * own.L_x @ innovation, f_hat + present * own.L_f @ innovation
+    innovation = c @ x - controller.C @ x_hat
+    present = controller.current
+    command = controller.K_x @ (x_hat + present * controller.L_x @ innovation) + controller.K_f @ (
+        f_hat + present * controller.L_f @ innovation
+    )
+    x_now, f_now = x_hat + present * controller.L_x @ innovation, f_hat + present * controller.L_f @ innovation
     rest = (1 - present) * innovation
-    estimate = own.A @ x_now + own.B @ command + own.F_a @ f_now + own.L_x @ rest
-    return np.vstack([a @ x + b @ command, estimate, own.A_f @ f_now + own.L_f @ rest])
+    estimate = controller.A @ x_now + controller.B @ command + controller.F_a @ f_now + controller.L_x @ rest
+    return np.vstack([a @ x + b @ command, estimate, controller.A_f @ f_now + controller.L_f @ rest])
 
 
 @pytest.mark.parametrize("plant, noise", [(SHAFT, 0.01), (TANKS, 0.02), (UNSTABLE, 0.01)], ids=["shaft", "tanks", "unstable"])

@@ -56,8 +56,8 @@ class Loop:
         self.indicators = np.ones(plant.indicators + controller.indicators)
         cut = lambda part: (self.states[part], self.slopes[part])
         self.plant = Side(plant, *cut(slice(4)), self.indicators[: plant.indicators])
-        own = self.indicators[plant.indicators :]
-        self.controller = Side(controller, *cut(slice(4, 9)), own)
+        indicators = self.indicators[plant.indicators :]
+        self.controller = Side(controller, *cut(slice(4, 9)), indicators)
         self.sides = (self.plant, self.controller)
         measured, command = (c_double * 2)(), (c_double * 1)()
         refer = lambda fmu, names, place: (fmu.references(*names), len(names), place)

@@ -46,25 +46,25 @@ def designed(aso_ftc, folder, text):
 
 
 def compensated(report):
-    (found,) = (own for own in report["losses"]["loops"] if own["name"] == "compensation on")
-    return found
+    (entry,) = (loop for loop in report["losses"]["loops"] if loop["name"] == "compensation on")
+    return entry
 
 
 def decrease(p, a, period):
     """The matrix that is negative definite if x'Px falls, in coordinates in which P is the identity."""
     root = cholesky(np.array(p))
-    own = root @ a @ np.linalg.inv(root)
-    return own + own.T if period is None else own.T @ own - np.eye(len(a))
+    dynamics = root @ a @ np.linalg.inv(root)
+    return dynamics + dynamics.T if period is None else dynamics.T @ dynamics - np.eye(len(a))
 
 
 @pytest.mark.parametrize("sampled", ["", "sample_time = 0.05\n"], ids=["continuous", "sampled"])
 def test_the_certificate_of_the_report_holds_for_every_loss_in_the_stated_range(aso_ftc, tmp_path, sampled):
-    own, report = designed(aso_ftc, tmp_path, sampled + PLANT.replace("UP_TO", "0.3"))
+    design, report = designed(aso_ftc, tmp_path, sampled + PLANT.replace("UP_TO", "0.3"))
     proof = compensated(report)["proof"]
     assert "reason" not in proof and report["losses"]["stated"] == [{"name": "u1", "unit": None, "value": 0.3}]
     for loss in np.linspace(0, 0.3, 7):
-        a = closed_loop(own, [loss, 0])[0]
-        assert np.linalg.eigvalsh(decrease(proof["p"], a, own.period)).max() < 0
+        a = closed_loop(design, [loss, 0])[0]
+        assert np.linalg.eigvalsh(decrease(proof["p"], a, design.period)).max() < 0
 
 
 @pytest.mark.parametrize("sampled", ["", "sample_time = 0.05\n"], ids=["continuous", "sampled"])
@@ -72,26 +72,26 @@ def test_losses_that_vary_keep_the_decay_rate_and_the_bounds_of_the_report(aso_f
     """Bang-bang losses and pushes, chosen greedily and at random, from rest."""
     text = (sampled + PLANT.replace("UP_TO", "0.3")).replace("C = [[1, 0]]", "C = [[1, 0], [0, 1]]")
     text = text.replace("[-6, -7, -8]", "[-6, -7, -8, -9]") + ANOTHER
-    own, report = designed(aso_ftc, tmp_path, text)
+    design, report = designed(aso_ftc, tmp_path, text)
     proof = compensated(report)["proof"]
-    step = own.period or 0.02
-    order = 2 * own.n + own.q
+    step = design.period or 0.02
+    order = 2 * design.n + design.q
     random = np.random.default_rng(1)
 
     def moved(loss, column):
-        a = closed_loop(own, [loss, 0])[0]
-        if own.period:
+        a = closed_loop(design, [loss, 0])[0]
+        if design.period:
             return a, column
         system = np.block([[a, column[:, None]], [np.zeros((1, order + 1))]])
         whole = expm(system * step)
         return whole[:order, :order], whole[:order, order]
 
-    inputs = {"lost part of u1 at the operating point": own.B[:, 0], "push": own.F_a[:, 1]}
+    inputs = {"lost part of u1 at the operating point": design.B[:, 0], "push": design.F_a[:, 1]}
     sizes = {"lost part of u1 at the operating point": 0.6, "push": 1.5}
     bounds = {(peak["disturbance"], peak["state"]): peak["largest"] for peak in proof["peaks"]}
     assert {name for name, _ in bounds} == set(inputs)
     for name, column in inputs.items():
-        column = np.concatenate([column * sizes[name], np.zeros(order - own.n)])
+        column = np.concatenate([column * sizes[name], np.zeros(order - design.n)])
         cases = [moved(loss, column) for loss in (0.0, 0.3)]
         for state, aim in itertools.product(range(2), ("greedy", "random")):
             x, largest = np.zeros(order), np.zeros(2)
@@ -113,10 +113,10 @@ def test_losses_that_vary_keep_the_decay_rate_and_the_bounds_of_the_report(aso_f
 
 
 def test_the_limits_of_the_report_are_those_of_eigenvalues(aso_ftc, tmp_path):
-    own, report = designed(aso_ftc, tmp_path, PLANT.replace("UP_TO", "0.3"))
-    found = compensated(report)
-    unstable = lambda loss: np.linalg.eigvals(closed_loop(own, [loss, 0])[0]).real.max() > 0
-    limit, certified = found["constant"][0], found["certified"][0]
+    design, report = designed(aso_ftc, tmp_path, PLANT.replace("UP_TO", "0.3"))
+    loop = compensated(report)
+    unstable = lambda loss: np.linalg.eigvals(closed_loop(design, [loss, 0])[0]).real.max() > 0
+    limit, certified = loop["constant"][0], loop["certified"][0]
     value, proven = limit["losses"][0]["value"], certified["losses"][0]["value"]
     assert 0.3 <= proven <= value <= 1
     if not limit["stable"]:
@@ -127,11 +127,11 @@ def test_a_stated_loss_that_destabilises_is_red_and_says_from_where_on(aso_ftc, 
     """One force against an unstable spring: the loop needs a part of it."""
     text = PLANT.replace("UP_TO", "0.95").replace("[0, 0.3], [1, 0.6]", "[0], [1]").replace(', "u2"', "")
     text = text.replace("R = [1, 1]", "R = [1]")
-    own, report = designed(aso_ftc, tmp_path, text)
-    found = compensated(report)
-    limit = found["constant"][0]["losses"][0]["value"]
-    assert limit < 0.95 and np.linalg.eigvals(closed_loop(own, [limit + 1e-6])[0]).real.max() > 0
-    assert report["verdict"]["level"] == "red" and "unstable" in found["proof"]["reason"]
+    design, report = designed(aso_ftc, tmp_path, text)
+    loop = compensated(report)
+    limit = loop["constant"][0]["losses"][0]["value"]
+    assert limit < 0.95 and np.linalg.eigvals(closed_loop(design, [limit + 1e-6])[0]).real.max() > 0
+    assert report["verdict"]["level"] == "red" and "unstable" in loop["proof"]["reason"]
     (reason,) = (one for one in report["verdict"]["reasons"] if "loop unstable, compensation on" in one)
     assert f"u1 {limit:.3f}"[:7] in reason and reason.endswith("(red)")
 
@@ -171,15 +171,15 @@ bound = 1.0
 @pytest.mark.parametrize("sampled", ["", "sample_time = 0.02\n"], ids=["continuous", "sampled"])
 def test_the_worst_sensor_fault_reaches_the_bounds_of_the_report_and_never_exceeds_them(aso_ftc, tmp_path, sampled):
     """The fault that has the sign of the impulse response, backwards, is the worst one: states, errors, estimates."""
-    own, report = designed(aso_ftc, tmp_path, sampled + SENSOR)
-    a, b, c, d = closed_loop(own)
-    step = own.period or 1e-3
-    if own.period is None:
+    design, report = designed(aso_ftc, tmp_path, sampled + SENSOR)
+    a, b, c, d = closed_loop(design)
+    step = design.period or 1e-3
+    if design.period is None:
         whole = expm(np.block([[a, b], [np.zeros((2, len(a) + 2))]]) * step)
         a, b = whole[: len(a), : len(a)], whole[: len(a), len(a) :]
     names = ["x1", "x2"] + ["filtered"] * 3 + ["error of x1", "error of x2"] + ["filtered"] * 3
     names += ["error of offset", "error of push"]
-    found = {bound["error"]: bound for bound in report["bounds"] if bound["fault"] == "offset"}
+    bounds = {bound["error"]: bound for bound in report["bounds"] if bound["fault"] == "offset"}
     count = int(8 / step)
     powers, x = [], b[:, 0]
     for _ in range(count):
@@ -195,7 +195,7 @@ def test_the_worst_sensor_fault_reaches_the_bounds_of_the_report_and_never_excee
         for value in worst:
             x = a @ x + b[:, 0] * value
         reached = c[row] @ x + 0.2 * abs(d[row, 0])
-        bound = 0.2 * found[name]["gain_of_fault"]
+        bound = 0.2 * bounds[name]["gain_of_fault"]
         assert reached <= bound * (1 + 1e-9), name
-        assert reached > (0.98 if own.period is None else 0.7) * bound, name
-        assert found[name]["largest"] <= bound * (1 + 1e-12), name
+        assert reached > (0.98 if design.period is None else 0.7) * bound, name
+        assert bounds[name]["largest"] <= bound * (1 + 1e-12), name

@@ -27,13 +27,13 @@ def airframe(aso_ftc, root, packed, tmp_path_factory):
 
 
 def test_the_points_of_the_missile_are_the_linearisations_of_its_equations(root):
-    own = tomllib.loads((root / PLANT).read_text(encoding="utf-8"))
-    assert tuple(point["at"] for point in own["schedule"]["points"]) == missile.MACH
-    operating = lambda name: [signal.get("operating", 0) for signal in own[name]]
-    for point in own["schedule"]["points"]:
+    plant = tomllib.loads((root / PLANT).read_text(encoding="utf-8"))
+    assert tuple(point["at"] for point in plant["schedule"]["points"]) == missile.MACH
+    operating = lambda name: [signal.get("operating", 0) for signal in plant[name]]
+    for point in plant["schedule"]["points"]:
         a, b, c, x, u, y = missile.linearised(point["at"])
         for name, matrix in (("A", a), ("B", b), ("C", c)):
-            stated = np.array(point.get(name, own[name]), float)
+            stated = np.array(point.get(name, plant[name]), float)
             assert stated == pytest.approx(matrix, rel=1e-8, abs=1e-6)
         for name, signals, values in (("x_op", "states", x), ("u_op", "actuators", [u]), ("y_op", "measurements", y)):
             assert point.get(name, operating(signals)) == pytest.approx(list(values), rel=1e-8, abs=1e-12)
@@ -48,24 +48,24 @@ def test_the_missile_flown_by_the_fmu_is_the_missile_flown_by_the_interpolated_e
     schedule, _, fmu = airframe
     mach = lambda t: 3.9 - 0.5 * t
     rest = lambda t: np.interp(mach(t), schedule.at, [point["r_op"][0] for point in schedule.points])
-    wanted = lambda t: rest(t) + (0 if t < 0.5 else 60 if t < 1.6 else -40)
+    reference = lambda t: rest(t) + (0 if t < 0.5 else 60 if t < 1.6 else -40)
     x_0, u_0 = missile.rest(mach(0))
     y_0 = missile.outputs(x_0, mach(0))
     z_0 = np.concatenate([x_0, [0.0, 0.0]])
-    start = {"eta": y_0[0], "rate": y_0[1], "r_eta": wanted(0), "mach": mach(0)}
-    own = Exchanged(fmu, start | {f"x_hat_0[{i + 1}]": value for i, value in enumerate(x_0)})
+    start = {"eta": y_0[0], "rate": y_0[1], "r_eta": reference(0), "mach": mach(0)}
+    model = Exchanged(fmu, start | {f"x_hat_0[{i + 1}]": value for i, value in enumerate(x_0)})
     size = len(x_0)
 
     def by_numpy(t, state):
         x, z = np.split(state, [size])
-        slope, u = schedule.equations(z, missile.outputs(x, mach(t)), np.array([wanted(t)]), mach(t))
+        slope, u = schedule.equations(z, missile.outputs(x, mach(t)), np.array([reference(t)]), mach(t))
         return np.concatenate([missile.derivatives(x, u[0], mach(t)), slope])
 
     def by_fmu(t, state):
         x, z = np.split(state, [size])
         y = missile.outputs(x, mach(t))
-        slope = own.at(t, z, {"eta": y[0], "rate": y[1], "r_eta": wanted(t), "mach": mach(t)})
-        return np.concatenate([missile.derivatives(x, own.instance.get("fin")[0], mach(t)), slope])
+        slope = model.at(t, z, {"eta": y[0], "rate": y[1], "r_eta": reference(t), "mach": mach(t)})
+        return np.concatenate([missile.derivatives(x, model.instance.get("fin")[0], mach(t)), slope])
 
     runs = []
     for right in (by_numpy, by_fmu):
@@ -74,7 +74,7 @@ def test_the_missile_flown_by_the_fmu_is_the_missile_flown_by_the_interpolated_e
             times = np.linspace(a, b, 101)
             if right is by_fmu:
                 right(a, state)
-                own.event(a)
+                model.event(a)
             done = solve_ivp(right, (a, b - 1e-12), state, t_eval=np.minimum(times, b - 1e-12), rtol=1e-9, atol=1e-11)
             state, rows = done.y[:, -1], [*rows, *done.y.T]
         runs.append(np.array(rows))
@@ -83,7 +83,7 @@ def test_the_missile_flown_by_the_fmu_is_the_missile_flown_by_the_interpolated_e
     # The command is within its limits, and the acceleration follows: at the end of each part within 2 m/s^2.
     for part, b in enumerate((0.5, 1.6, 3.0)):
         x = runs[1][101 * part + 100][:size]
-        assert missile.outputs(x, mach(b))[0] == pytest.approx(wanted(b - 1e-12), abs=2.0), part
+        assert missile.outputs(x, mach(b))[0] == pytest.approx(reference(b - 1e-12), abs=2.0), part
     assert abs(runs[1][:, 2]).max() < 0.5
 
 

@@ -66,8 +66,8 @@ def designed(aso_ftc, tmp_path):
         done = aso_ftc("design", plant, "--out", tmp_path / "design.toml", "--json", "--force")
         assert done.returncode in (0, 1), done.stderr
         report = json.loads(done.stdout)
-        own = Matrices(tomllib.loads((tmp_path / "design.toml").read_text()))
-        return np.vstack([own.L_x, -own.L_f]), report["observer"]["method"]
+        matrices = Matrices(tomllib.loads((tmp_path / "design.toml").read_text()))
+        return np.vstack([matrices.L_x, -matrices.L_f]), report["observer"]["method"]
 
     return design
 

@@ -130,10 +130,10 @@ def test_functions_and_groups_give_the_values_of_libcosim(
         rows = list(csv.DictReader(file))[1:]
     assert len(rows) == COUNT
     for (name, output, _), values in zip(places, expected, strict=True):
-        found = np.array([float(row[f"{name}.{output}"]) for row in rows])
+        samples = np.array([float(row[f"{name}.{output}"]) for row in rows])
         # The slower plant has new values only at the end of each of its own steps.
         each = round(second / STEP) if name == "second" else 1
-        at_ends = found[each - 1 :: each]
+        at_ends = samples[each - 1 :: each]
         # libcosim's times are whole nanoseconds, ours multiples of the step.
         limit = 1e-9 * np.abs(values).max()
         message = f"{name}.{output}"

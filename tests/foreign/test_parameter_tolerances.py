@@ -50,23 +50,23 @@ def designed(aso_ftc, tmp_path):
         done = aso_ftc("design", plant, *files)
         if done.returncode == 2:
             return done.stderr
-        own = Matrices(tomllib.loads((tmp_path / "design.toml").read_text()))
-        return done.returncode, json.loads(done.stdout), own, tomllib.loads((tmp_path / "worst.toml").read_text())
+        matrices = Matrices(tomllib.loads((tmp_path / "design.toml").read_text()))
+        return done.returncode, json.loads(done.stdout), matrices, tomllib.loads((tmp_path / "worst.toml").read_text())
 
     return design
 
 
-def instability(own, a, b):
+def instability(design, a, b):
     """The largest real part of the eigenvalues of the loop with another plant."""
-    loop = closed_loop(own)[0]
-    loop[: own.n] = np.hstack([a, np.zeros((own.n, own.n + own.q))]) + b @ commands(own)
+    loop = closed_loop(design)[0]
+    loop[: design.n] = np.hstack([a, np.zeros((design.n, design.n + design.q))]) + b @ commands(design)
     return np.linalg.eigvals(loop).real.max()
 
 
-def peak(own, a, b):
+def peak(design, a, b):
     """The peak of S of the loop with another plant; one command, one measurement."""
-    loop, n = closed_loop(own)[0], own.n
-    inner, entering, leaving = loop[n:, n:], loop[n:, [0]], commands(own)[:, n:]
+    loop, n = closed_loop(design)[0], design.n
+    inner, entering, leaving = loop[n:, n:], loop[n:, [0]], commands(design)[:, n:]
     points = 1j * np.linspace(20, 400, 40_001)
     through = (leaving @ np.linalg.solve(points[:, None, None] * np.eye(len(inner)) - inner, entering))[:, 0, 0]
     plant = b[1, 0] / (points * (points - a[1, 1]))
@@ -74,28 +74,28 @@ def peak(own, a, b):
 
 
 def test_random_cases_and_worst_case_are_those_of_the_equations(designed):
-    status, report, own, worst = designed(WIDE)
-    found = report["robustness"]["tolerance"]
+    status, report, design, worst = designed(WIDE)
+    tolerance = report["robustness"]["tolerance"]
     random = uniform(7)
     cases = [{name: value(name, 2 * next(random) - 1) for name in LIMITS} for _ in range(300)]
-    values = [instability(own, *servo(**case)) for case in cases]
+    values = [instability(design, *servo(**case)) for case in cases]
     stable = sum(value < 0 for value in values)
     assert 0 < stable < 300, "the test needs cases of both kinds"
-    assert found["stable"] == pytest.approx(stable / 300)
-    parameters = {one["name"]: one for one in found["parameters"]}
+    assert tolerance["stable"] == pytest.approx(stable / 300)
+    parameters = {one["name"]: one for one in tolerance["parameters"]}
     assert {name: one["limits"] for name, one in parameters.items()} == {
         name: pytest.approx(limits) for name, limits in LIMITS.items()
     }
     a, b = servo(**{name: one["worst"] for name, one in parameters.items()})
-    assert found["worst_instability"] == pytest.approx(instability(own, a, b), rel=1e-4)
+    assert tolerance["worst_instability"] == pytest.approx(instability(design, a, b), rel=1e-4)
     vertices = np.array(np.meshgrid(*LIMITS.values())).reshape(4, -1).T
-    assert found["worst_instability"] >= max(
-        instability(own, *servo(**dict(zip(LIMITS, vertex)))) for vertex in vertices
+    assert tolerance["worst_instability"] >= max(
+        instability(design, *servo(**dict(zip(LIMITS, vertex)))) for vertex in vertices
     ) * (1 - 1e-4)
     assert np.array(worst["A"]) == pytest.approx(a, rel=1e-5) and np.array(worst["B"]) == pytest.approx(b, rel=1e-5)
-    part = found["first_unstable"]
+    part = tolerance["first_unstable"]
     near = [
-        instability(own, *servo(**{
+        instability(design, *servo(**{
             name: NOMINAL[name] + scale * part * (one["worst"] - NOMINAL[name]) for name, one in parameters.items()
         }))
         for scale in (0.999, 1.001)
@@ -106,9 +106,9 @@ def test_random_cases_and_worst_case_are_those_of_the_equations(designed):
 
 
 def test_effects_of_parameters_are_the_changes_of_the_peak(designed):
-    _, report, own, _ = designed("parameters = { J = 0.01, k = 0.01, R = 0.01 }\n")
+    _, report, design, _ = designed("parameters = { J = 0.01, k = 0.01, R = 0.01 }\n")
     for one in report["robustness"]["tolerance"]["parameters"]:
-        low, high = (peak(own, *servo(**{one["name"]: limit})) for limit in one["limits"])
+        low, high = (peak(design, *servo(**{one["name"]: limit})) for limit in one["limits"])
         assert one["effects"] == pytest.approx([(high - low) / 2] * 2, rel=0.02)
 
 

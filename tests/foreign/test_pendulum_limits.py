@@ -10,16 +10,16 @@ import pendulum_limits
 @pytest.mark.parametrize("name", pendulum_limits.VARIANTS)
 def test_margins_noise_and_stability_with_other_masses_are_those_of_the_equations(packed, name):
     report, design = pendulum_limits.designed(pendulum_limits.VARIANTS[name])
-    own, found = pendulum_limits.figures(design, 1000), report["robustness"]
+    figures, robustness = pendulum_limits.figures(design, 1000), report["robustness"]
     # A grid of frequencies is below the peak.
-    assert own.peaks == pytest.approx([point["s_peak"] for point in found["points"]], rel=1e-2)
-    stated = np.array([one["value"] for one in found["noise_together"]])
-    assert 3.16e-7 * own.noise == pytest.approx(stated, rel=1e-6)
-    tolerance = found["tolerance"]
-    assert (tolerance["stable"], tolerance["cases"]) == (own.stable, 1000)
-    assert tolerance["worst_instability"] == pytest.approx(own.worst, rel=1e-6)
+    assert figures.peaks == pytest.approx([point["s_peak"] for point in robustness["points"]], rel=1e-2)
+    stated = np.array([one["value"] for one in robustness["noise_together"]])
+    assert 3.16e-7 * figures.noise == pytest.approx(stated, rel=1e-6)
+    tolerance = robustness["tolerance"]
+    assert (tolerance["stable"], tolerance["cases"]) == (figures.stable, 1000)
+    assert tolerance["worst_instability"] == pytest.approx(figures.worst, rel=1e-6)
     # It breaks with a pendulum that is lighter by a third to three quarters, not within 20 %.
-    assert own.stable == 1.0 and 0.25 * 0.535 < own.lightest < 0.68 * 0.535
+    assert figures.stable == 1.0 and 0.25 * 0.535 < figures.lightest < 0.68 * 0.535
 
 
 def test_the_papers_pendulum_is_the_plant_of_the_fmu(packed):

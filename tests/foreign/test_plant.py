@@ -226,10 +226,10 @@ def test_the_linearised_body_follows_the_matrix_exponential(plant):
     augmented = np.block([[A, B], [np.zeros((1, 5))]])
     state = np.array([1.1, -1.1, 0.2, 0.4])
     for end in (0.1, 1.5):
-        wanted = (expm(augmented * end) @ [*state, 13.0])[:4]
+        expected = (expm(augmented * end) @ [*state, 13.0])[:4]
         values = {**start_values(state), **FREE, "linearised": True}
         assert run(plant, end, end / 10, values, lambda _: (13.0,)) == pytest.approx(
-            wanted, rel=1e-7
+            expected, rel=1e-7
         )
     friction = {**start_values(state), "linearised": True, "u": 13.0}
     with Instance(plant) as instance:
@@ -257,7 +257,7 @@ def test_each_initial_output_depends_on_the_listed_variables_only(plant):
     }
     base = {"theta_0": 0.2, "omega_0": 0.4, "u": 3.0}
     sliding = {**base, "v_p_0": 0.2}
-    found = {name: set() for name in listed}
+    dependencies = {name: set() for name in listed}
     changeable = [v for v in order if v.causality in ("parameter", "input")]
     for point in (base, sliding):
         with Instance(plant) as instance:
@@ -271,5 +271,5 @@ def test_each_initial_output_depends_on_the_listed_variables_only(plant):
                 after = instance.enter({**point, variable.name: value}).get(*listed)
             for name, changed in zip(listed, after):
                 if changed != before[name]:
-                    found[name].add(variable.name)
-    assert found == listed
+                    dependencies[name].add(variable.name)
+    assert dependencies == listed

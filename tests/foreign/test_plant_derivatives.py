@@ -32,8 +32,8 @@ ALMOST_EXACT = 1e-13  # of a derivative, or of one where that is less
 def starts(point, linearised, parameters):
     """Start values at a point."""
     _, *state, u = point
-    given = {f"{name}_0": value for name, value in zip(STATES, state)}
-    return {**given, "u": u, "f_a": 1.5, "linearised": linearised, **parameters}
+    initial = {f"{name}_0": value for name, value in zip(STATES, state)}
+    return {**initial, "u": u, "f_a": 1.5, "linearised": linearised, **parameters}
 
 
 def values_of(instance):
@@ -52,10 +52,10 @@ def errors(instance, unknowns, knowns, start=False, rise=0.0):
     seed = np.random.default_rng(5).normal(size=len(knowns))
     for direction in [{name: 1.0} for name in knowns] + [dict(zip(knowns, seed))]:
         moved = {name: values[name] + 1j * STEP * part for name, part in direction.items()}
-        wanted = evaluated({**values, **moved}, regime, start)
-        for name, found in instance.directional(unknowns, direction).items():
-            expected = np.imag(wanted[name]) / STEP
-            yield abs(found - expected) / max(abs(expected), 1.0)
+        complex_values = evaluated({**values, **moved}, regime, start)
+        for name, derivative in instance.directional(unknowns, direction).items():
+            expected = np.imag(complex_values[name]) / STEP
+            yield abs(derivative - expected) / max(abs(expected), 1.0)
 
 
 def initial_unknowns(fmu):
@@ -110,8 +110,8 @@ def test_a_force_above_the_static_friction_does_not_change_the_friction_before_t
             instance.set({"u": u, "f_a": 0.0})
             assert instance.get("regime") == [0]
             assert instance.get("f_fric") == [pytest.approx(np.clip(u, -30, 30), rel=1e-12)]
-            found = instance.directional(["f_fric", "der(v_p)"], {"u": 1.0})
-            assert found == {"f_fric": slope, "der(v_p)": 0.0}
+            derivatives = instance.directional(["f_fric", "der(v_p)"], {"u": 1.0})
+            assert derivatives == {"f_fric": slope, "der(v_p)": 0.0}
 
 
 def test_variables_that_are_no_known_or_no_unknown_are_refused(plant):
@@ -131,7 +131,7 @@ def test_variables_that_are_no_known_or_no_unknown_are_refused(plant):
 
 def factors(plant):
     """Entries of the Jacobian by pair of names, for all parameters and regimes."""
-    found = {}
+    jacobian = {}
     for (point, linearised, parameters), jump in product(CASES, (0.0, 40.0)):
         with Instance(plant, kind=MODEL_EXCHANGE) as instance:
             at_a_point(instance, point, linearised, parameters)
@@ -139,8 +139,8 @@ def factors(plant):
             case = linearised, bool(parameters), point[0]
             for known in STATES + INPUTS:
                 for name, factor in instance.directional(unknowns_of(plant), {known: 1.0}).items():
-                    found.setdefault((name, known), {}).setdefault(case, set()).add(factor)
-    return found
+                    jacobian.setdefault((name, known), {}).setdefault(case, set()).add(factor)
+    return jacobian
 
 
 def kind_of(by_case):
@@ -159,8 +159,8 @@ def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their
         kinds = unknown.dependenciesKind or ["dependent"] * len(unknown.dependencies)
         for known, kind in zip(unknown.dependencies, kinds, strict=True):
             listed[unknown.variable.name, known.name] = kind
-    found = {pair: kind_of(by_case) for pair, by_case in factors(plant).items()}
-    assert {pair: kind for pair, kind in found.items() if kind} == listed
+    dependencies = {pair: kind_of(by_case) for pair, by_case in factors(plant).items()}
+    assert {pair: kind for pair, kind in dependencies.items() if kind} == listed
 
 
 def test_values_change_with_the_listed_inputs_and_states_only(plant):
@@ -168,7 +168,7 @@ def test_values_change_with_the_listed_inputs_and_states_only(plant):
         unknown.variable.name: {known.name for known in unknown.dependencies}
         for unknown in plant.description.outputs + plant.description.derivatives
     }
-    found = {name: set() for name in listed}
+    dependencies = {name: set() for name in listed}
     for case in CASES:
         with Instance(plant, kind=MODEL_EXCHANGE) as instance:
             at_a_point(instance, *case)
@@ -179,7 +179,7 @@ def test_values_change_with_the_listed_inputs_and_states_only(plant):
                     instance.set({known: value + shift})
                     for name, old, new in zip(names, before, instance.get(*names)):
                         if new != old:
-                            found[name].add(known)
+                            dependencies[name].add(known)
                 instance.set({known: value})
             assert instance.get(*names) == before
-    assert found == listed
+    assert dependencies == listed

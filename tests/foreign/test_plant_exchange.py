@@ -90,7 +90,7 @@ def test_cvode_gives_the_results_of_scipy(plant, root, monkeypatch):
     monkeypatch.setattr(fmpy.sundials, "CVodeSolver", CvodeWithInput)
     lines = (root / "tests" / "data" / "plant_reference.csv").read_text().splitlines()
     rows = [line for line in lines if not line.startswith("#")]
-    wanted = np.array([[float(part) for part in row.split(",")] for row in rows[1:]])
+    reference = np.array([[float(part) for part in row.split(",")] for row in rows[1:]])
     assert rows[0].split(",") == ["t", *OUTPUTS, "regime"]
     nodes = np.arange(401) * 0.01
     signal = np.array(
@@ -98,9 +98,9 @@ def test_cvode_gives_the_results_of_scipy(plant, root, monkeypatch):
         dtype=[("time", float), ("u", float)],
     )
     result = integrated(plant, signal, 4.0, 0.01, {"x_p_0": 0.1, "theta_0": 1.0})[8::8]
-    assert result["time"] == pytest.approx(wanted[:, 0], abs=1e-9)
-    assert (apart(table(result), wanted[:, 1:6]) < FRACTION).all()
-    assert (result["regime"] == wanted[:, 6]).all()
+    assert result["time"] == pytest.approx(reference[:, 0], abs=1e-9)
+    assert (apart(table(result), reference[:, 1:6]) < FRACTION).all()
+    assert (result["regime"] == reference[:, 6]).all()
 
 
 def event(instance):
@@ -225,17 +225,17 @@ def test_a_restored_state_continues_with_the_same_bits(plant):
     with begun(plant, START) as one, Instance(plant, kind=MODEL_EXCHANGE) as other:
         follow(one, 0, 333)
         data = serialized(one)
-        wanted = follow(one, 333, 500)
-        assert {row[-1] for row in wanted} == {-1, 0, 1}
+        expected = follow(one, 333, 500)
+        assert {row[-1] for row in expected} == {-1, 0, 1}
         restore(one, data)
-        assert follow(one, 333, 500) == wanted
+        assert follow(one, 333, 500) == expected
         restore(other, data)
-        assert follow(other, 333, 500) == wanted
+        assert follow(other, 333, 500) == expected
 
 
 def test_after_a_reset_the_results_are_the_same(plant):
     with begun(plant, START) as instance:
-        wanted = follow(instance, 0, 500)
+        expected = follow(instance, 0, 500)
         instance.must("Reset")
         instance.start_exchange(START)
-        assert follow(instance, 0, 500) == wanted
+        assert follow(instance, 0, 500) == expected

@@ -213,8 +213,8 @@ def native(packed, unpacked, root):
     subprocess.run(["cc", "-std=c11", "-O2", "-o", program, source, "-ldl"], check=True)
     arguments = [str(STEPS)]
     for role, fmu in packed.items():
-        own = Path(unpacked[role].path)
-        arguments += words(fmu, own, own.parents[2], False)
+        library = Path(unpacked[role].path)
+        arguments += words(fmu, library, library.parents[2], False)
     return subprocess.run([program, *arguments], capture_output=True, text=True, check=True).stdout
 
 
@@ -341,8 +341,8 @@ def test_macos_finds_the_needed_libraries_in_each_part(fmus, role, platform):
     machines = {part.header.cpu_type.name: part for part in parts}
     assert set(machines) == ({"X86_64", "ARM64"} if platform == "darwin64" else {"ARM64"})
     for machine, part in machines.items():
-        own, *others = part.libraries
-        assert own.name == f"@rpath/{MODELS[role]}.dylib"
+        library, *others = part.libraries
+        assert library.name == f"@rpath/{MODELS[role]}.dylib"
         assert [other.name for other in others] == ["/usr/lib/libSystem.B.dylib"]
         least = part.version_min.version if part.has_version_min else part.build_version.minos
         assert least[:2] == ([11, 0] if machine == "ARM64" else [10, 12])
@@ -384,8 +384,8 @@ def test_checksums_and_bills_of_materials_match_the_fmus(fmus):
         assert bill["metadata"]["component"]["name"] == fmu.stem
         listed = {f"{part['name']}-{part.get('version')}" for part in bill["components"]}
         texts = zipfile.ZipFile(fmu).namelist()
-        own = [name.split("/") for name in texts if name.startswith("documentation/licenses/")]
-        packed = {parts[2] for parts in own if len(parts) > 3}
+        paths = [name.split("/") for name in texts if name.startswith("documentation/licenses/")]
+        packed = {parts[2] for parts in paths if len(parts) > 3}
         assert {name for name in packed if not name.startswith("rust-")} <= listed
 
 
@@ -433,8 +433,8 @@ def test_the_command_in_the_wheel_writes_the_results_file_of_linux(
 ):
     drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
     options = ["run", "--stop-time", "20", "--record-every", "0.01"]
-    own = [f"--{role}={drive}{wheel / 'fmus' / model}.fmu" for role, model in MODELS.items()]
-    done = wheel_command(*options, *own, f"--out={drive}{tmp_path / 'there'}")
+    arguments = [f"--{role}={drive}{wheel / 'fmus' / model}.fmu" for role, model in MODELS.items()]
+    done = wheel_command(*options, *arguments, f"--out={drive}{tmp_path / 'there'}")
     assert done.returncode == 0, done.stderr
     here = [f"--{role}={path}" for role, path in packed.items()]
     done = aso_ftc(*options, *here, f"--out={tmp_path / 'here'}")
@@ -453,12 +453,12 @@ def test_the_command_in_the_wheel_places_the_eigenvalues_of_the_plant_file(
     # The verdict on the paper's design is red.
     assert done.returncode == 1, done.stderr
     required = tomllib.loads(plant.read_text(encoding="utf-8"))
-    own = tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8"))
-    a, b, c, f, k, l_x, l_f = (np.array(own[name]) for name in ("A", "B", "C", "F_a", "K_x", "L_x", "L_f"))
-    found = np.sort(np.linalg.eigvals(a + b @ k))
-    assert np.allclose(found, np.sort(required["feedback"]["eigenvalues"]), rtol=1e-8)
+    design = tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8"))
+    a, b, c, f, k, l_x, l_f = (np.array(design[name]) for name in ("A", "B", "C", "F_a", "K_x", "L_x", "L_f"))
+    eigenvalues = np.sort(np.linalg.eigvals(a + b @ k))
+    assert np.allclose(eigenvalues, np.sort(required["feedback"]["eigenvalues"]), rtol=1e-8)
     augmented = np.block([[a, f], [np.zeros((1, 5))]]) - np.vstack([l_x, l_f]) @ np.hstack(
         [c, np.zeros((2, 1))]
     )
-    found = np.sort(np.linalg.eigvals(augmented))
-    assert np.allclose(found, np.sort(required["observer"]["eigenvalues"]), rtol=1e-8)
+    eigenvalues = np.sort(np.linalg.eigvals(augmented))
+    assert np.allclose(eigenvalues, np.sort(required["observer"]["eigenvalues"]), rtol=1e-8)

@@ -15,12 +15,12 @@ PLANTS = sorted((ROOT / "examples" / "plants").glob("*.toml"))
 def test_figures_of_a_report_are_those_of_its_gains_and_at_most_a_tenth_above_scipys(file, sampled):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # place_poles warns of slow convergence
-        report, own, scipy = published_plants.compared(file, sampled)
+        report, figures, scipy = published_plants.compared(file, sampled)
     peaks = [point["s_peak"] for point in report["robustness"]["points"]]
-    assert peaks == pytest.approx([own.input, own.output], rel=1e-3)
-    assert report["feedback"]["condition"] == pytest.approx(own.feedback, rel=1e-3)
-    assert report["observer"]["condition"] == pytest.approx(own.observer, rel=1e-3)
-    for name, value in vars(own).items():
+    assert peaks == pytest.approx([figures.input, figures.output], rel=1e-3)
+    assert report["feedback"]["condition"] == pytest.approx(figures.feedback, rel=1e-3)
+    assert report["observer"]["condition"] == pytest.approx(figures.observer, rel=1e-3)
+    for name, value in vars(figures).items():
         assert value <= 1.1 * getattr(scipy, name), name
 
 

@@ -20,9 +20,9 @@ SYSTEMS: dict[str, list] = {
 
 def overruns(text):
     """Late steps, steps, largest lateness in s (0 without one)."""
-    found = re.search(r"(\d+) of (\d+) steps ended late(?:, at most by (\S+) s, at t = \S+ s)?", text)
-    assert found, text
-    return int(found[1]), int(found[2]), float(found[3] or 0)
+    match = re.search(r"(\d+) of (\d+) steps ended late(?:, at most by (\S+) s, at t = \S+ s)?", text)
+    assert match, text
+    return int(match[1]), int(match[2]), float(match[3] or 0)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)

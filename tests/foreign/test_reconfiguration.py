@@ -35,9 +35,9 @@ def matrix(design, name):
 def test_three_thrusters_have_the_effect_of_four_with_the_least_effort(vehicle):
     design, report, _ = vehicle
     b, k_x = matrix(design, "B"), matrix(design, "K_x")
-    assert [own["gone"] for own in design["reconfigurations"]] == ["T1", "T2", "T3", "T4"]
-    for at, own in enumerate(design["reconfigurations"]):
-        gains = matrix(own, "K_x")
+    assert [entry["gone"] for entry in design["reconfigurations"]] == ["T1", "T2", "T3", "T4"]
+    for at, entry in enumerate(design["reconfigurations"]):
+        gains = matrix(entry, "K_x")
         assert abs(gains[at]).max() == 0 and abs(b @ gains - b @ k_x).max() < 1e-12
         # For a state, no other command of the three has the same effect with less effort.
         x = np.array([0.4, -0.2, 0.1, 0.05, 0.03, -0.02])
@@ -50,9 +50,9 @@ def test_three_thrusters_have_the_effect_of_four_with_the_least_effort(vehicle):
         )
         assert abs(np.delete(gains @ x, at) - solved.x).max() < 1e-6
         # At rest the three do what the fourth did.
-        found = report["reconfiguration"]["without"][at]["outcome"]
-        commands = np.array([command["value"] for command in found["commands"]])
-        assert commands[at] == 0 and abs(b @ (commands - 3)).max() < 1e-12 and found["kept"]
+        outcome = report["reconfiguration"]["without"][at]["outcome"]
+        commands = np.array([command["value"] for command in outcome["commands"]])
+        assert commands[at] == 0 and abs(b @ (commands - 3)).max() < 1e-12 and outcome["kept"]
     assert ("loss" in design["reconfigurations"][0]) and ("loss" not in design["reconfigurations"][2])
 
 
@@ -107,9 +107,9 @@ class Loop:
 
 @pytest.fixture
 def loop(vehicle, tmp_path):
-    found = Loop(vehicle, tmp_path)
-    yield found
-    found.close()
+    closed_loop = Loop(vehicle, tmp_path)
+    yield closed_loop
+    closed_loop.close()
 
 
 def without(at, stuck=0.0):
@@ -131,8 +131,8 @@ def test_without_a_thruster_the_vehicle_returns_to_its_position(loop, at):
     assert loop.number() == at + 1
     assert abs(loop.x).max() < 2e-4
     commands = loop.get("T1", "T2", "T3", "T4")
-    own = loop.design["reconfigurations"][at]
-    expected = 3 + matrix(own, "K_s") * -3.0
+    entry = loop.design["reconfigurations"][at]
+    expected = 3 + matrix(entry, "K_s") * -3.0
     expected[at] = 0.0
     assert abs(commands - expected).max() < 0.02
 
@@ -140,7 +140,7 @@ def test_without_a_thruster_the_vehicle_returns_to_its_position(loop, at):
 def test_the_run_is_that_of_the_reconfigured_equations(vehicle, loop):
     """From another state, observer and plant by scipy with the matrices of the design file."""
     design = loop.design
-    own = design["reconfigurations"][2]
+    entry = design["reconfigurations"][2]
     a, b, c, f_a = (matrix(design, name) for name in ("A", "B", "C", "F_a"))
     gain = np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
     loop.gone(3)
@@ -148,9 +148,9 @@ def test_the_run_is_that_of_the_reconfigured_equations(vehicle, loop):
     x, z, step = loop.x.copy(), np.zeros(8), loop.step
     u_3 = -3.0
     # z' = M z + N [y; u_3] with the feedback of the design file; y is held over a step.
-    feedback = np.hstack([matrix(own, "K_x"), matrix(own, "K_f")])
+    feedback = np.hstack([matrix(entry, "K_x"), matrix(entry, "K_f")])
     feedback[2] = 0.0
-    constant = matrix(own, "K_s") * u_3
+    constant = matrix(entry, "K_s") * u_3
     constant[2] = u_3
     m = np.block([[a, f_a], [np.zeros((2, 8))]]) + np.vstack([b @ feedback, np.zeros((2, 8))])
     m -= gain @ np.hstack([c, np.zeros((3, 2))])
@@ -216,17 +216,17 @@ def test_without_exact_allocation_the_feedback_is_designed_again_and_keeps_what_
     done = designed(aso_ftc, tmp_path, SMALL)
     report, design = json.loads(done.stdout), tomllib.loads((tmp_path / "design.toml").read_text())
     a, b = matrix(design, "A"), matrix(design, "B")
-    for at, own in enumerate(design["reconfigurations"]):
-        found = report["reconfiguration"]["without"][at]["outcome"]
-        k_x, k_s = matrix(own, "K_x"), matrix(own, "K_s")
-        assert found["residual"] > 1e-3 and "Designed again" in found["method"]
+    for at, entry in enumerate(design["reconfigurations"]):
+        outcome = report["reconfiguration"]["without"][at]["outcome"]
+        k_x, k_s = matrix(entry, "K_x"), matrix(entry, "K_s")
+        assert outcome["residual"] > 1e-3 and "Designed again" in outcome["method"]
         rest = b.copy()
         rest[:, at] = 0
         eigenvalues = np.sort(np.linalg.eigvals(a + rest @ k_x).real)
         assert eigenvalues == pytest.approx([-4, -3, -2], abs=1e-6)
         # At rest under the stuck command the third state is zero.
         x = np.linalg.solve(a + rest @ k_x, -(b[:, at] + rest @ k_s))
-        assert abs(x[2]) < 1e-10 and found["kept"]
+        assert abs(x[2]) < 1e-10 and outcome["kept"]
 
 
 def test_an_actuator_that_the_plant_needs_is_amber_with_the_mode_that_nothing_moves(aso_ftc, tmp_path):
@@ -235,7 +235,7 @@ def test_an_actuator_that_the_plant_needs_is_amber_with_the_mode_that_nothing_mo
     one, two = report["reconfiguration"]["without"]
     assert "cannot be stabilised" in two["outcome"]["reason"] and "x3" in two["outcome"]["reason"]
     assert any(reason.startswith("without u2 there is no controller") for reason in report["verdict"]["reasons"])
-    assert [own["gone"] for own in tomllib.loads((tmp_path / "design.toml").read_text()).get("reconfigurations", [])] in (
+    assert [entry["gone"] for entry in tomllib.loads((tmp_path / "design.toml").read_text()).get("reconfigurations", [])] in (
         [],
         ["u1"],
     )
@@ -284,8 +284,8 @@ actuators = ["u4"]
 """)
     assert done.returncode in (0, 1), done.stderr
     design = tomllib.loads((tmp_path / "design.toml").read_text())
-    own, l = design["reconfigurations"][0], np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
-    rest, f_a, k_f = np.hstack([b[:, :3], np.zeros((5, 1))]), matrix(design, "F_a"), matrix(own, "K_f")
+    entry, l = design["reconfigurations"][0], np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
+    rest, f_a, k_f = np.hstack([b[:, :3], np.zeros((5, 1))]), matrix(design, "F_a"), matrix(entry, "K_f")
 
     def value(k_x):
         g = np.block([[a + rest @ k_x, f_a + rest @ k_f], [np.zeros((1, 6))]]) - l @ np.hstack([c, np.zeros((4, 1))])
@@ -293,5 +293,5 @@ actuators = ["u4"]
 
     placed = [place_poles(a, b[:, :3], poles, method=method).gain_matrix for method in ("YT", "KNV0")]
     others = [value(np.vstack([-gain, np.zeros((1, 5))])) for gain in placed]
-    assert np.sort(np.linalg.eigvals(a + rest @ matrix(own, "K_x")).real) == pytest.approx(np.sort(poles), abs=1e-6)
-    assert value(matrix(own, "K_x")) < 1.01 * min(others)
+    assert np.sort(np.linalg.eigvals(a + rest @ matrix(entry, "K_x")).real) == pytest.approx(np.sort(poles), abs=1e-6)
+    assert value(matrix(entry, "K_x")) < 1.01 * min(others)

@@ -77,11 +77,11 @@ def case(request, aso_ftc, tmp_path_factory):
 
 def test_the_loop_is_stable_and_has_the_requested_eigenvalues(case):
     loop, design, report, _, _ = case
-    found = np.linalg.eigvals(loop.matrices()[0])
+    eigenvalues = np.linalg.eigvals(loop.matrices()[0])
     period = design.get("sample_time")
-    assert (abs(found) < 1 if period else found.real < 0).all()
-    for wanted in report["feedback"]["required"]:
-        assert np.abs(found - complex(*wanted)).min() < 1e-6
+    assert (abs(eigenvalues) < 1 if period else eigenvalues.real < 0).all()
+    for required in report["feedback"]["required"]:
+        assert np.abs(eigenvalues - complex(*required)).min() < 1e-6
     assert all(check["holds"] for check in report["checks"])
 
 
@@ -124,8 +124,8 @@ def test_the_report_has_the_responses_of_the_whole_loop(case):
             times = np.array(curve["times"])[some]
             states, commands = loop.step(which, size, times)
             command = name.removeprefix("command ")
-            found = states @ rows[name] if name in rows else commands[:, ["u1", "u2"].index(command)]
-            assert np.allclose(found, np.array(curve["values"])[some], atol=1e-7), name
+            expected = states @ rows[name] if name in rows else commands[:, ["u1", "u2"].index(command)]
+            assert np.allclose(expected, np.array(curve["values"])[some], atol=1e-7), name
 
 
 def test_rise_time_overshoot_settling_time_and_command_peaks_are_those_of_the_response(case):
@@ -140,11 +140,11 @@ def test_rise_time_overshoot_settling_time_and_command_peaks_are_those_of_the_re
         first = lambda level: times[np.argmax(share >= level)]
         assert abs(first(0.9) - first(0.1) - step["rise_time"]) < 0.05
         assert abs(max(share.max() - 1, 0) - step["overshoot"]) < 2e-3
-        for command, own in zip(commands.T, step["commands"]):
+        for command, entry in zip(commands.T, step["commands"]):
             scale = np.abs(command).max()
-            assert abs(min(command.min(), 0) - own["range"][0]) < 5e-3 * scale
-            assert abs(max(command.max(), 0) - own["range"][1]) < 5e-3 * scale
-            assert own["limits"] is None
+            assert abs(min(command.min(), 0) - entry["range"][0]) < 5e-3 * scale
+            assert abs(max(command.max(), 0) - entry["range"][1]) < 5e-3 * scale
+            assert entry["limits"] is None
         assert step["largest_step"] == [None, None]
 
 
@@ -172,18 +172,18 @@ def motor(request, aso_ftc, packed, tmp_path_factory):
 
 def follow(fmu, folder, start, count=400):
     """The motor under the FMU after a step of the reference by 1 rad: angles and commands."""
-    own = Stepped(fmu, folder, [("theta", 1.0), ("r_theta", 2.0), *start])
+    instance = Stepped(fmu, folder, [("theta", 1.0), ("r_theta", 2.0), *start])
     period = 0.05
     decay = np.exp(-period)
-    x, found = np.array([1.0, 0.0]), []
+    x, rows = np.array([1.0, 0.0]), []
     for k in range(count):
-        u = own.get("u")
-        found.append((x[0], u, own.get("x_i")))
+        u = instance.get("u")
+        rows.append((x[0], u, instance.get("x_i")))
         x = np.array([x[0] + (1 - decay) * x[1] + (period - 1 + decay) * u, decay * x[1] + (1 - decay) * u])
         # The sample at the end of the step takes the angle at that time.
-        own.set("theta", x[0])
-        own.step(k * period, period)
-    return np.array(found).T
+        instance.set("theta", x[0])
+        instance.step(k * period, period)
+    return np.array(rows).T
 
 
 @pytest.mark.parametrize("conditioned", [True, False])
@@ -191,10 +191,10 @@ def test_the_fmu_at_its_limits_is_the_recursion_and_back_calculation_prevents_wi
     design, report, fmu, _ = motor
     settings = () if conditioned else [("L_w[1,1]", 0.0)]
     angle, command, integral = follow(fmu, tmp_path, settings)
-    own = dict(design)
+    variant = dict(design)
     if not conditioned:
-        own["L_w"] = [[0.0]]
-    loop = TrackingLoop(([[0, 1], [0, -1]], [[0], [1]], [[1, 0]], [[0], [1]], [[0]]), own, limits=(-0.5, 0.5))
+        variant["L_w"] = [[0.0]]
+    loop = TrackingLoop(([[0, 1], [0, -1]], [[0], [1]], [[1, 0]], [[0], [1]], [[0]]), variant, limits=(-0.5, 0.5))
     state, angles, commands, integrals = np.zeros(loop.order), [], [], []
     for _ in angle:
         after, u = loop.evaluate(state, np.ones(1), np.zeros(1))
@@ -239,13 +239,13 @@ def tank(aso_ftc, packed, tmp_path_factory):
     folder = tmp_path_factory.mktemp("tank")
     text = (ROOT / "examples/three-tank/reference.toml").read_text(encoding="utf-8")
     text = text.replace("../../dist", str(ROOT / "dist"))
-    found = {}
+    controllers = {}
     for kind, change in [("current", ""), ("continuous", "sample_time = 1.0\n")]:
-        own = folder / kind
-        own.mkdir()
-        designed(aso_ftc, own, text.replace(change, ""), "--fmu", own / "Tank.fmu")
-        found[kind] = own / "Tank.fmu"
-    return plant, found
+        subfolder = folder / kind
+        subfolder.mkdir()
+        designed(aso_ftc, subfolder, text.replace(change, ""), "--fmu", subfolder / "Tank.fmu")
+        controllers[kind] = subfolder / "Tank.fmu"
+    return plant, controllers
 
 
 SYSTEM = """[fmus]
@@ -280,8 +280,8 @@ def test_the_tanks_reach_their_references_in_spite_of_a_fault(tank, kind, aso_ft
     plant, controllers = tank
     description = read_model_description(str(controllers[kind]))
     starts = {variable.name: variable.start for variable in description.modelVariables}
-    wanted = [float(starts["r_y_1"]) + 0.05, float(starts["r_y_2"]) + 0.03]
-    text = SYSTEM.format(plant=str(plant), controller=str(controllers[kind]), settings="", r_1=wanted[0], r_2=wanted[1])
+    targets = [float(starts["r_y_1"]) + 0.05, float(starts["r_y_2"]) + 0.03]
+    text = SYSTEM.format(plant=str(plant), controller=str(controllers[kind]), settings="", r_1=targets[0], r_2=targets[1])
     (tmp_path / "system.toml").write_text(text, encoding="utf-8")
     done = aso_ftc("run", tmp_path / "system.toml", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
@@ -289,7 +289,7 @@ def test_the_tanks_reach_their_references_in_spite_of_a_fault(tank, kind, aso_ft
     names = results.read_text(encoding="utf-8").split("\n", 1)[0].replace('"', "").split(",")
     table = dict(zip(names, np.loadtxt(results, delimiter=",", skiprows=1).T))
     time = table["time"]
-    for level, target in zip(("plant.h_1", "plant.h_2"), wanted):
+    for level, target in zip(("plant.h_1", "plant.h_2"), targets):
         before = table[level][time < 199]
         assert np.abs(before - before[0]).max() < 1e-9, "the operating point is held"
         for end in (1499.0, 3500.0):

@@ -97,45 +97,45 @@ def report(aso_ftc, *arguments):
 
 @pytest.mark.parametrize("name", ["own.csv", "own.parquet"])
 def test_statistics_are_those_of_numpy_for_files_of_pandas(aso_ftc, write, name):
-    own = frame()
-    page, _ = report(aso_ftc, write(name, own))
-    found, time = table(page, "statistics"), own["time"].to_numpy()
+    results = frame()
+    page, _ = report(aso_ftc, write(name, results))
+    statistics, time = table(page, "statistics"), results["time"].to_numpy()
     for variable in ["a", "b"]:
-        values = own[variable].to_numpy()
+        values = results[variable].to_numpy()
         low, high = values.argmin(), values.argmax()
         mean = np.trapezoid(values, time) / 4
         rms = np.sqrt(np.trapezoid(values**2, time) / 4)
         expected = [values[0], values[-1], values[low], time[low], values[high], time[high], mean, rms]
-        assert np.allclose(found[variable], expected, rtol=1e-12, atol=1e-12)
+        assert np.allclose(statistics[variable], expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("rows", [137, 5003])
 def test_the_difference_is_that_to_the_interpolated_other_run(aso_ftc, write, rows):
-    own, other = frame(), frame(rows, 0.25)
-    page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", other.drop(columns="b")))
-    there = np.interp(own["time"], other["time"], other["a"])
-    expected = own["a"] - there
+    results, other = frame(), frame(rows, 0.25)
+    page, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", other.drop(columns="b")))
+    there = np.interp(results["time"], other["time"], other["a"])
+    expected = results["a"] - there
     at = np.abs(expected).argmax()
-    scale = max(own["a"].max(), there.max()) - min(own["a"].min(), there.min())
-    found = table(page, "differences")
+    scale = max(results["a"].max(), there.max()) - min(results["a"].min(), there.min())
+    differences = table(page, "differences")
     assert np.allclose(
-        found["a"],
-        [np.abs(expected).max(), own["time"][at], np.sqrt(np.mean(expected**2)), np.abs(expected).max() / scale],
+        differences["a"],
+        [np.abs(expected).max(), results["time"][at], np.sqrt(np.mean(expected**2)), np.abs(expected).max() / scale],
         rtol=1e-9,
     )
-    assert "b" not in found and "Only in this run: b." in page.text_content()
+    assert "b" not in differences and "Only in this run: b." in page.text_content()
     assert "largest difference to" in said
     curve = curves(page)["a"]
-    assert (curve["time"] == own["time"]).all() and (curve["values"] == own["a"]).all()
+    assert (curve["time"] == results["time"]).all() and (curve["values"] == results["a"]).all()
     assert np.allclose(curve["other"], there, atol=1e-12)
 
 
 def test_equal_runs_have_no_difference_at_events_either(aso_ftc, write):
-    own = pd.DataFrame({"time": [0.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 5.0]})
-    page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", own))
+    results = pd.DataFrame({"time": [0.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 5.0]})
+    page, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", results))
     assert "no difference" in said and table(page, "differences")["x"][0] == 0
     curve = curves(page)["x"]
-    assert all((curve[name] == own[column]).all() for name, column in (("time", "time"), ("values", "x"), ("other", "x")))
+    assert all((curve[name] == results[column]).all() for name, column in (("time", "time"), ("values", "x"), ("other", "x")))
 
 
 def noise(count, width):
@@ -148,30 +148,30 @@ def noise(count, width):
 
 
 def test_a_page_has_all_rows_of_a_run_bit_by_bit(aso_ftc, write):
-    own = noise(10_001, 26)
-    page, _ = report(aso_ftc, write("own.csv", own))
-    found = curves(page)
-    for name in own.columns[1:]:
-        assert (found[name]["time"] == own["time"]).all() and (found[name]["values"] == own[name]).all()
+    results = noise(10_001, 26)
+    page, _ = report(aso_ftc, write("own.csv", results))
+    series = curves(page)
+    for name in results.columns[1:]:
+        assert (series[name]["time"] == results["time"]).all() and (series[name]["values"] == results[name]).all()
 
 
 def test_a_page_of_too_many_rows_has_whole_rows_with_every_peak(aso_ftc, write, tmp_path):
-    own = noise(300_000, 12)
-    page, _ = report(aso_ftc, write("own.parquet", own))
+    results = noise(300_000, 12)
+    page, _ = report(aso_ftc, write("own.parquet", results))
     assert (tmp_path / "own.html").stat().st_size < 22e6
     for name, curve in curves(page).items():
-        rows = np.searchsorted(own["time"], curve["time"])
-        assert (own["time"].to_numpy()[rows] == curve["time"]).all()
-        assert (own[name].to_numpy()[rows] == curve["values"]).all()
-        assert curve["values"].max() == own[name].max() and curve["values"].min() == own[name].min()
+        rows = np.searchsorted(results["time"], curve["time"])
+        assert (results["time"].to_numpy()[rows] == curve["time"]).all()
+        assert (results[name].to_numpy()[rows] == curve["values"]).all()
+        assert curve["values"].max() == results[name].max() and curve["values"].min() == results[name].min()
         assert (rows[0], rows[-1]) == (0, 299_999) and curve["total"] == 300_000 > rows.size
 
 
 def test_texts_and_values_that_are_not_finite_are_named(aso_ftc, write):
-    own = pd.DataFrame({"time": [0.0, 1.0, 2.0], "x": [1.0, np.nan, 3.0], "mode": ["a", "b", "c"]})
-    page, _ = report(aso_ftc, write("own.csv", own))
+    results = pd.DataFrame({"time": [0.0, 1.0, 2.0], "x": [1.0, np.nan, 3.0], "mode": ["a", "b", "c"]})
+    page, _ = report(aso_ftc, write("own.csv", results))
     assert "Texts are not shown: mode." in page.text_content()
-    np.testing.assert_array_equal(curves(page)["x"]["values"], own["x"])
+    np.testing.assert_array_equal(curves(page)["x"]["values"], results["x"])
 
 
 def rates():
@@ -181,18 +181,18 @@ def rates():
 
 
 def test_statistics_with_empty_cells_are_over_the_values_and_say_so(aso_ftc, write):
-    own = rates()
-    page, _ = report(aso_ftc, write("own.csv", own))
-    values = own["slow"].dropna().to_numpy()
+    results = rates()
+    page, _ = report(aso_ftc, write("own.csv", results))
+    values = results["slow"].dropna().to_numpy()
     assert table(page, "statistics")["slow"][-2:] == pytest.approx([values.mean(), np.sqrt((values**2).mean())])
     rows = page.xpath("//section[@aria-labelledby='statistics']//tbody/tr")
     assert [row.xpath("./td")[-1].text_content() for row in rows] == ["time, 6 s", "4 values in 7 rows"]
 
 
 def test_what_is_not_compared_is_named_on_the_terminal(aso_ftc, write):
-    own = rates().assign(here=1.0, mode=["a"] * 7)
+    results = rates().assign(here=1.0, mode=["a"] * 7)
     other = pd.DataFrame({"time": np.arange(2.0, 12.0), "fast": np.arange(2.0, 12.0), "there": 0.0})
-    page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", other))
+    page, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", other))
     lines = [line.removeprefix("not compared: ") for line in said.splitlines() if line.startswith("not compared: ")]
     assert [re.sub(r"\S*/", "", line) for line in lines] == [
         "2 rows of own.csv outside of the time of other.csv",
@@ -204,7 +204,7 @@ def test_what_is_not_compared_is_named_on_the_terminal(aso_ftc, write):
     assert "no difference to" in said and "in 5 rows of 1 variable\n" in said
     text = page.text_content()
     assert "Only in this run: slow, here." in text and "2 rows of this run outside of the time of" in text
-    page, said = report(aso_ftc, write("own.csv", own), "--against", write("own.csv", own))
+    page, said = report(aso_ftc, write("own.csv", results), "--against", write("own.csv", results))
     assert "not compared: texts: mode" in said and said.count("not compared") == 1
 
 
@@ -220,39 +220,39 @@ def test_times_that_decrease_are_an_error_with_the_line(aso_ftc, tmp_path):
 
 @pytest.mark.parametrize("compression", ["uncompressed", "snappy", "gzip", "brotli", "zstd", "lz4"])
 def test_parquet_files_of_polars_are_read(aso_ftc, tmp_path, compression):
-    own = frame()
-    polars.from_pandas(own.assign(large=np.uint32(4_000_000_000))).write_parquet(
+    results = frame()
+    polars.from_pandas(results.assign(large=np.uint32(4_000_000_000))).write_parquet(
         tmp_path / "own.parquet", compression=compression
     )
     page, _ = report(aso_ftc, tmp_path / "own.parquet")
-    found = curves(page)
-    assert all((found[name]["values"] == own[name]).all() for name in ("a", "b", "on"))
-    assert "large" not in found and unchanged(page) == {"large": 4e9}
+    series = curves(page)
+    assert all((series[name]["values"] == results[name]).all() for name in ("a", "b", "on"))
+    assert "large" not in series and unchanged(page) == {"large": 4e9}
 
 
 def test_csv_of_other_programs_is_read(aso_ftc, tmp_path):
     from fmpy.util import write_csv
 
-    own = frame(301)
-    expected = own["a"].to_numpy()
+    results = frame(301)
+    expected = results["a"].to_numpy()
 
     def check(name, values=expected):
         page, _ = report(aso_ftc, tmp_path / name)
         curve = curves(page)["a"]
-        assert (curve["values"] == values).all() and (curve["time"] == own["time"]).all(), name
+        assert (curve["values"] == values).all() and (curve["time"] == results["time"]).all(), name
 
-    write_csv(tmp_path / "fmpy.csv", own.to_records(index=False))
+    write_csv(tmp_path / "fmpy.csv", results.to_records(index=False))
     check("fmpy.csv")
-    own.to_csv(tmp_path / "german.csv", index=False, sep=";", decimal=",")
+    results.to_csv(tmp_path / "german.csv", index=False, sep=";", decimal=",")
     check("german.csv")
-    own.to_csv(tmp_path / "tabs.csv", index=False, sep="\t")
+    results.to_csv(tmp_path / "tabs.csv", index=False, sep="\t")
     check("tabs.csv")
-    own.to_csv(tmp_path / "utf16.csv", index=False, encoding="utf-16")
+    results.to_csv(tmp_path / "utf16.csv", index=False, encoding="utf-16")
     check("utf16.csv")
-    own.to_csv(tmp_path / "bom.csv", index=False, encoding="utf-8-sig")
+    results.to_csv(tmp_path / "bom.csv", index=False, encoding="utf-8-sig")
     check("bom.csv")
     # OpenModelica: names in quotation marks; some versions end each line with a comma.
-    lines = [",".join(f'"{name}"' for name in own.columns), *(",".join(map(repr, row)) for row in own.values.tolist())]
+    lines = [",".join(f'"{name}"' for name in results.columns), *(",".join(map(repr, row)) for row in results.values.tolist())]
     (tmp_path / "modelica.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     check("modelica.csv")
     (tmp_path / "closed.csv").write_text(",\n".join(lines) + ",\n", encoding="utf-8")
@@ -301,9 +301,9 @@ def test_mat_files_of_dymola_and_openmodelica_are_read(aso_ftc, tmp_path, kind):
     }
     scipy.savemat(tmp_path / "own.mat", content, format="4")
     page, _ = report(aso_ftc, tmp_path / "own.mat")
-    found, stored = curves(page), values.astype(kind)
-    assert (found["body.phi"]["time"] == time).all()
-    assert (found["body.phi"]["values"] == stored).all() and (found["minus.phi"]["values"] == -stored).all()
+    series, stored = curves(page), values.astype(kind)
+    assert (series["body.phi"]["time"] == time).all()
+    assert (series["body.phi"]["values"] == stored).all() and (series["minus.phi"]["values"] == -stored).all()
     assert unchanged(page) == {"gain": 7}
     assert [plot["unit"] for plot in data(page)["plots"]] == ["rad"]
     whole = (tmp_path / "own.mat").read_bytes()
@@ -319,14 +319,14 @@ def test_names_with_markup_remain_text(aso_ftc, write):
 
 
 def test_nothing_of_others_is_overwritten(aso_ftc, write, tmp_path):
-    own, page = write("own.csv", frame()), tmp_path / "own.html"
+    file, page = write("own.csv", frame()), tmp_path / "own.html"
     page.write_text("mine", encoding="utf-8")
-    done = aso_ftc("report", own)
+    done = aso_ftc("report", file)
     assert done.returncode == 2 and "--force" in done.stderr and page.read_text(encoding="utf-8") == "mine"
-    assert aso_ftc("report", own, "--force").returncode == 0 == aso_ftc("report", own).returncode
-    done = aso_ftc("report", own, "--out", own)
-    assert done.returncode == 2 and own.read_text(encoding="utf-8").startswith("time")
-    done = aso_ftc("report", own, "--against", write("apart.csv", pd.DataFrame({"time": [0.0], "z": [1.0]})))
+    assert aso_ftc("report", file, "--force").returncode == 0 == aso_ftc("report", file).returncode
+    done = aso_ftc("report", file, "--out", file)
+    assert done.returncode == 2 and file.read_text(encoding="utf-8").startswith("time")
+    done = aso_ftc("report", file, "--against", write("apart.csv", pd.DataFrame({"time": [0.0], "z": [1.0]})))
     assert done.returncode == 2 and "no variable in common" in done.stderr
 
 
@@ -343,12 +343,12 @@ def test_the_frames_of_a_bus_trace_are_counted_and_drawn_at_their_times(aso_ftc,
     trace = tmp_path / "trace.log"
     trace.write_text(TRACE, encoding="utf-8")
     page, _ = report(aso_ftc, write("own.csv", frame()), "--bus-trace", trace)
-    found = table(page, "frames")
-    assert set(found) == {"can0 100", "can0 00000101", "can1 100", "can0 error"}
+    frames = table(page, "frames")
+    assert set(frames) == {"can0 100", "can0 00000101", "can1 100", "can0 error"}
     times = np.array([0.001, 0.002, 0.005])
     gaps = 1e3 * np.diff(times)
-    assert found["can0 100"] == pytest.approx([3, times[0], times[-1], gaps.min(), gaps.mean(), gaps.max()])
-    assert found["can1 100"][:3] == [1, 0.005, 0.005] and np.isnan(found["can1 100"][3:]).all()
+    assert frames["can0 100"] == pytest.approx([3, times[0], times[-1], gaps.min(), gaps.mean(), gaps.max()])
+    assert frames["can1 100"][:3] == [1, 0.005, 0.005] and np.isnan(frames["can1 100"][3:]).all()
     curve = curves(page)["can0 100"]
     assert curve["dots"] and not curves(page)["a"]["dots"]
     rows = np.isfinite(curve["values"])
@@ -419,7 +419,7 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
             globalThis.range = () => [Number(id("from").value), Number(id("to").value)];
             globalThis.curves = () => document.querySelectorAll(".u-legend .u-series").length""")
         page.until("document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length")
-        found = page.evaluate("""(() => {
+        readings = page.evaluate("""(() => {
             const found = [range(), curves()];
             id("closer").click(); found.push(range());
             id("later").click(); found.push(range());
@@ -427,11 +427,11 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
             document.querySelector("input[value=difference]").click(); found.push(range());
             return found;
         })()""")
-        page.until(f"curves() === {found[1]} - 3")
+        page.until(f"curves() === {readings[1]} - 3")
         page.evaluate("id('all').click()")
-        found += [page.evaluate("curves()"), page.evaluate("range()")]
-    whole, both, closer, later, typed, kept, differences, end = found
-    assert (whole, closer, later, typed, kept, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
+        readings += [page.evaluate("curves()"), page.evaluate("range()")]
+    whole, both, closer, later, typed, compared, differences, end = readings
+    assert (whole, closer, later, typed, compared, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
     # Each plot has a line for the time, and one for each curve.
     assert both - differences == 3
 
@@ -469,11 +469,11 @@ def legend(page, figure):
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_the_values_at_the_cursor_are_those_of_the_row_at_the_stated_time(aso_ftc, write, tmp_path):
-    own = noise(10_001, 26)
-    own.loc[::3, "x3"] = np.nan
-    report(aso_ftc, write("own.csv", own))
+    results = noise(10_001, 26)
+    results.loc[::3, "x3"] = np.nan
+    report(aso_ftc, write("own.csv", results))
     assert (tmp_path / "own.html").stat().st_size < 4e6  # Noise; the paper's run has 1.6 MB.
-    times, names = own["time"].to_numpy(), set()
+    times, names = results["time"].to_numpy(), set()
     with browser(tmp_path / "profile") as page:
         page.open((tmp_path / "own.html").as_uri())
         page.until(DRAWN)
@@ -486,10 +486,10 @@ def test_the_values_at_the_cursor_are_those_of_the_row_at_the_stated_time(aso_ft
                     # The pointer and the end of the axis are on whole pixels.
                     width = page.evaluate(f"document.querySelectorAll('figure .u-over')[{figure}].clientWidth")
                     assert abs(time - times[at]) <= 2 * (high - low) / width + 1.01 * np.diff(times).max()
-                    row = own.iloc[np.flatnonzero(times == time)[0]]
+                    row = results.iloc[np.flatnonzero(times == time)[0]]
                     np.testing.assert_array_equal(list(values.values()), row[list(values)])
                     names |= set(values)
-        assert names == set(own.columns[1:]) and not page.complaints
+        assert names == set(results.columns[1:]) and not page.complaints
 
 
 def inked(page, colour):
@@ -512,9 +512,9 @@ def inked(page, colour):
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_a_peak_of_one_row_stays_as_narrow_as_it_is_in_every_zoom(aso_ftc, write, tmp_path):
-    own = pd.DataFrame({"time": np.arange(500_001) * 1e-3, "x": 0.0})
-    own.loc[250_000, "x"] = 1.0
-    report(aso_ftc, write("own.parquet", own))
+    results = pd.DataFrame({"time": np.arange(500_001) * 1e-3, "x": 0.0})
+    results.loc[250_000, "x"] = 1.0
+    report(aso_ftc, write("own.parquet", results))
     with browser(tmp_path / "profile") as page:
         page.open((tmp_path / "own.html").as_uri())
         page.until(DRAWN)
@@ -529,10 +529,10 @@ def test_a_peak_of_one_row_stays_as_narrow_as_it_is_in_every_zoom(aso_ftc, write
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_values_between_empty_cells_are_drawn_as_points_or_held(aso_ftc, write, tmp_path):
-    own = rates()
-    report(aso_ftc, write("own.csv", own))
+    results = rates()
+    report(aso_ftc, write("own.csv", results))
     polars.DataFrame(
-        {"time": own["time"].to_numpy(), "fast": own["fast"].to_numpy(), "slow": [10, None, 20, None, 30, None, 40]},
+        {"time": results["time"].to_numpy(), "fast": results["fast"].to_numpy(), "slow": [10, None, 20, None, 30, None, 40]},
         schema_overrides={"slow": polars.Int32},
     ).write_parquet(tmp_path / "held.parquet")
     report(aso_ftc, tmp_path / "held.parquet")
@@ -552,8 +552,8 @@ def test_values_between_empty_cells_are_drawn_as_points_or_held(aso_ftc, write, 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_the_keyboard_reaches_each_row_of_an_event(aso_ftc, write, tmp_path):
-    own = pd.DataFrame({"time": [0.0, 1.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 3.0, 5.0]})
-    report(aso_ftc, write("own.csv", own))
+    results = pd.DataFrame({"time": [0.0, 1.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 3.0, 5.0]})
+    report(aso_ftc, write("own.csv", results))
     with browser(tmp_path / "profile") as page:
         page.open((tmp_path / "own.html").as_uri())
         page.until(DRAWN)
@@ -565,13 +565,13 @@ def test_the_keyboard_reaches_each_row_of_an_event(aso_ftc, write, tmp_path):
             page.evaluate("new Promise((resume) => { requestAnimationFrame(resume); })")
             time, values = legend(page, 0)
             rows.append((time, values["x"]))
-        assert rows == list(own.iloc[1:].itertuples(index=False, name=None))
+        assert rows == list(results.iloc[1:].itertuples(index=False, name=None))
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_a_plot_without_all_rows_says_so_and_names_the_command_for_them(aso_ftc, write, tmp_path):
-    own = noise(300_000, 12)
-    report(aso_ftc, write("own.parquet", own))
+    results = noise(300_000, 12)
+    report(aso_ftc, write("own.parquet", results))
     with browser(tmp_path / "profile") as page:
         page.open((tmp_path / "own.html").as_uri())
         page.until(DRAWN)
@@ -579,14 +579,14 @@ def test_a_plot_without_all_rows_says_so_and_names_the_command_for_them(aso_ftc,
         assert f"{rows:,} of 300,000 rows" in page.evaluate("document.querySelector('figcaption').textContent")
         show(page, 40, 40.3)
         time, values = read(page, 0, 0.4)
-        row = own.iloc[np.flatnonzero(own["time"] == time)[0]]
+        row = results.iloc[np.flatnonzero(results["time"] == time)[0]]
         np.testing.assert_array_equal(list(values.values()), row[list(values)])
         command = page.evaluate("document.querySelector('figcaption code').textContent")
     words = shlex.split(command)
     assert words[:2] == ["aso-ftc", "report"]
     words[words.index("part.html")] = tmp_path / "part.html"
     page, _ = report(aso_ftc, *words[2:])
-    part = own[(own["time"] >= 40) & (own["time"] <= 40.3)]
+    part = results[(results["time"] >= 40) & (results["time"] <= 40.3)]
     for name, curve in curves(page).items():
         assert curve["total"] == len(part) and (curve["values"] == part[name]).all()
     assert "Rows from t = 40 s to t = 40.3 s only." in page.text_content()
@@ -631,8 +631,8 @@ def test_a_page_of_200_signals_is_short_and_its_filter_finds_each(of_many_signal
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_the_second_cursor_and_the_vertical_zoom_work_by_mouse_and_keyboard(aso_ftc, write, tmp_path):
-    own = frame()
-    report(aso_ftc, write("own.csv", own))
+    results = frame()
+    report(aso_ftc, write("own.csv", results))
     frames = "new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(done)); })"
 
     def cells(page):
@@ -642,11 +642,11 @@ def test_the_second_cursor_and_the_vertical_zoom_work_by_mouse_and_keyboard(aso_
         """The legend has the values of a row, and the differences to another row."""
         for name, cell in zip(["time", "a", "b", "on"], cells(page), strict=True):
             value, difference = re.fullmatch(r"(\S+) \(Δ (\S+)\)", cell).groups()
-            assert float(value) == own[name][at]
-            assert float(difference) == pytest.approx(own[name][at] - own[name][other], rel=1e-5, abs=1e-12)
+            assert float(value) == results[name][at]
+            assert float(difference) == pytest.approx(results[name][at] - results[name][other], rel=1e-5, abs=1e-12)
 
     def row(page):
-        return int(np.flatnonzero(own["time"] == float(cells(page)[0].split(" ")[0]))[0])
+        return int(np.flatnonzero(results["time"] == float(cells(page)[0].split(" ")[0]))[0])
 
     def key(page, name):
         page.call("Input.dispatchKeyEvent", type="keyDown", key=name)

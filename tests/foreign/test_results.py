@@ -77,23 +77,23 @@ def files(write_results, tmp_path_factory):
     return SimpleNamespace(csv=csv, parquet=parquet, numbers=numbers, table=expected())
 
 
-def same(found, wanted):
+def same(values, reference):
     """Checks that the bits are equal; all NaN values count as equal."""
-    found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
-    either = np.isnan(wanted)
-    assert np.array_equal(np.isnan(found), either)
-    return np.array_equal(found[~either].view(np.uint64), wanted[~either].view(np.uint64))
+    values, reference = np.asarray(values, dtype=np.float64), np.asarray(reference, dtype=np.float64)
+    either = np.isnan(reference)
+    assert np.array_equal(np.isnan(values), either)
+    return np.array_equal(values[~either].view(np.uint64), reference[~either].view(np.uint64))
 
 
 def assert_table(column, names, table, rows=ROWS):
     """Checks every column of a reader, which is a function of the column's name."""
     for name in names:
-        found = column(name)
-        assert len(found) == rows
+        values = column(name)
+        assert len(values) == rows
         if name == "ctrl.text":
-            assert list(found) == table[name][:rows]
+            assert list(values) == table[name][:rows]
         else:
-            assert same(found, table[name][:rows]), name
+            assert same(values, table[name][:rows]), name
 
 
 def test_the_table_contains_difficult_numbers(files):
@@ -103,14 +103,14 @@ def test_the_table_contains_difficult_numbers(files):
 
 
 def test_fmpy_reads_the_csv_file_with_the_same_bits(files):
-    found = read_csv(files.numbers)
-    assert list(found.dtype.names) == NAMES[:-1]
-    assert_table(lambda name: found[name], NAMES[:-1], files.table)
+    table = read_csv(files.numbers)
+    assert list(table.dtype.names) == NAMES[:-1]
+    assert_table(lambda name: table[name], NAMES[:-1], files.table)
 
 
 def test_genfromtxt_of_numpy_reads_the_csv_file_with_the_same_bits(files):
-    found = np.genfromtxt(files.numbers, delimiter=",", skip_header=1)
-    assert_table(lambda name: found[:, NAMES.index(name)], NAMES[:-1], files.table)
+    table = np.genfromtxt(files.numbers, delimiter=",", skip_header=1)
+    assert_table(lambda name: table[:, NAMES.index(name)], NAMES[:-1], files.table)
     named = np.genfromtxt(
         files.numbers, delimiter=",", names=True, deletechars="", max_rows=1
     )
@@ -118,44 +118,44 @@ def test_genfromtxt_of_numpy_reads_the_csv_file_with_the_same_bits(files):
 
 
 def test_pandas_reads_the_csv_file_with_the_same_bits(files):
-    found = pd.read_csv(files.csv)
-    assert list(found.columns) == NAMES
-    assert found.dtypes["plant.mode"] == np.int64
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    table = pd.read_csv(files.csv)
+    assert list(table.columns) == NAMES
+    assert table.dtypes["plant.mode"] == np.int64
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
 
 
 def test_polars_reads_the_csv_file_with_the_same_bits(files):
-    found = pl.read_csv(files.csv)
-    assert found.columns == NAMES
-    assert found.schema["time"] == pl.Float64 and found.schema["plant.mode"] == pl.Int64
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    table = pl.read_csv(files.csv)
+    assert table.columns == NAMES
+    assert table.schema["time"] == pl.Float64 and table.schema["plant.mode"] == pl.Int64
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
 
 
 def test_pyarrow_reads_the_parquet_file_typed_without_nulls_and_with_units(files):
-    found = pq.read_table(files.parquet)
+    table = pq.read_table(files.parquet)
     types = [pa.float64(), pa.float64(), pa.int32(), pa.float64(), pa.bool_(), pa.string()]
-    assert found.schema.names == NAMES and found.schema.types == types
-    assert not any(field.nullable for field in found.schema)
-    assert json.loads(found.schema.metadata[b"units"]) == UNITS
-    assert_table(lambda name: found[name].to_pandas().to_numpy(), NAMES, files.table)
+    assert table.schema.names == NAMES and table.schema.types == types
+    assert not any(field.nullable for field in table.schema)
+    assert json.loads(table.schema.metadata[b"units"]) == UNITS
+    assert_table(lambda name: table[name].to_pandas().to_numpy(), NAMES, files.table)
     assert pq.ParquetFile(files.parquet).metadata.num_row_groups > 1
     assert pq.read_table(files.parquet, columns=["ctrl.x_hat[1]"]).num_columns == 1
 
 
 def test_pandas_reads_the_parquet_file_with_the_same_bits_and_the_units(files):
-    found = pd.read_parquet(files.parquet)
-    assert list(found.columns) == NAMES
-    assert found.dtypes["ctrl.on"] == np.bool_ and found.dtypes["plant.mode"] == np.int32
-    assert found.attrs["units"] == UNITS
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    table = pd.read_parquet(files.parquet)
+    assert list(table.columns) == NAMES
+    assert table.dtypes["ctrl.on"] == np.bool_ and table.dtypes["plant.mode"] == np.int32
+    assert table.attrs["units"] == UNITS
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
 
 
 def test_polars_reads_the_parquet_file_with_the_same_bits_and_the_units(files):
-    found = pl.read_parquet(files.parquet)
+    table = pl.read_parquet(files.parquet)
     kinds = [pl.Float64, pl.Float64, pl.Int32, pl.Float64, pl.Boolean, pl.String]
-    assert found.schema == dict(zip(NAMES, kinds))
+    assert table.schema == dict(zip(NAMES, kinds))
     assert json.loads(pl.read_parquet_metadata(files.parquet)["units"]) == UNITS
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
     some = pl.scan_parquet(files.parquet).filter(pl.col("ctrl.on")).select("plant.x_p").collect()
     assert same(some["plant.x_p"], files.table["plant.x_p"][1::2])
 
@@ -164,11 +164,11 @@ def test_a_crash_leaves_every_row_up_to_the_flush_before_it(write_results, tmp_p
     csv, parquet = tmp_path / "a.csv", tmp_path / "a.parquet"
     assert write_results("--interrupt", csv) != 0
     assert write_results("--interrupt", parquet) != 0
-    found = pd.read_csv(csv)
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    table = pd.read_csv(csv)
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
     assert csv.read_bytes().endswith(b"\n")
-    found = pd.read_parquet(parquet)
-    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    table = pd.read_parquet(parquet)
+    assert_table(lambda name: table[name].to_numpy(), NAMES, files.table)
 
 
 # A few columns that are written in full blocks, and so many that a partial block takes several writes.
@@ -188,7 +188,7 @@ def test_a_kill_at_any_instant_leaves_a_file_without_the_rows_of_the_last_second
         time.sleep(instants.uniform(0.1, 2))
         run.kill()
         run.wait()
-        given = np.fromfile(times)
+        timestamps = np.fromfile(times)
         names = ["time", f"x[{columns - 1}]"]
         if ending == "csv":
             # The last line can be a part.
@@ -202,5 +202,5 @@ def test_a_kill_at_any_instant_leaves_a_file_without_the_rows_of_the_last_second
         assert np.array_equal(table[names[0]].to_numpy(), rows)
         assert np.array_equal(table[names[1]].to_numpy(), rows + (columns - 1) / 1024)
         # The row that is in work is among the times or not. A write on a busy machine takes a while.
-        lost = given[len(table) : len(given)]
-        assert len(lost) == 0 or given[-1] - lost[0] < 1, f"{len(lost)} of {len(given)} rows"
+        lost = timestamps[len(table) : len(timestamps)]
+        assert len(lost) == 0 or timestamps[-1] - lost[0] < 1, f"{len(lost)} of {len(timestamps)} rows"

@@ -12,7 +12,7 @@ from design_file import vector
 from excitation import restore, serialized
 from named_equations import losses, size_of, state_names
 from sampled_oracle import SampledController
-from test_designs import SAMPLE_TIME, begun, made, random_design
+from test_designs import SAMPLE_TIME, begun, fmu_with, random_design
 
 T = SAMPLE_TIME
 # Sizes, limits that some command reaches or leaves, extras of `random_design`.
@@ -31,7 +31,7 @@ SAMPLES = 40
 @pytest.fixture(params=CASES, ids=str)
 def fmu(request, controller, tmp_path):
     """The FMU of a sampled design."""
-    return made(controller, random_design(*request.param), tmp_path)
+    return fmu_with(controller, random_design(*request.param), tmp_path)
 
 
 def start_of(fmu):
@@ -57,7 +57,7 @@ def expected(fmu):
 
 
 def test_these_tests_include_commands_at_limits(fmu):
-    limits = [own.get("limits") for own in fmu.design["actuators"]]
+    limits = [actuator.get("limits") for actuator in fmu.design["actuators"]]
     commands = expected(fmu)[:, -len(limits) :].T
     for command, pair in zip(commands, limits):
         assert pair is None or 0 < sum(np.isin(command, pair)) < len(command)
@@ -117,7 +117,7 @@ def test_it_has_discrete_outputs_no_states_and_a_constant_sample_time(fmu):
 def test_the_step_size_of_the_default_experiment_is_the_sample_time(controller, tmp_path):
     design = random_design((1, 1, 1, 1), None, "c")
     del design["experiment"]["step_size"]
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     assert float(fmu.description.defaultExperiment.stepSize) == T
 
 
@@ -178,11 +178,11 @@ def test_fmpy_runs_it_in_model_exchange(fmu):
         output=signals(fmu),
         start_values=dict(zip(vector("x_hat_0", n) + vector("f_hat_0", q) + names, [*z, *y])),
     )
-    wanted = expected(fmu)
+    reference = expected(fmu)
     for k in range(SAMPLES - 1):
         after = result[result["time"] <= (k + 0.9) * T][-1]
-        found = [after[name] for name in signals(fmu)]
-        assert found == pytest.approx(wanted[k], rel=1e-6, abs=1e-9)
+        values = [after[name] for name in signals(fmu)]
+        assert values == pytest.approx(reference[k], rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("parts", [1, 4, 10])
@@ -202,25 +202,25 @@ def test_there_is_no_delay_in_a_loop_with_a_plant_that_is_stepped_first(
     design |= {"states": signal("x") + signal("v"), "actuators": signal("force")}
     design |= {"measurements": signal("y1"), "faults": signal("f")}
     design |= {"experiment": {"stop_time": 2.0}}
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     x = np.array([1.0, 0.0])
-    ideal, wanted, found = SampledController(design, np.zeros(3), C @ x), [], []
+    ideal, reference, commands = SampledController(design, np.zeros(3), C @ x), [], []
     for _ in range(SAMPLES):
         _, _, u = ideal.sample(C @ x)
-        wanted.append(u[0])
+        reference.append(u[0])
         x = Phi @ x + Gamma @ (u + 0.7)
     x, part = np.array([1.0, 0.0]), whole(T / parts)
     with begun(fmu, size_of(design), np.zeros(3), C @ x) as instance:
         for i in range((SAMPLES - 1) * parts + 1):
             u = instance.get("force")
-            found += u if i % parts == 0 else []
+            commands += u if i % parts == 0 else []
             before, x = C @ x, part @ [*x, u[0] + 0.7]
-            given = before if slopes else C @ x
-            instance.set({"y1": given[0]})
+            measurement = before if slopes else C @ x
+            instance.set({"y1": measurement[0]})
             if slopes:
                 instance.set_slopes(y1=((C @ x - before) * parts / T)[0])
             instance.step(i * T / parts, T / parts)
-    assert found == pytest.approx(wanted, rel=1e-8, abs=1e-10)
+    assert commands == pytest.approx(reference, rel=1e-8, abs=1e-10)
 
 
 @pytest.mark.parametrize("period", [0.1, 0.001])
@@ -232,7 +232,7 @@ def test_ten_steps_of_a_tenth_of_the_sample_time_take_one_sample(controller, tmp
     design |= {"states": signal("k"), "actuators": signal("u"), "measurements": signal("y1")}
     design |= {"faults": signal("f"), "experiment": {"stop_time": 1.0, "step_size": period / 10}}
     design |= {"sample_time": period, "estimator": "current"}
-    fmu = made(controller, design, tmp_path)
+    fmu = fmu_with(controller, design, tmp_path)
     with begun(fmu, (1, 1, 1, 1), [0.0, 1.0], [0.0]) as instance:
         time = 0.0
         for i in range(1, 100_001):

@@ -9,7 +9,7 @@ from scipy.io import savemat
 from scipy.linalg import solve_discrete_are
 from scipy.signal import cont2discrete
 
-from design_oracle import closed_loop, commands, made, responses
+from design_oracle import closed_loop, commands, design_and_report, responses
 from test_delays import response
 
 PERIOD = 0.05
@@ -53,8 +53,8 @@ def test_sampled_matrices_give_the_design_of_the_plant_that_was_sampled(design):
         reports.append(json.loads(done.stdout))
     for one, other in zip(reports[0]["gains"], reports[1]["gains"], strict=True):
         np.testing.assert_allclose(one["values"], other["values"], rtol=1e-8, atol=1e-9)
-    found, expected = ([point["s_peak"] for point in report["robustness"]["points"]] for report in reports)
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    peaks, expected = ([point["s_peak"] for point in report["robustness"]["points"]] for report in reports)
+    np.testing.assert_allclose(peaks, expected, rtol=1e-6)
 
 
 def test_the_worst_plant_of_sampled_matrices_is_a_plant_file(design, aso_ftc, tmp_path):
@@ -71,10 +71,10 @@ def test_matlab_variables_with_a_sample_time_become_a_sampled_plant(aso_ftc, tmp
     savemat(tmp_path / "plant.mat", {"A": SAMPLED, "B": INPUTS[:, :1], "C": C, "Ts": PERIOD})
     done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    made = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
-    assert (made["matrices"], made["sample_time"]) == ("sampled", PERIOD)
-    assert made["observer"]["bandwidth"] > made["feedback"]["bandwidth"] > 0
-    np.testing.assert_array_equal(made["A"], SAMPLED)
+    plant = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+    assert (plant["matrices"], plant["sample_time"]) == ("sampled", PERIOD)
+    assert plant["observer"]["bandwidth"] > plant["feedback"]["bandwidth"] > 0
+    np.testing.assert_array_equal(plant["A"], SAMPLED)
 
 
 SCALAR = 'B = [[1]]\nC = [[1]]\nactuator_faults = "all"\n'
@@ -157,29 +157,29 @@ def test_gains_of_published_plants_without_a_continuous_one_solve_scipys_riccati
     a, b, c, _ = (np.array(part, dtype=float) for part in plant)
     n, m, p = len(a), b.shape[1], len(c)
     weights = f"feedback = {{ Q = {[1] * n}, R = {[1] * m} }}\nobserver = {{ W = {[1] * (n + m)}, V = {[1] * p} }}\n"
-    own, report = made(aso_ftc, tmp_path, only_samples(plant, weights + 'actuator_faults = "all"\n'))
-    np.testing.assert_array_equal(own.A, a)
+    design, report = design_and_report(aso_ftc, tmp_path, only_samples(plant, weights + 'actuator_faults = "all"\n'))
+    np.testing.assert_array_equal(design.A, a)
     x = solve_discrete_are(a, b, np.eye(n), np.eye(m))
     expected = -np.linalg.solve(np.eye(m) + b.T @ x @ b, b.T @ x @ a)
-    np.testing.assert_allclose(own.K_x, expected, rtol=1e-8, atol=1e-9)
-    a_0, c_0, gain = own.augmented
+    np.testing.assert_allclose(design.K_x, expected, rtol=1e-8, atol=1e-9)
+    a_0, c_0, gain = design.augmented
     x = solve_discrete_are(a_0.T, c_0.T, np.eye(n + m), np.eye(p))
     np.testing.assert_allclose(gain, x @ c_0.T @ np.linalg.inv(np.eye(p) + c_0 @ x @ c_0.T), rtol=1e-7, atol=1e-8)
     assert any("no continuous plant has these samples" in warning for warning in report["warnings"])
 
 
-def radius_of(own, a, b, c):
+def radius_of(design, a, b, c):
     """The largest modulus of the eigenvalues of the loop of another plant and the controller of a design."""
-    n, q = own.n, own.q
+    n, q = design.n, design.q
     x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
-    innovation = c @ x - own.C @ x_hat
-    corrected, faults = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
-    if not own.current:
+    innovation = c @ x - design.C @ x_hat
+    corrected, faults = x_hat + design.L_x @ innovation, f_hat + design.L_f @ innovation
+    if not design.current:
         corrected, faults = x_hat, f_hat
-    command = own.K_x @ corrected + own.K_f @ faults
-    rest = (0 if own.current else 1) * innovation
-    model = own.A @ corrected + own.B @ command + own.F_a @ faults + own.L_x @ rest
-    return max(abs(np.linalg.eigvals(np.vstack([a @ x + b @ command, model, faults + own.L_f @ rest]))))
+    command = design.K_x @ corrected + design.K_f @ faults
+    rest = (0 if design.current else 1) * innovation
+    model = design.A @ corrected + design.B @ command + design.F_a @ faults + design.L_x @ rest
+    return max(abs(np.linalg.eigvals(np.vstack([a @ x + b @ command, model, faults + design.L_f @ rest]))))
 
 
 @pytest.mark.parametrize("estimator", ["current", "prediction"])
@@ -188,11 +188,11 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
     faults = 'faults = [{ name = "f", actuator = "u1", bound = 2, rate_bound = 0.5 }]\n'
     tolerance = "robustness.tolerance = 0.05\n"
     text = only_samples(plant, f'estimator = "{estimator}"\n{faults}{tolerance}')
-    own, report = made(aso_ftc, tmp_path, text)
+    design, report = design_and_report(aso_ftc, tmp_path, text)
     a, b, c, period = map(np.array, plant)
     n = len(a)
-    loop, entry, _, direct = closed_loop(own)
-    to_command = commands(own)
+    loop, entry, _, direct = closed_loop(design)
+    to_command = commands(design)
     added = np.vstack([b, np.zeros((n + 1, 1))])
     frequencies = np.linspace(0, np.pi, 20_001)[1:]
     sums = [1 + response(loop, added, to_command, np.exp(1j * angle))[0, 0] for angle in frequencies]
@@ -215,7 +215,7 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
 
     assert delayed(whole) < 1 <= delayed(whole + 1)
     # |f| <= 2, and |f'| <= 0.5: the sums of the moduli of the responses.
-    system = (loop, entry, np.vstack([np.eye(n, len(loop)), closed_loop(own)[2][n:]]), direct)
+    system = (loop, entry, np.vstack([np.eye(n, len(loop)), closed_loop(design)[2][n:]]), direct)
     _, impulse, step = responses(system, period, 4000)
     of_fault = np.abs(impulse).sum(axis=0)[:, 0] + np.abs(direct[:, 0])
     of_rate = np.abs(step).sum(axis=0)[:, 0] * period
@@ -229,7 +229,7 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
 
     limit = robustness["tolerance"]["first_unstable"]
     changed = [nominal[name] + limit * (worst[name] - nominal[name]) for name in "ABC"]
-    np.testing.assert_allclose(radius_of(own, *changed), 1, rtol=1e-6)
+    np.testing.assert_allclose(radius_of(design, *changed), 1, rtol=1e-6)
     assert 0.9 * limit < robustness["tolerance_proof"]["fraction"] <= limit
 
 
@@ -242,8 +242,8 @@ noise = 0.01
 false_alarm_interval = 100
 model_error = 1
 """
-    refused, message = made(aso_ftc, tmp_path, only_samples(UNSTABLE, detection))
+    refused, message = design_and_report(aso_ftc, tmp_path, only_samples(UNSTABLE, detection))
     assert refused is None and "bounded only if the plant is stable without the controller" in message, message
     stable = ([[0.9, 0.2], [0, -0.5]], *([[0.1], [1.0]], [[1, 0]], 0.05))
-    design, report = made(aso_ftc, tmp_path, only_samples(stable, detection))
+    design, report = design_and_report(aso_ftc, tmp_path, only_samples(stable, detection))
     assert design is not None and report["detection"]["tests"], message

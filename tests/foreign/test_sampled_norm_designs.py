@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import LinAlgError, block_diag, solve_discrete_are
 
-from design_oracle import made
+from design_oracle import design_and_report
 
 NOISE = 0.01
 # Planar vertical take-off aircraft: Astrom and Murray, Feedback Systems (2008), example 5.12; the values of python-control.
@@ -40,13 +40,13 @@ SUSPENSION = (
 )
 
 
-def problem(own, noise):
+def problem(design, noise):
     """A, C, B, D, E of the error dynamics A - L C; the disturbances are the rates of the faults and the noise."""
-    a_0, c_0, gain = own.augmented
-    rates = np.vstack([np.zeros((own.n, own.q)), own.period * np.eye(own.q)])
+    a_0, c_0, gain = design.augmented
+    rates = np.vstack([np.zeros((design.n, design.q)), design.period * np.eye(design.q)])
     b = np.hstack([rates, np.zeros((len(a_0), len(c_0)))])
     d = np.hstack([c_0 @ rates, noise * np.eye(len(c_0))])
-    return a_0, c_0 @ a_0, b, d, rates.T / own.period, gain
+    return a_0, c_0 @ a_0, b, d, rates.T / design.period, gain
 
 
 def sweep(a, c, b, d, e, gain):
@@ -81,11 +81,11 @@ def test_a_sampled_observer_has_nearly_the_least_norm_of_any_filter(aso_ftc, tmp
     a, b, c, period = plant
     text = f"sample_time = {period}\nA = {a}\nB = {b}\nC = {c}\nactuator_faults = \"all\"\n"
     text += f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * len(b[0])}\nobserver.h_infinity = \"least\"\nobserver.noise = {NOISE}\n"
-    own, found = made(aso_ftc, tmp_path, text)
-    assert own is not None, found
-    matrices = problem(own, NOISE)
+    design, report = design_and_report(aso_ftc, tmp_path, text)
+    assert design is not None, report
+    matrices = problem(design, NOISE)
     norm, least = sweep(*matrices), least_norm(*matrices[:-1])
-    stated = found["observer"]["norm"]
+    stated = report["observer"]["norm"]
     assert stated["norm"] == pytest.approx(norm, rel=1e-3)
     assert 0.999 * least < norm < 1.13 * least
     if stated["lower_bound"] is not None:

@@ -71,8 +71,8 @@ def test_fmpy_gives_the_same_residual(tmp_path, python, packed):
         *("--controller", fmu, "--step", period),
     )
     assert done.returncode == 0, done.stderr
-    found = 1e3 * json.loads(done.stdout)["residual"]["x_p"]
-    assert found == pytest.approx(couple(fmu, period), rel=1e-3)
+    residual = 1e3 * json.loads(done.stdout)["residual"]["x_p"]
+    assert residual == pytest.approx(couple(fmu, period), rel=1e-3)
 
 
 def test_noise_is_amplified_as_the_page_says(tmp_path):
@@ -92,10 +92,10 @@ def test_noise_is_amplified_as_the_page_says(tmp_path):
 def test_the_tables_of_the_page_are_those_of_the_figure():
     page = (ROOT / "docs" / "explanation" / "sampled.md").read_text(encoding="utf-8")
     lines = (ROOT / "docs" / "figures" / "residual_over_sample_time.csv").read_text(encoding="utf-8").splitlines()
-    found = {}
+    table = {}
     for row in lines[1:]:
         label, cart = re.match(r'[\d.]+,"(.*)",([\d.]+),', row).groups()
-        found.setdefault(label, []).append(f"{float(cart):.3g}")
-    assert len(found) == 4
-    for label, carts in found.items():
+        table.setdefault(label, []).append(f"{float(cart):.3g}")
+    assert len(table) == 4
+    for label, carts in table.items():
         assert f"| {label} | {' | '.join(carts)} |" in page

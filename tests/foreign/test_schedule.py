@@ -50,12 +50,12 @@ class Design:
     """A scheduled design file: interpolation and recursion."""
 
     def __init__(self, text):
-        own = tomllib.loads(text)
-        self.period, self.current = own["sample_time"], own["estimator"] == "current"
-        self.points = own["schedule"]["points"]
+        design = tomllib.loads(text)
+        self.period, self.current = design["sample_time"], design["estimator"] == "current"
+        self.points = design["schedule"]["points"]
         self.at = [point["at"] for point in self.points]
         free = [-np.inf, np.inf]
-        self.limits = np.transpose([actuator.get("limits", free) for actuator in own["actuators"]])
+        self.limits = np.transpose([actuator.get("limits", free) for actuator in design["actuators"]])
 
     def numbers(self, value):
         """Matrices and operating point at a value of the scheduling variable."""
@@ -73,9 +73,9 @@ class Design:
             (A, B, C, F, K_x, K_f, L_x, L_f, x_op, u_op, y_op), used = self.numbers(value)
             (n, q), point = F.shape, np.concatenate([x_op, np.zeros(F.shape[1])])
             g, k, l = np.block([[A, F], [np.zeros((q, n)), np.eye(q)]]), np.hstack([K_x, K_f]), np.vstack([L_x, L_f])
-            own = z - point
-            correction = l @ (y - y_op - C @ own[:n])
-            shown = own + correction if self.current else own
+            deviation = z - point
+            correction = l @ (y - y_op - C @ deviation[:n])
+            shown = deviation + correction if self.current else deviation
             u = np.clip(u_op + k @ shown, *self.limits)
             rows.append([*(shown + point), *u, used])
             following = g @ shown + np.vstack([B, np.zeros((q, B.shape[1]))]) @ (u - u_op)
@@ -86,7 +86,7 @@ class Design:
 @pytest.fixture(scope="module")
 def tank(aso_ftc, root, packed, tmp_path_factory):
     """Report, design and FMU of the three tanks."""
-    return made(aso_ftc, root / "examples/three-tank/schedule.toml", tmp_path_factory.mktemp("tank"))
+    return design_of_file(aso_ftc, root / "examples/three-tank/schedule.toml", tmp_path_factory.mktemp("tank"))
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +94,10 @@ def measured(aso_ftc, root, packed, tmp_path_factory):
     """The three tanks with the measured level as variable."""
     folder = tmp_path_factory.mktemp("measured")
     text = (root / "examples/three-tank/schedule.toml").read_text().replace("../../dist", str(root / "dist"))
-    own = 'variable = "level"\nunit = "m"\ndescription = "Set point of the level of tank 1"'
-    assert own in text
-    (folder / "tank.toml").write_text(text.replace(own, 'variable = "y_1"'))
-    return made(aso_ftc, folder / "tank.toml", folder)
+    lines = 'variable = "level"\nunit = "m"\ndescription = "Set point of the level of tank 1"'
+    assert lines in text
+    (folder / "tank.toml").write_text(text.replace(lines, 'variable = "y_1"'))
+    return design_of_file(aso_ftc, folder / "tank.toml", folder)
 
 
 @pytest.fixture(scope="module")
@@ -105,10 +105,10 @@ def drive(aso_ftc, packed, tmp_path_factory):
     """Report, design and FMU of the drive."""
     folder = tmp_path_factory.mktemp("drive")
     (folder / "drive.toml").write_text(DRIVE)
-    return made(aso_ftc, folder / "drive.toml", folder)
+    return design_of_file(aso_ftc, folder / "drive.toml", folder)
 
 
-def made(aso_ftc, plant, folder):
+def design_of_file(aso_ftc, plant, folder):
     """The design of a plant file, made by the command."""
     out = folder / "design.toml"
     done = aso_ftc("design", plant, "--out", out, "--fmu", folder / "made.fmu", "--json", "--force")
@@ -205,14 +205,14 @@ def test_the_derivatives_at_the_start_include_the_schedule(measured):
         with Instance(fmu) as instance:
             instance.enter(dict(zip(names, LEVELS)))
             instance.get(*outputs)
-            found = instance.directional(outputs, {name: 1.0})
-        assert list(found.values()) == pytest.approx(slopes, rel=1e-5, abs=1e-6)
+            derivatives = instance.directional(outputs, {name: 1.0})
+        assert list(derivatives.values()) == pytest.approx(slopes, rel=1e-5, abs=1e-6)
 
 
 def test_the_controller_has_no_matrices_as_parameters_but_the_value_of_its_schedule(measured):
     _, _, fmu = measured
     parameters = fmu.names(causality="parameter")
-    assert not any(name.startswith(tuple(f"{own}[" for own in [*MATRICES, *LISTS])) for name in parameters)
+    assert not any(name.startswith(tuple(f"{entry}[" for entry in [*MATRICES, *LISTS])) for name in parameters)
     assert fmu.variables["schedule_at"].causality == "output"
     assert fmu.names(causality="input") == ["y_1", "y_2", "y_3", "compensate"]
 
@@ -254,19 +254,19 @@ def closed(design, value):
 @pytest.mark.parametrize("name", ["tank", "drive"])
 def test_the_certificate_holds_between_the_points(name, request):
     report, design, _ = request.getfixturevalue(name)
-    found = report["schedule"]
+    schedule = report["schedule"]
     values = np.linspace(design.at[0], design.at[-1], 97)
     radii = [abs(np.linalg.eigvals(closed(design, value))).max() for value in values]
-    assert found["worst_instability"] >= max(radii) - 1 - 1e-9
-    if "p" in found["any_rate"]:
-        p = np.array(found["any_rate"]["p"])
+    assert schedule["worst_instability"] >= max(radii) - 1 - 1e-9
+    if "p" in schedule["any_rate"]:
+        p = np.array(schedule["any_rate"]["p"])
         scale = 1 / np.sqrt(np.diag(p))
         for value in values:
             a = closed(design, value)
             left = p - a.T @ p @ a
             assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0
         return
-    rate, grid = found["bounded_rate"]["rate"], [np.array(p) for p in found["bounded_rate"]["p"]]
+    rate, grid = schedule["bounded_rate"]["rate"], [np.array(p) for p in schedule["bounded_rate"]["p"]]
     change = rate * design.period
 
     def energy(value):

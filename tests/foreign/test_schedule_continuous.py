@@ -97,19 +97,19 @@ def drive(designed, request):
 def test_in_model_exchange_derivatives_and_commands_are_those_of_the_interpolated_equations(drive):
     schedule, _, fmu = drive
     random = np.random.default_rng(5)
-    own = Exchanged(fmu, {"angle": 0.0, "inertia": 1.0, "r_angle": 0.0})
+    model = Exchanged(fmu, {"angle": 0.0, "inertia": 1.0, "r_angle": 0.0})
     limited = 0
     for _ in range(300):
         z = schedule.start(1.0) + 0.8 * random.standard_normal(len(schedule.start(1.0)))
         # Some values are outside of the points, where they are held.
-        angle, wanted, inertia = random.standard_normal(), random.standard_normal(), random.uniform(0.5, 5)
-        inputs = {"angle": angle, "inertia": inertia, "r_angle": wanted}
-        own.at(0.0, z, inputs)
-        own.event(0.0)
-        slopes = own.at(0.0, z, inputs)
-        expected, u = schedule.equations(z, np.array([angle]), np.array([wanted]), inertia)
+        angle, reference, inertia = random.standard_normal(), random.standard_normal(), random.uniform(0.5, 5)
+        inputs = {"angle": angle, "inertia": inertia, "r_angle": reference}
+        model.at(0.0, z, inputs)
+        model.event(0.0)
+        slopes = model.at(0.0, z, inputs)
+        expected, u = schedule.equations(z, np.array([angle]), np.array([reference]), inertia)
         assert slopes == pytest.approx(expected, rel=1e-11, abs=1e-12)
-        assert own.instance.get("torque", "schedule_at") == pytest.approx([u[0], min(max(inertia, 1), 4)], rel=1e-12, abs=1e-13)
+        assert model.instance.get("torque", "schedule_at") == pytest.approx([u[0], min(max(inertia, 1), 4)], rel=1e-12, abs=1e-13)
         limited += abs(u[0]) == 3
     assert 20 < limited < 280, "commands at and between the limits"
 
@@ -117,15 +117,15 @@ def test_in_model_exchange_derivatives_and_commands_are_those_of_the_interpolate
 def course(time):
     """Angle, reference and inertia of the runs below: piecewise linear between whole numbers of steps of 0.05 s."""
     knots = np.arange(0, 12.01, 0.05)
-    angle, wanted = 0.5 * np.sin(1.3 * knots), np.where(knots < 3, 0.2, 1.6)
+    angle, reference = 0.5 * np.sin(1.3 * knots), np.where(knots < 3, 0.2, 1.6)
     inertia = 2.5 + 1.8 * np.sin(0.9 * knots)
-    return tuple(np.interp(time, knots, own) for own in (angle, wanted, inertia))
+    return tuple(np.interp(time, knots, signal) for signal in (angle, reference, inertia))
 
 
-def sensitivity(own):
+def sensitivity(gains):
     """The largest change of the command for states that are one off each, with and without a direct term."""
-    own = {name: np.abs(own[name]).sum() for name in ("K_x", "K_f", "K_i", "P_f", "C") if name in own}
-    return own["K_x"] + own.get("K_i", 0) + own["K_f"] * (1 + own.get("P_f", 0) * (1 + own["C"]))
+    gains = {name: np.abs(gains[name]).sum() for name in ("K_x", "K_f", "K_i", "P_f", "C") if name in gains}
+    return gains["K_x"] + gains.get("K_i", 0) + gains["K_f"] * (1 + gains.get("P_f", 0) * (1 + gains["C"]))
 
 
 @pytest.mark.parametrize("size", [0.05, 0.01])
@@ -134,25 +134,25 @@ def test_in_co_simulation_the_fmu_follows_scipys_integration_of_the_equations_th
     names = states_of(schedule)
     z, at_limit = schedule.start(1.0), 0
     z[schedule.n + schedule.q] = course(0)[0]
-    with Instance(fmu) as own:
-        own.start(dict(zip(["angle", "r_angle", "inertia"], course(0.0))))
+    with Instance(fmu) as instance:
+        instance.start(dict(zip(["angle", "r_angle", "inertia"], course(0.0))))
         for k in range(round(12 / size)):
             now, after = course(k * size), course((k + 1) * size)
-            own.set(dict(zip(["angle", "r_angle", "inertia"], now)))
+            instance.set(dict(zip(["angle", "r_angle", "inertia"], now)))
             slopes = {name: (b - a) / size for name, a, b in zip(["angle", "r_angle", "inertia"], now, after)}
-            own.set_slopes(**slopes)
+            instance.set_slopes(**slopes)
             # The first value outside of the points is a warning.
-            assert own.call("DoStep", k * size, size, 1) in (OK, WARNING), own.messages[-1:]
+            assert instance.call("DoStep", k * size, size, 1) in (OK, WARNING), instance.messages[-1:]
 
             def right(t, z):
-                angle, wanted, inertia = (a + (b - a) * (t - k * size) / size for a, b in zip(now, after))
-                return schedule.equations(z, np.array([angle]), np.array([wanted]), inertia)[0]
+                angle, reference, inertia = (a + (b - a) * (t - k * size) / size for a, b in zip(now, after))
+                return schedule.equations(z, np.array([angle]), np.array([reference]), inertia)[0]
 
             z = solve_ivp(right, (k * size, (k + 1) * size), z, rtol=1e-11, atol=1e-13, method="DOP853").y[:, -1]
             u = schedule.equations(z, np.array(after[:1]), np.array([after[1]]), after[2])[1]
             at_limit += abs(u[0]) == 3
-            assert own.get(*names) == pytest.approx(z, rel=2e-7, abs=2e-7), k
-            torque, at = own.get("torque", "schedule_at")
+            assert instance.get(*names) == pytest.approx(z, rel=2e-7, abs=2e-7), k
+            torque, at = instance.get("torque", "schedule_at")
             assert torque == pytest.approx(u[0], abs=2e-7 * (1 + abs(z).max()) * sensitivity(schedule.numbers(after[2])))
             assert at == pytest.approx(min(max(after[2], 1), 4), rel=1e-12)
     assert at_limit * size > 0.2, "the command is at a limit for a while"
@@ -175,30 +175,30 @@ def test_held_inputs_and_events_of_the_activation_need_no_slopes(designed):
             slope[schedule.n] = 0
         return slope
 
-    with Instance(fmu) as own:
-        own.start(inputs)
+    with Instance(fmu) as instance:
+        instance.start(inputs)
         for k in range(4):
-            own.step(0.5 * k, 0.5)
+            instance.step(0.5 * k, 0.5)
             ends = [0.5 * k, *([0.73] if k == 1 else []), 0.5 * (k + 1)]
             for a, b in zip(ends, ends[1:]):
                 z = solve_ivp(right, (a, b - 1e-13), z, rtol=1e-11, atol=1e-13).y[:, -1]
-            assert own.get(*names) == pytest.approx(z, rel=1e-7, abs=1e-7)
+            assert instance.get(*names) == pytest.approx(z, rel=1e-7, abs=1e-7)
 
 
 def test_slopes_of_the_command_include_the_moving_gains(drive):
     schedule, _, fmu = drive
     random = np.random.default_rng(2)
-    with Instance(fmu) as own:
-        own.start({"angle": 0.2, "r_angle": 0.3, "inertia": 1.3})
-        own.step(0.0, 0.4)
+    with Instance(fmu) as instance:
+        instance.start({"angle": 0.2, "r_angle": 0.3, "inertia": 1.3})
+        instance.step(0.0, 0.4)
         for _ in range(20):
             rates = dict(zip(["angle", "r_angle", "inertia"], 0.3 * random.standard_normal(3)))
             inputs = {"angle": 0.1 * random.standard_normal(), "r_angle": 0.3, "inertia": random.uniform(1.1, 3.9)}
-            own.set(inputs)
-            own.set_slopes(**rates)
-            (found,) = own.slopes_of("torque")
-            (instance_slope,) = own.slopes_of("f_hat")
-            z = np.array(own.get(*states_of(schedule)))
+            instance.set(inputs)
+            instance.set_slopes(**rates)
+            (torque_slope,) = instance.slopes_of("torque")
+            (instance_slope,) = instance.slopes_of("f_hat")
+            z = np.array(instance.get(*states_of(schedule)))
 
             def command(t):
                 values = {name: inputs[name] + rates[name] * t for name in inputs}
@@ -210,14 +210,14 @@ def test_slopes_of_the_command_include_the_moving_gains(drive):
 
                 def fault(t):
                     slope, _ = schedule.equations(z, np.array([inputs["angle"]]), np.array([inputs["r_angle"]]), inputs["inertia"])
-                    moved, own = z + slope * t, schedule.numbers(inputs["inertia"] + rates["inertia"] * t)
+                    moved, point = z + slope * t, schedule.numbers(inputs["inertia"] + rates["inertia"] * t)
                     # The filtered measurement is the state after the one of the fault.
-                    e = moved[schedule.n + 1] - own["y_op"][0] - own["C"][0] @ (moved[: schedule.n] - own["x_op"])
-                    return moved[schedule.n] + own["P_f"][0, 0] * e
+                    e = moved[schedule.n + 1] - point["y_op"][0] - point["C"][0] @ (moved[: schedule.n] - point["x_op"])
+                    return moved[schedule.n] + point["P_f"][0, 0] * e
 
                 assert instance_slope == pytest.approx((fault(1e-6) - fault(-1e-6)) / 2e-6, rel=1e-5, abs=1e-6)
             if abs(command(0)) < 2.9:
-                assert found == pytest.approx((command(1e-6) - command(-1e-6)) / 2e-6, rel=1e-5, abs=1e-6)
+                assert torque_slope == pytest.approx((command(1e-6) - command(-1e-6)) / 2e-6, rel=1e-5, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -227,30 +227,30 @@ def test_directional_derivatives_are_the_difference_quotients(designed, case):
     schedule, _, fmu = designed(*case, certified=case is FILTERED)
     inputs = {"angle": 0.45, "r_angle": 0.3} | ({"inertia": 2.7} if case is FILTERED else {})
     names = states_of(schedule)
-    own = Exchanged(fmu, inputs)
+    model = Exchanged(fmu, inputs)
     z = schedule.start(schedule.at[0]) + 0.05 * np.arange(1, len(names) + 1)
     faults = ["f_hat"] if "P_f" in schedule.points[0] else []
     unknowns = [f"der({name})" for name in names] + ["torque", *faults]
     structure = [*fmu.description.derivatives, *fmu.description.outputs]
-    stated = {item.variable.name: {own.name for own in item.dependencies} for item in structure}
+    stated = {item.variable.name: {variable.name for variable in item.dependencies} for item in structure}
 
     def values(z, inputs):
-        slopes = own.at(0.0, z, inputs)
-        return np.array([*slopes, *own.instance.get("torque", *faults)])
+        slopes = model.at(0.0, z, inputs)
+        return np.array([*slopes, *model.instance.get("torque", *faults)])
 
     values(z, inputs)
-    own.event(0.0)
+    model.event(0.0)
     for k, name in enumerate([*names, *inputs]):
         step = 1e-6
         moved = []
         for sign in (1, -1):
             changed = z + sign * step * np.eye(len(z))[k] if k < len(z) else z
-            given = inputs if k < len(z) else inputs | {name: inputs[name] + sign * step}
-            moved.append(values(changed, given))
+            input_values = inputs if k < len(z) else inputs | {name: inputs[name] + sign * step}
+            moved.append(values(changed, input_values))
         values(z, inputs)
-        found = own.instance.directional(unknowns, {name: 1.0})
+        derivatives = model.instance.directional(unknowns, {name: 1.0})
         quotient = (moved[0] - moved[1]) / (2 * step)
-        assert list(found.values()) == pytest.approx(quotient, rel=1e-5, abs=1e-6), name
+        assert list(derivatives.values()) == pytest.approx(quotient, rel=1e-5, abs=1e-6), name
         for unknown, slope in zip(unknowns, quotient):
             assert name in stated[unknown] or abs(slope) < 1e-9, (unknown, name)
 
@@ -267,11 +267,11 @@ def test_the_certificate_holds_between_the_points_at_the_stated_rate(designed, c
 
 def test_the_energy_falls_while_the_spring_changes_at_the_proven_rate(designed):
     schedule, report, _ = designed(text=SPRING)
-    found = report["schedule"]["bounded_rate"]
-    low, high = (np.array(p) for p in found["p"])
+    proof = report["schedule"]["bounded_rate"]
+    low, high = (np.array(p) for p in proof["p"])
     # From 1 to 9 and back, again and again.
-    spring = lambda t: 1 + abs((found["rate"] * t + 8) % 16 - 8)
-    corners = np.arange(0, 4) * 8 / found["rate"]
+    spring = lambda t: 1 + abs((proof["rate"] * t + 8) % 16 - 8)
+    corners = np.arange(0, 4) * 8 / proof["rate"]
     # The loop is a polynomial of degree 2.
     first, middle, last = (schedule.loop(value) for value in (1, 5, 9))
     along = lambda s: (1 - s) * (1 - 2 * s) * first + 4 * s * (1 - s) * middle + s * (2 * s - 1) * last
@@ -290,8 +290,8 @@ def test_the_energy_falls_while_the_spring_changes_at_the_proven_rate(designed):
 
 def test_a_rate_that_is_not_proven_makes_the_verdict_amber_and_says_so(designed):
     _, report, _ = designed(rate("100.0"), text=SPRING)
-    found = report["schedule"]
-    assert "no P was found for the stated rate 100 per s" in str(found["bounded_rate"]) and "p" not in found["any_rate"]
+    certificate = report["schedule"]
+    assert "no P was found for the stated rate 100 per s" in str(certificate["bounded_rate"]) and "p" not in certificate["any_rate"]
     reasons = report["verdict"]["reasons"]
     assert any("stability while k changes is not proven" in reason for reason in reasons), reasons
     assert report["verdict"]["level"] == "amber"
@@ -310,7 +310,7 @@ def test_a_measurement_that_schedules_moves_its_own_operating_point(designed, la
         slope, u = schedule.equations(z, y, np.array(point["r_op"]), value, limited=False)
         return np.concatenate([np.array(point["A"]) @ (x - point["x_op"]) + np.array(point["B"]) @ (u - point["u_op"]), slope])
 
-    for k, own in enumerate(report["schedule"]["points"]):
+    for k, entry in enumerate(report["schedule"]["points"]):
         rest = np.concatenate([schedule.points[k]["x_op"], schedule.start(schedule.at[k])])
         worst = -np.inf
         for sign in (1, -1):
@@ -318,7 +318,7 @@ def test_a_measurement_that_schedules_moves_its_own_operating_point(designed, la
                 continue
             moved = [(right(k, rest + sign * 1e-6 * e) - right(k, rest)) / (sign * 1e-6) for e in np.eye(len(rest))]
             worst = max(worst, np.linalg.eigvals(np.array(moved).T).real.max())
-        assert own["coupled_instability"] == pytest.approx(worst, abs=1e-4 * (1 + abs(worst))), k
+        assert entry["coupled_instability"] == pytest.approx(worst, abs=1e-4 * (1 + abs(worst))), k
 
 
 def test_without_integral_action_a_warning_states_the_largest_error_between_the_points(designed):
@@ -326,9 +326,9 @@ def test_without_integral_action_a_warning_states_the_largest_error_between_the_
     (warning,) = [text for text in report["warnings"] if "reached at the points" in text]
 
     def error(value):
-        own = schedule.numbers(value)
-        states = np.linalg.solve(-own["A"] - own["B"] @ own["K_x"], own["B"] @ own["N_r"])
-        return 1 - (own["C"] @ states)[0, 0]
+        point = schedule.numbers(value)
+        states = np.linalg.solve(-point["A"] - point["B"] @ point["K_x"], point["B"] @ point["N_r"])
+        return 1 - (point["C"] @ states)[0, 0]
 
     values = np.concatenate([np.linspace(low, high, 21) for low, high in ((1, 2), (2, 4))])
     errors = np.abs([error(value) for value in values])
@@ -339,26 +339,26 @@ def test_without_integral_action_a_warning_states_the_largest_error_between_the_
 
 def test_a_value_outside_of_the_points_is_held_with_one_warning(drive):
     _, _, fmu = drive
-    with Instance(fmu) as own:
-        own.start({"angle": 0.0, "r_angle": 0.0, "inertia": 3.9})
-        own.set({"inertia": 4.5})
-        assert own.call("DoStep", 0.0, 0.1, 1) in (OK, WARNING)
-        own.set({"inertia": 4.6})
-        assert own.call("DoStep", 0.1, 0.1, 1) == OK
-        warnings = [message.text for message in own.messages if message.status == WARNING]
+    with Instance(fmu) as instance:
+        instance.start({"angle": 0.0, "r_angle": 0.0, "inertia": 3.9})
+        instance.set({"inertia": 4.5})
+        assert instance.call("DoStep", 0.0, 0.1, 1) in (OK, WARNING)
+        instance.set({"inertia": 4.6})
+        assert instance.call("DoStep", 0.1, 0.1, 1) == OK
+        warnings = [message.text for message in instance.messages if message.status == WARNING]
         assert len(warnings) == 1 and "outside of the schedule" in warnings[0]
-        assert own.get("schedule_at") == [4.0]
+        assert instance.get("schedule_at") == [4.0]
 
 
 def test_a_restored_state_continues_with_the_same_bits(drive):
     _, _, fmu = drive
-    with Instance(fmu) as own, Instance(fmu) as other:
-        own.start(dict(zip(["angle", "r_angle", "inertia"], course(0.0))))
+    with Instance(fmu) as instance, Instance(fmu) as other:
+        instance.start(dict(zip(["angle", "r_angle", "inertia"], course(0.0))))
         for k in range(40):
-            own.set(dict(zip(["angle", "r_angle", "inertia"], course(0.1 * k))))
-            assert own.call("DoStep", 0.1 * k, 0.1, 1) in (OK, WARNING)
-        saved, runs = serialized(own), []
-        for one in (own, other):
+            instance.set(dict(zip(["angle", "r_angle", "inertia"], course(0.1 * k))))
+            assert instance.call("DoStep", 0.1 * k, 0.1, 1) in (OK, WARNING)
+        saved, runs = serialized(instance), []
+        for one in (instance, other):
             restore(one, saved)
             one.set({"angle": 0.7, "inertia": 1.7})
             one.set_slopes(inertia=0.4)

@@ -54,35 +54,35 @@ class Schedule(ScheduledDesign):
 
     def __init__(self, text):
         super().__init__(text)
-        self.current = self.own["estimator"] == "current"
+        self.current = self.file["estimator"] == "current"
 
-    def sample(self, z, y, r, own):
+    def sample(self, z, y, r, point):
         """The next estimates and integrals, and the command."""
         x_hat, f_hat, x_i = np.split(z, [self.n, self.n + self.q])
-        x_hat, e = x_hat - own["x_op"], y - own["y_op"]
-        r = r - own["r_op"]
-        innovation = e - own["C"] @ x_hat
+        x_hat, e = x_hat - point["x_op"], y - point["y_op"]
+        r = r - point["r_op"]
+        innovation = e - point["C"] @ x_hat
         if self.current:
-            x_hat, f_hat = x_hat + own["L_x"] @ innovation, f_hat + own["L_f"] @ innovation
+            x_hat, f_hat = x_hat + point["L_x"] @ innovation, f_hat + point["L_f"] @ innovation
             innovation = 0 * innovation
         # With a direct term f_hat is the integral part of the estimate.
-        fault = f_hat + own["P_f"] @ (e - own["C"] @ x_hat) if "P_f" in own else f_hat
-        v = own["u_op"] + own["K_x"] @ x_hat + own["K_f"] @ fault
-        if "N_r" in own:
-            v = v + own["N_r"] @ r
+        fault = f_hat + point["P_f"] @ (e - point["C"] @ x_hat) if "P_f" in point else f_hat
+        v = point["u_op"] + point["K_x"] @ x_hat + point["K_f"] @ fault
+        if "N_r" in point:
+            v = v + point["N_r"] @ r
         if self.integrals:
-            v = v + own["K_i"] @ x_i
+            v = v + point["K_i"] @ x_i
         u = np.clip(v, *self.limits)
-        after = own["x_op"] + own["A"] @ x_hat + own["B"] @ (u - own["u_op"]) + own["F_a"] @ f_hat + own["L_x"] @ innovation
+        after = point["x_op"] + point["A"] @ x_hat + point["B"] @ (u - point["u_op"]) + point["F_a"] @ f_hat + point["L_x"] @ innovation
         if self.integrals:
-            x_i = x_i + PERIOD * (r - np.array(self.own["H"]) @ e)
-            x_i = x_i + (own["L_w"] @ (u - v) if "L_w" in own else 0)
-        kept = np.array(self.own.get("A_f", np.eye(self.q)))
-        return np.concatenate([after, kept @ f_hat + own["L_f"] @ innovation, x_i]), u
+            x_i = x_i + PERIOD * (r - np.array(self.file["H"]) @ e)
+            x_i = x_i + (point["L_w"] @ (u - v) if "L_w" in point else 0)
+        fault_model = np.array(self.file.get("A_f", np.eye(self.q)))
+        return np.concatenate([after, fault_model @ f_hat + point["L_f"] @ innovation, x_i]), u
 
 
 @pytest.fixture(scope="module")
-def made(aso_ftc, packed, tmp_path_factory):
+def design(aso_ftc, packed, tmp_path_factory):
     """Schedule, report and FMU of the drive after replacements in its text; without certificates if it is so wanted."""
 
     @functools.cache
@@ -102,13 +102,13 @@ def made(aso_ftc, packed, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def both(made):
-    return made(certified=True)
+def both(design):
+    return design(certified=True)
 
 
 @pytest.fixture(scope="module")
-def without(made):
-    return made(*WITHOUT, certified=True)
+def without(design):
+    return design(*WITHOUT, certified=True)
 
 
 def test_each_point_has_the_gains_of_its_own_plant(both, without):
@@ -116,36 +116,36 @@ def test_each_point_has_the_gains_of_its_own_plant(both, without):
         a, b = drive(k)
         extended = np.block([[a, np.zeros((2, 1))], [-PERIOD * np.eye(1, 2), np.eye(1)]])
         feedback = extended + np.vstack([b, [[0]]]) @ np.hstack([point["K_x"], point["K_i"]])
-        wanted = np.sort(np.exp(np.array([-1.2, -2.0, -2.5]) * PERIOD))
-        assert np.sort(np.linalg.eigvals(feedback).real) == pytest.approx(wanted, abs=1e-9)
+        expected = np.sort(np.exp(np.array([-1.2, -2.0, -2.5]) * PERIOD))
+        assert np.sort(np.linalg.eigvals(feedback).real) == pytest.approx(expected, abs=1e-9)
         values, vectors = np.linalg.eig(feedback.T)
         w = vectors[:, np.argmax(abs(values))].real
         assert point["N_r"][0][0] == pytest.approx(-PERIOD * w[2] / (w[:2] @ b[:, 0]), rel=1e-8)
         # One command: the range cancels, and L_w K_i = 1 - e^(-T / windup_time), by default of the slowest eigenvalue.
         assert point["L_w"][0][0] * point["K_i"][0][0] == pytest.approx(1 - np.exp(-1.2 * PERIOD), rel=1e-7)
         assert point["r_op"] == point["y_op"]
-        own = without[0].points[k]
-        gain = np.linalg.solve(np.eye(2) - a - b @ own["K_x"], b)[0, 0]
-        assert own["N_r"][0][0] == pytest.approx(1 / gain, rel=1e-8) and "K_i" not in own
+        feedforward = without[0].points[k]
+        gain = np.linalg.solve(np.eye(2) - a - b @ feedforward["K_x"], b)[0, 0]
+        assert feedforward["N_r"][0][0] == pytest.approx(1 / gain, rel=1e-8) and "K_i" not in feedforward
 
 
 def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0):
     """The FMU and the own recursion with the plant: angles and commands of both."""
     start = next(point for point in schedule.points if point["at"] == 1.0)
-    own = Stepped(fmu, folder, [("inertia", inertia(0)), ("r_angle", reference(0))])
+    controller = Stepped(fmu, folder, [("inertia", inertia(0)), ("r_angle", reference(0))])
     z = np.concatenate([start["x_op"], np.zeros(schedule.q + schedule.integrals)])
     x, rows = np.zeros(2), []
     a, b = plant
-    measured = len(schedule.own["measurements"])
+    measured = len(schedule.file["measurements"])
     for k in range(count):
         z, u = schedule.sample(z, x[:measured], np.array([reference(k)]), schedule.numbers(inertia(k)))
-        rows.append([x[0], own.get("torque"), u[0]])
+        rows.append([x[0], controller.get("torque"), u[0]])
         x = a @ x + b[:, 0] * (rows[-1][1] + disturbance)
         for name, value in zip(["angle", "speed"][:measured], x):
-            own.set(name, value)
-        own.set("inertia", inertia(k + 1))
-        own.set("r_angle", reference(k + 1))
-        own.step(k * PERIOD, PERIOD)
+            controller.set(name, value)
+        controller.set("inertia", inertia(k + 1))
+        controller.set("r_angle", reference(k + 1))
+        controller.step(k * PERIOD, PERIOD)
     return np.array(rows)
 
 
@@ -154,8 +154,8 @@ def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0
     [(), tuple(WITHOUT), (("sample_time", 'estimator = "prediction"\nsample_time'),)],
     ids=["both", "feedforward", "prediction"],
 )
-def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(made, change, tmp_path):
-    schedule, _, fmu = made(*change, certified=change in ((), tuple(WITHOUT)))
+def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(design, change, tmp_path):
+    schedule, _, fmu = design(*change, certified=change in ((), tuple(WITHOUT)))
     inertia = lambda k: 0.9 + 0.015 * k
     reference = lambda k: 1.0 if k % 120 < 60 else -2.0
     rows = run(schedule, fmu, tmp_path, inertia, reference, 230, drive(1))
@@ -164,9 +164,9 @@ def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(made, chan
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_fmu_follows_the_recursion_of_other_laws(made, law, tmp_path):
-    schedule, _, fmu = made(*by(law))
-    assert ("P_f" in schedule.points[0]) == (law != "learning") and ("A_f" in schedule.own) == (law == "learning")
+def test_the_fmu_follows_the_recursion_of_other_laws(design, law, tmp_path):
+    schedule, _, fmu = design(*by(law))
+    assert ("P_f" in schedule.points[0]) == (law != "learning") and ("A_f" in schedule.file) == (law == "learning")
     inertia = lambda k: 0.9 + 0.015 * k
     reference = lambda k: 1.0 if k % 120 < 60 else -2.0
     rows = run(schedule, fmu, tmp_path, inertia, reference, 230, drive(1), disturbance=0.3)
@@ -177,8 +177,8 @@ def test_the_fmu_follows_the_recursion_of_other_laws(made, law, tmp_path):
 @pytest.mark.parametrize("value", [1.0, 1.37, 2.0, 3.1, 4.0])
 def test_with_integral_action_the_reference_is_reached_at_and_between_the_points(both, value, tmp_path):
     schedule, _, fmu = both
-    own = schedule.numbers(value)
-    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (own["A"], own["B"]), disturbance=0.2)
+    matrices = schedule.numbers(value)
+    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (matrices["A"], matrices["B"]), disturbance=0.2)
     assert rows[-1, 0] == pytest.approx(0.9, abs=1e-7)
 
 
@@ -196,15 +196,15 @@ def test_the_derivatives_at_the_start_include_references_and_schedule(both, tmp_
         with Instance(fmu) as instance:
             instance.enter(point)
             instance.get(*outputs)
-            found = instance.directional(outputs, {name: 1.0})
-        assert list(found.values()) == pytest.approx((moved[0] - moved[1]) / 2e-6, rel=1e-5, abs=1e-6), name
+            derivatives = instance.directional(outputs, {name: 1.0})
+        assert list(derivatives.values()) == pytest.approx((moved[0] - moved[1]) / 2e-6, rel=1e-5, abs=1e-6), name
 
 
 def constant_error(schedule, value):
     """What is missing of a step without integral action: 1 - H C (I - A - B K_x)^-1 B N_r."""
-    own = schedule.numbers(value)
-    states = np.linalg.solve(np.eye(2) - own["A"] - own["B"] @ own["K_x"], own["B"] @ own["N_r"])
-    return 1 - (own["C"] @ states)[0, 0]
+    matrices = schedule.numbers(value)
+    states = np.linalg.solve(np.eye(2) - matrices["A"] - matrices["B"] @ matrices["K_x"], matrices["B"] @ matrices["N_r"])
+    return 1 - (matrices["C"] @ states)[0, 0]
 
 
 def test_without_it_a_warning_states_the_largest_error_between_the_points(both, without, tmp_path):
@@ -220,45 +220,45 @@ def test_without_it_a_warning_states_the_largest_error_between_the_points(both, 
         assert constant_error(schedule, value) == pytest.approx(0, abs=1e-9)
     # The FMU misses by the same part.
     value = values[errors.argmax()]
-    own = schedule.numbers(value)
-    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (own["A"], own["B"]))
-    missing = (0.9 - rows[-1, 0]) / (0.9 - own["r_op"][0])
+    matrices = schedule.numbers(value)
+    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (matrices["A"], matrices["B"]))
+    missing = (0.9 - rows[-1, 0]) / (0.9 - matrices["r_op"][0])
     assert missing == pytest.approx(constant_error(schedule, value), abs=1e-7)
 
 
 @pytest.mark.parametrize("change", [(), tuple(WITHOUT), *map(by, LAWS)], ids=["both", "feedforward", *LAWS])
-def test_the_certificate_and_the_checked_values_are_about_the_loop_with_its_integrals(made, change):
-    schedule, report, _ = made(*change, certified=True)
-    found = report["schedule"]
+def test_the_certificate_and_the_checked_values_are_about_the_loop_with_its_integrals(design, change):
+    schedule, report, _ = design(*change, certified=True)
+    certificate = report["schedule"]
 
     def loop(value):
         """The loop of interpolated plant and controller, its deviations: [x; x_hat; f_hat; x_i]."""
-        own = schedule.numbers(value)
-        point = {**own, **{name: np.zeros(np.shape(own[name])) for name in LISTS}}
+        matrices = schedule.numbers(value)
+        point = {**matrices, **{name: np.zeros(np.shape(matrices[name])) for name in LISTS}}
         schedule.limits, before = np.transpose([[-np.inf, np.inf]]), schedule.limits
         size = 2 * schedule.n + schedule.q + schedule.integrals
         columns = []
         for unit in np.eye(size):
-            after, u = schedule.sample(unit[2:], own["C"] @ unit[:2], np.zeros(1), point)
-            columns.append(np.concatenate([own["A"] @ unit[:2] + own["B"] @ u, after]))
+            after, u = schedule.sample(unit[2:], matrices["C"] @ unit[:2], np.zeros(1), point)
+            columns.append(np.concatenate([matrices["A"] @ unit[:2] + matrices["B"] @ u, after]))
         schedule.limits = before
         return np.array(columns).T
 
     values = np.linspace(1, 4, 61)
     radii = [abs(np.linalg.eigvals(loop(value))).max() for value in values]
-    assert found["worst_instability"] >= max(radii) - 1 - 1e-6 and max(radii) < 1
-    if "p" in found["any_rate"]:
-        p = np.array(found["any_rate"]["p"])
+    assert certificate["worst_instability"] >= max(radii) - 1 - 1e-6 and max(radii) < 1
+    if "p" in certificate["any_rate"]:
+        p = np.array(certificate["any_rate"]["p"])
         scale = 1 / np.sqrt(np.diag(p))
         for value in values:
             left = p - loop(value).T @ p @ loop(value)
             assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0
     else:
-        assert "p" in found["bounded_rate"], found
+        assert "p" in certificate["bounded_rate"], certificate
 
 
 @pytest.mark.parametrize("change", [(), tuple(WITHOUT), by(LAWS[0])], ids=["both", "feedforward", LAWS[0]])
-def test_a_measurement_that_schedules_moves_the_references_too(made, change):
+def test_a_measurement_that_schedules_moves_the_references_too(design, change):
     """The Jacobian of one sample of plant and controller, by differences on each side of a point."""
     changes = [
         *change,
@@ -266,7 +266,7 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
         ("at = 1.0\n", "at = 0.0\n"), ("at = 2.0\n", "at = 1.0\n"), ("at = 4.0\n", "at = 2.0\n"),
         ("operating = 0.0", "operating = 0.1"),
     ]
-    schedule, report, _ = made(*changes, certified=False)
+    schedule, report, _ = design(*changes, certified=False)
     schedule.limits = np.transpose([[-np.inf, np.inf]])
 
     def sample(k, state):
@@ -276,13 +276,13 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
         y = y_op + np.array(point["C"]) @ state[:2]
         theta = schedule.at[k] + (y - y_op)[0]
         z = state[2:] + np.concatenate([point["x_op"], np.zeros(schedule.q + schedule.integrals)])
-        own = schedule.numbers(theta)
-        after, u = schedule.sample(z, y, np.array(point["r_op"]), own)
+        matrices = schedule.numbers(theta)
+        after, u = schedule.sample(z, y, np.array(point["r_op"]), matrices)
         a, b = drive(k)
         moved = a @ state[:2] + b @ (u - point["u_op"])
         return np.concatenate([moved, after - np.concatenate([point["x_op"], np.zeros(schedule.q + schedule.integrals)])])
 
-    for k, own in enumerate(report["schedule"]["points"]):
+    for k, entry in enumerate(report["schedule"]["points"]):
         worst = -1.0
         size = 2 * schedule.n + schedule.q + schedule.integrals
         for sign in (1, -1):
@@ -295,7 +295,7 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
                 moves = sign * step * unit
                 columns.append((sample(k, moves) - sample(k, 0 * unit)) / (sign * step))
             worst = max(worst, abs(np.linalg.eigvals(np.array(columns).T)).max() - 1)
-        assert own["coupled_instability"] == pytest.approx(worst, abs=2e-5), k
+        assert entry["coupled_instability"] == pytest.approx(worst, abs=2e-5), k
 
 
 @pytest.mark.parametrize(

@@ -93,8 +93,8 @@ def test_every_call_from_the_logger_of_a_failing_call_is_an_error_and_does_nothi
         before = len(instance.messages)
         instance.keep()
         failing = "DoStep" if kind == CO_SIMULATION else "SetTime"
-        given = (0.0, nan, 1) if kind == CO_SIMULATION else (nan,)
-        assert instance.call(failing, *given) == ERROR
+        arguments = (0.0, nan, 1) if kind == CO_SIMULATION else (nan,)
+        assert instance.call(failing, *arguments) == ERROR
         assert instance.answers.pop("FreeInstance") is None
         assert instance.answers == dict.fromkeys(instance.answers, ERROR)
         assert len(instance.answers) == len(FUNCTIONS) - 1

@@ -38,9 +38,9 @@ def allowed(root):
         names = set()
         for name in functions.replace("~", "").split():
             start, brace, kind = name.partition("{")
-            names |= {start + own for own in SETS[kind[0]]} if brace else {name}
-        for own in ("ModelExchange", "CoSimulation") if interface == "both" else (interface,):
-            table.setdefault((own, state), set()).update(names)
+            names |= {start + suffix for suffix in SETS[kind[0]]} if brace else {name}
+        for interface_type in ("ModelExchange", "CoSimulation") if interface == "both" else (interface,):
+            table.setdefault((interface_type, state), set()).update(names)
     for interface, state in list(table):
         table[interface, state] |= table[interface, "FMUStateSettable"]
         if state in ("EventMode", "ContinuousTimeMode", "StepMode"):
@@ -61,17 +61,17 @@ class Life:
         first = (b"life", token, None, c_bool(False), c_bool(True))
         last = (None, self.logger)
         if exchange:
-            made = self.library.fmi3InstantiateModelExchange(*first, *last)
+            instance = self.library.fmi3InstantiateModelExchange(*first, *last)
         else:
             middle = (c_bool(event_mode), c_bool(False), None, c_size_t(0))
-            made = self.library.fmi3InstantiateCoSimulation(*first, *middle, *last, None)
-        assert made, self.messages
-        self.instance = c_void_p(made)
-        self.saved, self.kept = c_void_p(), None
+            instance = self.library.fmi3InstantiateCoSimulation(*first, *middle, *last, None)
+        assert instance, self.messages
+        self.instance = c_void_p(instance)
+        self.saved, self.snapshot = c_void_p(), None
         self.start_over()
         self.states = self.count("GetNumberOfContinuousStates") if exchange else 0
         self.indicators = self.count("GetNumberOfEventIndicators") if exchange else 0
-        self.output = next(own.valueReference for own in self.description.modelVariables if own.causality == "output")
+        self.output = next(variable.valueReference for variable in self.description.modelVariables if variable.causality == "output")
         self.count_dependencies()
 
     def start_over(self):
@@ -185,11 +185,11 @@ class Life:
         elif name == "Reset":
             self.start_over()
         elif name == "GetFMUState":
-            self.kept = (self.state, self.time, self.updated)
+            self.snapshot = (self.state, self.time, self.updated)
         elif name == "SetFMUState":
-            self.state, self.time, self.updated = self.kept
+            self.state, self.time, self.updated = self.snapshot
         elif name == "FreeFMUState":
-            self.kept = None
+            self.snapshot = None
         elif name == "DoStep":
             self.time = self.reached.value
         self.updated = name == "UpdateDiscreteStates" or self.updated and name not in steps
@@ -246,11 +246,11 @@ def test_every_sequence_of_calls_is_answered_as_the_standard_says(plant3, root, 
             every, legal, on = names(life)
             pool = chance.choices([every, legal, on or legal], [1, 6, 6])[0]
             name = chance.choice(pool)
-            if name in ("SetFMUState", "SerializedFMUStateSize") and life.kept is None:
+            if name in ("SetFMUState", "SerializedFMUStateSize") and life.snapshot is None:
                 continue
             life.call(name)
             visited.add(life.state)
         life.free()
-    own = {"ContinuousTimeMode"} if exchange else {"StepMode"}
-    assert visited >= {"Instantiated", "InitializationMode", "Terminated"} | own
+    modes = {"ContinuousTimeMode"} if exchange else {"StepMode"}
+    assert visited >= {"Instantiated", "InitializationMode", "Terminated"} | modes
     assert ("EventMode" in visited) == (exchange or event_mode)

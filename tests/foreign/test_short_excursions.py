@@ -44,9 +44,9 @@ def test_an_excursion_is_exact_if_the_middle_or_the_end_of_the_step_is_in_it(
     design["actuators"][0]["limits"] = LIMITS
     limited = redesigned(controller, design_text(design), tmp_path / "limited")
     free = [-np.inf, np.inf]
-    for size, seen in ((3e-4, True), (9e-4, True), (2e-3, False), (5e-3, False)):
+    for size, is_detected in ((3e-4, True), (9e-4, True), (2e-3, False), (5e-3, False)):
         right, without = integrated(design, LIMITS, size), integrated(design, free, size)
         assert abs(right[4] - without[4]) > 0.01, "the limit matters"
-        wanted = right if seen else without
-        assert stepped(limited, size) == pytest.approx(wanted, rel=1e-7, abs=1e-9), size
+        expected = right if is_detected else without
+        assert stepped(limited, size) == pytest.approx(expected, rel=1e-7, abs=1e-9), size
     assert stepped(limited, 5e-3)[4] - right[4] == pytest.approx(-1.23, abs=0.005)

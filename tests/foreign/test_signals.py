@@ -43,12 +43,12 @@ def of_fmpy(file, between, times):
     description = SimpleNamespace(modelVariables=[VARIABLES[between]])
     source = Input(listener, description, read_csv(file))
     table = (source.continuous or source.discrete)[0].table
-    found = []
+    rows = []
     for time in times:
         source.apply(time, after_event=True)
         _, slope = source.interpolate(time, source.t, table, between == "hold", True)
-        found.append((listener.value, np.ravel(slope)[0], source.nextEvent(time)))
-    return np.array(found)
+        rows.append((listener.value, np.ravel(slope)[0], source.nextEvent(time)))
+    return np.array(rows)
 
 
 @pytest.fixture(scope="session")
@@ -113,9 +113,9 @@ def test_values_equal_those_of_fmpy_to_the_last_bit(case, between, of_ours, tmp_
     file = tmp_path / "inputs.csv"
     write(file, *CASES[case])
     times = around(CASES[case][0])
-    expected, found = of_fmpy(file, between, times), of_ours(file, between, times)
-    wrong = expected[:, 0] != found[:, 0]
-    assert not wrong.any(), list(zip(times[wrong], expected[wrong, 0], found[wrong, 0]))[:5]
+    expected, rows = of_fmpy(file, between, times), of_ours(file, between, times)
+    wrong = expected[:, 0] != rows[:, 0]
+    assert not wrong.any(), list(zip(times[wrong], expected[wrong, 0], rows[wrong, 0]))[:5]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -124,8 +124,8 @@ def test_slopes_between_the_points_equal_those_of_fmpy(case, of_ours, tmp_path):
     write(file, *CASES[case])
     points = CASES[case][0]
     times = np.array([t for t in around(points) if not any(isclose(t, p) for p in points)])
-    expected, found = of_fmpy(file, "line", times), of_ours(file, "line", times)
-    assert (expected[:, 1] == found[:, 1]).all()
+    expected, rows = of_fmpy(file, "line", times), of_ours(file, "line", times)
+    assert (expected[:, 1] == rows[:, 1]).all()
     # At a point, ours is the slope of the line that starts there, FMPy's that of the line that ends
     # there.
     write(file, [0, 1, 2], [0, 1, 5])
@@ -143,15 +143,15 @@ def test_steps_end_at_the_events_of_fmpy(case, between, of_ours, tmp_path):
     write(file, *CASES[case])
     points, values = map(np.asarray, CASES[case])
     times = around(points)
-    expected, found = of_fmpy(file, between, times), of_ours(file, between, times)
-    assert found.shape == expected.shape
+    expected, rows = of_fmpy(file, between, times), of_ours(file, between, times)
+    assert rows.shape == expected.shape
     if between == "line":
-        assert (found[:, 2] == expected[:, 2]).all()
+        assert (rows[:, 2] == expected[:, 2]).all()
         return
     # FMPy's events at repeated times belong to all columns, so some are without a change of this
     # one.
     changes = {float(t) for t, before, after in zip(points[1:], values, values[1:]) if before != after}
-    for time, theirs, ours in zip(times, expected[:, 2], found[:, 2]):
+    for time, theirs, ours in zip(times, expected[:, 2], rows[:, 2]):
         later = [t for t in changes if t > time and not isclose(t, time)]
         assert ours == min(later, default=np.inf)
         assert theirs <= ours

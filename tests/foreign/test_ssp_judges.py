@@ -113,17 +113,17 @@ def test_fmpy_reads_elements_connectors_and_connections_of_our_ssp(package, unpa
         kinds = {each.name: each.kind for each in components[role].connectors}
         assert kinds == {name: fmu.variables[name].causality for name in kinds}
         assert set(real_outputs(fmu.description)) <= set(kinds)
-    found = {(a.parent.name, a.name, b.parent.name, b.name) for a, b in get_connections(system)}
-    assert found == set(LINKS)
+    connections = {(a.parent.name, a.name, b.parent.name, b.name) for a, b in get_connections(system)}
+    assert connections == set(LINKS)
 
 
 def test_libcosim_runs_our_ssp_with_the_bits_of_the_loop_in_fmpy(package, unpacked):
     grid = nanoseconds(OWN_STEP, OWN_COUNT)
     names, expected = held_loop(unpacked, grid, NO_SETTINGS)
-    times, found = by_libcosim(package, None, OWN_COUNT, unpacked)
+    times, results = by_libcosim(package, None, OWN_COUNT, unpacked)
     # Without a stated step it uses the step of our SSP.
     assert times == [(k + 1) * 1_000_000 / NANOSECOND for k in range(OWN_COUNT)]
-    expect_equal(names, expected, found)
+    expect_equal(names, expected, results)
 
 
 def test_ecos_runs_our_ssp_with_the_bits_of_the_loop_in_fmpy(package, unpacked):
@@ -139,22 +139,22 @@ def test_fmpy_runs_our_ssp_with_its_first_exchange_one_step_late(package, unpack
     result = simulate_ssp(str(package), stop_time=OWN_COUNT * OWN_STEP - 1e-9, step_size=OWN_STEP)
     grid = list(sums(OWN_STEP, OWN_COUNT))
     assert list(result["time"]) == [time for time, _ in grid]
-    found = np.transpose([result[f"{role}.{name}"] for role, name in columns(unpacked)])
+    values = np.transpose([result[f"{role}.{name}"] for role, name in columns(unpacked)])
     names, late = late_loop(unpacked, grid)
-    expect_equal(names, late, found)
+    expect_equal(names, late, values)
     _, right = held_loop(unpacked, grid, NO_SETTINGS)
     u = names.index(("controller", "u"))
     # The controller's first command, computed from the initial position of the pendulum, arrives
     # one step late; the pendulum has hardly moved by then.
-    assert found[0, u] == 0.0
-    assert abs(right[0, u]) > 1000.0 and found[1, u] == pytest.approx(right[0, u], rel=1e-4)
+    assert values[0, u] == 0.0
+    assert abs(right[0, u]) > 1000.0 and values[1, u] == pytest.approx(right[0, u], rel=1e-4)
 
 
 def test_libcosim_runs_a_structure_of_its_own_style(packed, unpacked, tmp_path):
     path = libcosim_style(packed, tmp_path)
     names, expected = held_loop(unpacked, nanoseconds(STEP, COUNT))
-    _, found = by_libcosim(path, None, COUNT, unpacked)
-    expect_equal(names, expected, found)
+    _, results = by_libcosim(path, None, COUNT, unpacked)
+    expect_equal(names, expected, results)
 
 
 def test_ecos_runs_a_structure_of_its_own_style(packed, unpacked, tmp_path):
@@ -169,5 +169,5 @@ def test_libcosim_runs_a_structure_in_the_style_of_ecos_if_both_read_it_alike(
     assert set(SETTINGS) == set(unpacked)
     path = ecos_style(packed, tmp_path)
     names, expected = held_loop(unpacked, nanoseconds(STEP, 200))
-    _, found = by_libcosim(path, STEP, 200, unpacked)
-    expect_equal(names, expected, found)
+    _, results = by_libcosim(path, STEP, 200, unpacked)
+    expect_equal(names, expected, results)

@@ -50,17 +50,17 @@ def test_structures_of_every_style_run_with_the_bits_of_the_loop_in_fmpy(
     names, expected = held_loop(unpacked, grid(STEP, COUNT))
     elements = {"plant": plant, "controller": "controller"}
     columns = [f"{elements[role]}.{name}" for role, name in names]
-    times, found = run(style(packed, tmp_path), STEP, COUNT * STEP, columns)
+    times, values = run(style(packed, tmp_path), STEP, COUNT * STEP, columns)
     assert list(times) == [k * STEP for k in range(COUNT + 1)]
-    expect_equal(names, expected, found[1:])
+    expect_equal(names, expected, values[1:])
 
 
 def test_our_ssp_runs_in_our_master_with_the_bits_of_the_loop_in_fmpy(run, root, unpacked):
     step = 1e-3
     names, expected = held_loop(unpacked, grid(step, COUNT), NO_SETTINGS)
     columns = [f"{role}.{name}" for role, name in names]
-    _, found = run(root / "dist" / "InvertedPendulum.ssp", step, COUNT * step, columns)
-    expect_equal(names, expected, found[1:])
+    _, values = run(root / "dist" / "InvertedPendulum.ssp", step, COUNT * step, columns)
+    expect_equal(names, expected, values[1:])
 
 
 def test_a_structure_that_cannot_be_read_is_refused_with_its_position(aso_ftc, tmp_path):
@@ -73,12 +73,12 @@ def test_a_structure_that_cannot_be_read_is_refused_with_its_position(aso_ftc, t
 
 def for_windows(data):
     """The FMU in `data`, with its library for Linux in the folder for Windows."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(data)) as fmu, zipfile.ZipFile(made, "w") as other:
+    archive = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as fmu, zipfile.ZipFile(archive, "w") as other:
         for name in fmu.namelist():
             target = name.replace("binaries/linux64", "binaries/win64").replace(".so", ".dll")
             other.writestr(target, fmu.read(name))
-    return made.getvalue()
+    return archive.getvalue()
 
 
 def test_an_fmu_without_a_library_for_this_platform_is_refused_with_the_platforms_it_has(

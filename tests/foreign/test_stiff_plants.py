@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from design_oracle import closed_loop, commands, made
+from design_oracle import closed_loop, commands, design_and_report
 
 NN6 = np.zeros((9, 9))
 NN6[[0, 2, 5, 7], [1, 3, 6, 8]] = 1
@@ -70,19 +70,19 @@ def designed(aso_ftc, folder, name, sampled):
     text += f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * b.shape[1]}\n"
     text += f"observer.W = {[1.0] * len(a) + [100.0]}\nobserver.V = {[0.01] * len(c)}\n"
     text += '[[faults]]\nname = "f"\nactuator = "u1"\nbound = 1.0\nrate_bound = 1.0\n'
-    own, report = made(aso_ftc, folder, text)
-    assert own is not None, report
-    return (a, b, c), report, own
+    matrices, report = design_and_report(aso_ftc, folder, text)
+    assert matrices is not None, report
+    return (a, b, c), report, matrices
 
 
-def peak_of_s(own, near):
+def peak_of_s(matrices, near):
     """The largest singular value of S, from a signal that is added to the commands to the actuators, on a grid around `near`."""
-    a, *_ = closed_loop(own)
-    b = np.vstack([own.B, np.zeros((own.n + own.q, own.B.shape[1]))])
-    c = commands(own)
+    a, *_ = closed_loop(matrices)
+    b = np.vstack([matrices.B, np.zeros((matrices.n + matrices.q, matrices.B.shape[1]))])
+    c = commands(matrices)
 
     def largest(w):
-        point = 1j * w if own.period is None else np.exp(1j * w * own.period)
+        point = 1j * w if matrices.period is None else np.exp(1j * w * matrices.period)
         return np.linalg.norm(np.eye(len(c)) + c @ np.linalg.solve(point * np.eye(len(a)) - a, b), 2)
 
     return max(largest(w) for w in near * np.geomspace(0.5, 2, 2001))
@@ -91,23 +91,23 @@ def peak_of_s(own, near):
 @pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled"])
 @pytest.mark.parametrize("name", PLANTS)
 def test_stiff_plants_are_designed_and_examined(aso_ftc, tmp_path, name, sampled):
-    (a, b, c), report, own = designed(aso_ftc, tmp_path, name, sampled)
+    (a, b, c), report, matrices = designed(aso_ftc, tmp_path, name, sampled)
     if not sampled:
         p = solve_continuous_are(a, b, np.eye(len(a)), np.eye(b.shape[1]))
-        assert np.abs(own.K_x + b.T @ p).max() < 1e-7 * np.abs(own.K_x).max()
-        a_0, c_0, gain = own.augmented
+        assert np.abs(matrices.K_x + b.T @ p).max() < 1e-7 * np.abs(matrices.K_x).max()
+        a_0, c_0, gain = matrices.augmented
         weights = np.diag([1.0] * len(a) + [100.0]), 0.01 * np.eye(len(c))
         p = solve_continuous_are(a_0.T, c_0.T, *weights)
         assert np.abs(gain - p @ c_0.T / 0.01).max() < 1e-6 * np.abs(gain).max()
     at_commands = report["robustness"]["points"][0]
-    expected = peak_of_s(own, at_commands["s_frequency"])
+    expected = peak_of_s(matrices, at_commands["s_frequency"])
     assert at_commands["s_peak"] == pytest.approx(expected, rel=1e-3)
 
 
 def test_bounds_of_a_slow_sampled_loop_are_sums_of_its_impulse_response(aso_ftc, tmp_path):
     """The fault may change 16 times in a sample: more than at the samples, by no more than a jump between them."""
-    _, report, own = designed(aso_ftc, tmp_path, "AC4, missile", sampled=True)
-    a, b, c, d = closed_loop(own)
+    _, report, matrices = designed(aso_ftc, tmp_path, "AC4, missile", sampled=True)
+    a, b, c, d = closed_loop(matrices)
     sums, state = np.abs(d), b
     for _ in range(200_000):
         sums, state = sums + np.abs(c @ state), a @ state
@@ -118,10 +118,10 @@ def test_bounds_of_a_slow_sampled_loop_are_sums_of_its_impulse_response(aso_ftc,
 
 def test_a_design_whose_responses_overflow_is_written_and_red(aso_ftc, tmp_path):
     """BDT1, a binary distillation tower: the observer that is asked for has eigenvectors with a condition of 1e16."""
-    own = [-0.014, -0.0138, -0.0141, -0.0158, -0.0312, -0.0352, -0.0422, -0.0482, -0.0572, -0.0483, -0.0185]
+    diagonal = [-0.014, -0.0138, -0.0141, -0.0158, -0.0312, -0.0352, -0.0422, -0.0482, -0.0572, -0.0483, -0.0185]
     above = [0.0043, 0.0046, 0.0063, 0.011, 0.015, 0.022, 0.028, 0.037, 0.042, 0.0005]
     below = [0.0095, 0.0095, 0.0095, 0.0095, 0.0202, 0.0202, 0.0202, 0.0202, 0.0202, 0.0255]
-    a = np.diag(own) + np.diag(above, 1) + np.diag(below, -1)
+    a = np.diag(diagonal) + np.diag(above, 1) + np.diag(below, -1)
     a[[1, 2, 7, 8, 10], [10, 10, 10, 10, 0]] = 0.0005, 0.0002, 0.0002, 0.0005, 0.0255
     b = 1e-6 * np.array(
         [

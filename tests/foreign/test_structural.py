@@ -41,29 +41,29 @@ def fmus(aso_ftc, root, tmp_path_factory):
 def references(fmus):
     """Value references of FMI 3.0 by name."""
     description = fmpy.read_model_description(str(fmus[3]))
-    return {own.name: own.valueReference for own in description.modelVariables}
+    return {variable.name: variable.valueReference for variable in description.modelVariables}
 
 
 def instance(kind, fmus):
     """An instance of FMI 3.0."""
     description = fmpy.read_model_description(str(fmus[3]))
     folder = fmpy.extract(str(fmus[3]))
-    own = kind(guid=description.guid, unzipDirectory=folder, modelIdentifier="StateSpace", instanceName="system")
-    own.instantiate()
-    return own
+    fmu = kind(guid=description.guid, unzipDirectory=folder, modelIdentifier="StateSpace", instanceName="system")
+    fmu.instantiate()
+    return fmu
 
 
-def resize(own, references, n, m, p):
+def resize(fmu, references, n, m, p):
     """Sets the extents in configuration mode or in reconfiguration mode."""
-    own.enterConfigurationMode()
-    own.setUInt64([references[name] for name in "nmp"], [n, m, p])
-    own.exitConfigurationMode()
+    fmu.enterConfigurationMode()
+    fmu.setUInt64([references[name] for name in "nmp"], [n, m, p])
+    fmu.exitConfigurationMode()
 
 
-def fill(own, references, **more):
+def fill(fmu, references, **more):
     """Sets all matrices and the inputs."""
     for name, values in ({"A": A, "B": B, "C": C, "D": D, "u": U} | more).items():
-        own.setFloat64([references[name]], values.flatten().tolist())
+        fmu.setFloat64([references[name]], values.flatten().tolist())
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -79,52 +79,52 @@ def test_fmpy_simulates_the_extents_of_the_description_in_both_versions(fmus, ve
 
 
 def test_after_configuration_mode_the_arrays_have_the_new_extents(fmus, references):
-    own = instance(FMU3Slave, fmus)
-    resize(own, references, 3, 2, 2)
-    fill(own, references, x=X0)
-    assert list(own.getFloat64([references["A"]], 9)) == A.flatten().tolist()
-    own.enterInitializationMode()
-    own.exitInitializationMode()
-    own.doStep(currentCommunicationPoint=0, communicationStepSize=2)
-    y = list(own.getFloat64([references["y"]], 2))
+    fmu = instance(FMU3Slave, fmus)
+    resize(fmu, references, 3, 2, 2)
+    fill(fmu, references, x=X0)
+    assert list(fmu.getFloat64([references["A"]], 9)) == A.flatten().tolist()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(currentCommunicationPoint=0, communicationStepSize=2)
+    y = list(fmu.getFloat64([references["y"]], 2))
     assert y == pytest.approx(exact(2).tolist(), abs=1e-6)
-    own.terminate()
-    own.freeInstance()
+    fmu.terminate()
+    fmu.freeInstance()
 
 
 def test_in_reconfiguration_mode_the_arrays_change_between_two_steps(fmus, references):
-    own = instance(FMU3Slave, fmus)
-    own.enterInitializationMode()
-    own.exitInitializationMode()
-    own.doStep(currentCommunicationPoint=0, communicationStepSize=1)
-    state = own.getFMUState()
-    resize(own, references, 3, 2, 2)
-    fill(own, references)
-    own.doStep(currentCommunicationPoint=1, communicationStepSize=2)
+    fmu = instance(FMU3Slave, fmus)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(currentCommunicationPoint=0, communicationStepSize=1)
+    state = fmu.getFMUState()
+    resize(fmu, references, 3, 2, 2)
+    fill(fmu, references)
+    fmu.doStep(currentCommunicationPoint=1, communicationStepSize=2)
     # The states of the oscillator at 1 s stay, and the new one is zero.
     expected = exact(2, [math.cos(1), -math.sin(1), 0.0])
-    assert list(own.getFloat64([references["y"]], 2)) == pytest.approx(expected.tolist(), abs=1e-5)
+    assert list(fmu.getFloat64([references["y"]], 2)) == pytest.approx(expected.tolist(), abs=1e-5)
     # The saved state has the extents of before.
-    own.setFMUState(state)
-    assert list(own.getFloat64([references["y"]], 1)) == pytest.approx([math.cos(1)], abs=1e-5)
-    own.freeFMUState(state)
-    own.reset()
-    resize(own, references, 1, 1, 1)
-    assert list(own.getFloat64([references["A"]], 1)) == [0.0]
-    own.freeInstance()
+    fmu.setFMUState(state)
+    assert list(fmu.getFloat64([references["y"]], 1)) == pytest.approx([math.cos(1)], abs=1e-5)
+    fmu.freeFMUState(state)
+    fmu.reset()
+    resize(fmu, references, 1, 1, 1)
+    assert list(fmu.getFloat64([references["A"]], 1)) == [0.0]
+    fmu.freeInstance()
 
 
 def test_in_model_exchange_the_number_of_states_follows(fmus, references):
-    own = instance(FMU3Model, fmus)
-    resize(own, references, 3, 2, 2)
-    assert own.getNumberOfContinuousStates() == 3
-    fill(own, references, x=X0)
-    own.enterInitializationMode()
-    own.exitInitializationMode()
-    own.enterContinuousTimeMode()
-    assert list(own.getFloat64([references["der(x)"]], 3)) == pytest.approx((A @ X0 + B @ U).tolist())
-    own.terminate()
-    own.freeInstance()
+    fmu = instance(FMU3Model, fmus)
+    resize(fmu, references, 3, 2, 2)
+    assert fmu.getNumberOfContinuousStates() == 3
+    fill(fmu, references, x=X0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.enterContinuousTimeMode()
+    assert list(fmu.getFloat64([references["der(x)"]], 3)) == pytest.approx((A @ X0 + B @ U).tolist())
+    fmu.terminate()
+    fmu.freeInstance()
 
 
 def test_our_master_sets_the_extents_and_gets_the_exact_solution(fmus, aso_ftc, tmp_path):
@@ -136,15 +136,15 @@ def test_our_master_sets_the_extents_and_gets_the_exact_solution(fmus, aso_ftc, 
     assert done.returncode == 0, done.stderr
     with open(tmp_path / "results.csv", newline="") as file:
         last = list(csv.DictReader(file))[-1]
-    found = [float(last[f"s.y[{k}]"]) for k in (1, 2)]
-    assert found == pytest.approx(exact(2).tolist(), abs=1e-5)
+    outputs = [float(last[f"s.y[{k}]"]) for k in (1, 2)]
+    assert outputs == pytest.approx(exact(2).tolist(), abs=1e-5)
 
 
 def test_an_extent_out_of_range_or_outside_of_configuration_mode_is_refused(fmus, references, aso_ftc, tmp_path):
-    own = instance(FMU3Slave, fmus)
+    fmu = instance(FMU3Slave, fmus)
     with pytest.raises(Exception, match="setUInt64|fmi3SetUInt64"):
-        own.setUInt64([references["n"]], [3])
-    own.freeInstance()
+        fmu.setUInt64([references["n"]], [3])
+    fmu.freeInstance()
     run = ["run", "--fmu", f"s={fmus[3]}", "--stop-time", "1", "--step", "0.1", "--out", tmp_path]
     for value in ("0", "101"):
         done = aso_ftc(*run, "--set", f"s.n={value}")

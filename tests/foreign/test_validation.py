@@ -57,7 +57,7 @@ def test_the_description_follows_the_text_of_the_standard(packed, role):
 def test_exactly_the_required_initial_unknowns_are_listed_in_ascending_order(packed, role):
     model = etree.fromstring(zipfile.ZipFile(packed[role]).read("modelDescription.xml"))
     variables = model.find("ModelVariables")
-    wanted = {
+    required = {
         index
         for index, variable in enumerate(variables, start=1)
         if variable.get("causality") == "calculatedParameter"
@@ -66,7 +66,7 @@ def test_exactly_the_required_initial_unknowns_are_listed_in_ascending_order(pac
         or variable.find("Real[@derivative]") is not None
     }
     listed = [int(unknown.get("index")) for unknown in model.find("ModelStructure/InitialUnknowns")]
-    assert listed == sorted(wanted)
+    assert listed == sorted(required)
     for unknown in model.findall("ModelStructure//Unknown"):
         dependencies = [int(index) for index in unknown.get("dependencies").split()]
         assert dependencies == sorted(set(dependencies))

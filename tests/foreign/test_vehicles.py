@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from design_oracle import made
+from design_oracle import design_and_report
 
 COUNT, PERIOD = 12, 0.3
 
@@ -19,27 +19,27 @@ def vehicles(count):
     return a, b, c
 
 
-def loop_gain(own, frequency):
+def loop_gain(design, frequency):
     """L at the commands: u = -L u of the loop that is opened there."""
-    n, z = own.n, np.exp(1j * frequency * own.period)
-    a_0, c_0, gain = own.augmented
+    n, z = design.n, np.exp(1j * frequency * design.period)
+    a_0, c_0, gain = design.augmented
     # The states of `augmented` are x and -f.
-    feedback, b_0 = np.hstack([own.K_x, -own.K_f]), np.vstack([own.B, np.zeros((own.q, own.B.shape[1]))])
-    kept = np.eye(len(a_0)) - gain @ c_0
+    feedback, b_0 = np.hstack([design.K_x, -design.K_f]), np.vstack([design.B, np.zeros((design.q, design.B.shape[1]))])
+    correction = np.eye(len(a_0)) - gain @ c_0
     # xi[k+1] = (A_0 + B_0 K) ((I - L C_0) xi + L y),  u = K ((I - L C_0) xi + L y)
     moved = a_0 + b_0 @ feedback
-    controller = feedback @ kept @ np.linalg.solve(z * np.eye(len(a_0)) - moved @ kept, moved @ gain) + feedback @ gain
-    return -controller @ own.C @ np.linalg.solve(z * np.eye(n) - own.A, own.B)
+    controller = feedback @ correction @ np.linalg.solve(z * np.eye(len(a_0)) - moved @ correction, moved @ gain) + feedback @ gain
+    return -controller @ design.C @ np.linalg.solve(z * np.eye(n) - design.A, design.B)
 
 
-def delay_margin(own):
+def delay_margin(design):
     """The least delay at which an eigenvalue of -L e^(-j w tau) is 1, on a fine grid; exact for whole samples."""
-    found = np.inf
-    for frequency in np.geomspace(1e-4, 1, 20001) * np.pi / own.period:
-        values = np.linalg.eigvals(loop_gain(own, frequency))
+    margin = np.inf
+    for frequency in np.geomspace(1e-4, 1, 20001) * np.pi / design.period:
+        values = np.linalg.eigvals(loop_gain(design, frequency))
         for value in values[np.abs(np.abs(values) - 1) < 2e-3]:
-            found = min(found, np.angle(-value) % (2 * np.pi) / frequency)
-    return found
+            margin = min(margin, np.angle(-value) % (2 * np.pi) / frequency)
+    return margin
 
 
 def test_the_delay_margin_of_a_string_of_vehicles_is_that_of_the_loop_gain(aso_ftc, tmp_path):
@@ -48,8 +48,8 @@ def test_the_delay_margin_of_a_string_of_vehicles_is_that_of_the_loop_gain(aso_f
     weights = f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * COUNT}\nobserver.W = {[1.0] * len(a) + [100.0] * (COUNT - 1)}\n"
     weights += f"observer.V = {[0.01] * (COUNT - 1)}\n"
     text = f"sample_time = {PERIOD}\nA = {a.tolist()}\nB = {b.tolist()}\nC = {c.tolist()}\n{weights}{faults}"
-    own, found = made(aso_ftc, tmp_path, text)
-    assert own is not None, found
-    stated = found["robustness"]["delay_margin"]
+    design, report = design_and_report(aso_ftc, tmp_path, text)
+    assert design is not None, report
+    stated = report["robustness"]["delay_margin"]
     # Below one sample the stated margin is that of the continuous plant: it is compared in whole samples.
-    assert stated == pytest.approx(delay_margin(own), rel=1e-2)
+    assert stated == pytest.approx(delay_margin(design), rel=1e-2)

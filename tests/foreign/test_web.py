@@ -95,12 +95,12 @@ def of_the_command(aso_ftc, page, folder, more=""):
     return rows(results.read_text(encoding="utf-8"))
 
 
-def equal(own, theirs):
+def equal(results, theirs):
     """Every row of the page is a row of the command, bit for bit."""
-    at = np.searchsorted(theirs["time"], own["time"])
-    assert len(own["time"]) > 100
+    at = np.searchsorted(theirs["time"], results["time"])
+    assert len(results["time"]) > 100
     for name in ["time", *NAMES]:
-        assert np.array_equal(own[name], theirs[name][at]), name
+        assert np.array_equal(results[name], theirs[name][at]), name
 
 
 def amplitude(values):
@@ -115,9 +115,9 @@ def claims(page):
 
 def test_100_s_of_the_page_are_those_of_the_command_bit_for_bit(aso_ftc, open_page, tmp_path):
     page = open_page()
-    own = rows(run_to_the_end(page))
-    assert len(own["time"]) == 10001 and own["time"][-1] == 100
-    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    results = rows(run_to_the_end(page))
+    assert len(results["time"]) == 10001 and results["time"][-1] == 100
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
     print("100 s were computed in", page.evaluate("document.body.dataset.spent"), "ms")
 
 
@@ -126,14 +126,14 @@ def test_the_claims_are_those_of_the_readme_in_its_words_and_units(open_page):
     table = [[cell.strip() for cell in line.strip("|").split("|")] for line in readme.splitlines()[1:6]]
     page = open_page("#monitor=false")
     assert claims(page) == ["–"] * 5
-    own = rows(run_to_the_end(page))
+    results = rows(run_to_the_end(page))
     page.until("!document.querySelector('#claims').textContent.includes('–')", limit=10)
     shown = page.evaluate("[...document.querySelectorAll('#claims tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent))")
     assert [[claim.replace("−", "-"), paper] for claim, paper, _ in shown] == [row[:2] for row in table]
     assert [here.removesuffix(" ✓ holds") for *_, here in shown] == [row[2] for row in table]
-    late, early = own["time"] >= 60, (own["time"] >= 10) & (own["time"] <= 40)
-    x, theta = own["plant.x_p"], own["plant.theta"]
-    rms = np.sqrt(np.mean((own["plant.f_fric"] - own["controller.f_hat"])[late] ** 2))
+    late, early = results["time"] >= 60, (results["time"] >= 10) & (results["time"] <= 40)
+    x, theta = results["plant.x_p"], results["plant.theta"]
+    rms = np.sqrt(np.mean((results["plant.f_fric"] - results["controller.f_hat"])[late] ** 2))
     numbers = [amplitude(x[early]), amplitude(theta[early]), 1e3 * amplitude(x[late]), 1e3 * amplitude(theta[late]), rms]
     assert [float(here.split()[0]) for *_, here in shown] == pytest.approx(numbers, rel=0.02)
     assert "0.962 mm" in page.evaluate("document.getElementById('summary').textContent")
@@ -165,9 +165,9 @@ def gains_of(page):
 def test_faults_noise_and_an_observer_designed_in_the_page_are_those_of_the_command(aso_ftc, open_page, tmp_path):
     link = "#stop=12&t_on=4&F_s=28&M=3.3&eigenvalues=-900+-1000+-1100+-1200+-1300&noise_theta=1e-6&bias_x=0.001&gain_u=0.95&from=6"
     page = open_page(link)
-    own = rows(run_to_the_end(page))
+    results = rows(run_to_the_end(page))
     assert np.allclose(gains_of(page), [-1300, -1200, -1100, -1000, -900], rtol=1e-6)
-    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
 
 
 @pytest.mark.parametrize("text", ["-900+200i -900-200i -1100 -1200 -1300", "-900±200i,-1100,-1200,-1300"])
@@ -179,15 +179,15 @@ def test_the_observer_may_have_complex_eigenvalues(open_page, text):
 
 def test_the_time_of_the_faults_acts_on_noise_and_delay_too(aso_ftc, open_page, tmp_path):
     page = open_page("#stop=4&t_on=1&from=2&noise_x=1e-6&delay_theta=0.0005")
-    own = rows(run_to_the_end(page))
+    results = rows(run_to_the_end(page))
     faults = tomllib.loads(page.evaluate("document.getElementById('native').textContent"))["scenario"]["fault"]
     assert [next(iter(fault[kind] for kind in fault if kind != "connection"))["from"] for fault in faults] == [2, 2]
-    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
     open_page("#stop=4&t_on=1")
     without = rows(run_to_the_end(page))
-    early = own["time"] <= 2
-    assert np.array_equal(own["controller.u"][early], without["controller.u"][early])
-    assert not np.array_equal(own["controller.u"], without["controller.u"])
+    early = results["time"] <= 2
+    assert np.array_equal(results["controller.u"][early], without["controller.u"][early])
+    assert not np.array_equal(results["controller.u"], without["controller.u"])
 
 
 def test_the_dashed_cart_is_the_run_of_the_command_without_compensation(aso_ftc, open_page, tmp_path):
@@ -206,16 +206,16 @@ def test_changes_during_the_run_are_in_the_system_toml_and_in_the_link(aso_ftc, 
     state(page, "F_c", "15")
     click(page, "set-compensate")
     page.until(f"{NEWEST} > 3")
-    own = rows(at_the_end(page))
+    results = rows(at_the_end(page))
     text = page.evaluate("document.getElementById('native').textContent")
     assert text.count("[[scenario.set]]") == 2 and "plant.F_c" in text
-    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
     link = page.evaluate("document.getElementById('link').getAttribute('href')")
     open_page(link)
     assert page.evaluate("document.getElementById('set-F_c').value") == "25"
     assert page.evaluate("document.getElementById('link').getAttribute('href')") == link, "before the changes are due"
     again = rows(run_to_the_end(page))
-    assert all(np.array_equal(own[name], again[name]) for name in own)
+    assert all(np.array_equal(results[name], again[name]) for name in results)
     assert page.evaluate("document.getElementById('set-F_c').value") == "15"
     assert page.evaluate("document.getElementById('native').textContent") == text
     assert page.evaluate("document.getElementById('link').getAttribute('href')") == link
@@ -238,11 +238,11 @@ def test_a_change_at_the_time_of_a_row_after_a_step_back_is_that_of_the_command(
     click(page, "back")
     page.until(f"{NEWEST} < 0.505")
     state(page, "F_c", "15")
-    own = rows(run_to_the_end(page))
+    results = rows(run_to_the_end(page))
     text = page.evaluate("document.getElementById('native').textContent")
     assert text.count("[[scenario.set]]") == 1 and "at = 0.5\n" in text
-    assert len(own["time"]) == 201
-    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    assert len(results["time"]) == 201
+    equal(results, of_the_command(aso_ftc, page, tmp_path))
 
 
 def test_every_control_answers(open_page):
@@ -373,8 +373,8 @@ def test_a_change_that_the_plant_refuses_is_refused_beforehand_and_the_run_goes_
     page.until(f"{NEWEST} > 1")
     state(page, "F_s", "0")
     assert "F_s at least as large as F_c" in refusal(page, "F_s")
-    own = rows(at_the_end(page))
-    assert own["time"][-1] == 4
+    results = rows(at_the_end(page))
+    assert results["time"][-1] == 4
     assert "[[scenario.set]]" not in page.evaluate("document.getElementById('native').textContent")
 
 
@@ -493,10 +493,10 @@ def test_the_tour_has_five_sentences_and_keys_move_the_cursor_and_switch_curves(
         float(text)
         for text in page.evaluate("[...document.querySelectorAll('#motion .u-value')].slice(0, 2).map((cell) => cell.textContent)")
     )
-    own = rows(page.evaluate("window.paper.csv()"))
-    k = np.argmin(abs(own["time"] - at))
-    assert own["time"][k] == pytest.approx(at, rel=1e-5)
-    assert value == pytest.approx(1e3 * own["plant.x_p"][k], rel=1e-5)
+    results = rows(page.evaluate("window.paper.csv()"))
+    k = np.argmin(abs(results["time"] - at))
+    assert results["time"][k] == pytest.approx(at, rel=1e-5)
+    assert value == pytest.approx(1e3 * results["plant.x_p"][k], rel=1e-5)
     press("ArrowRight")
     assert float(page.evaluate("document.querySelector('#motion .u-value').textContent")) > at
     page.evaluate("document.querySelector('#motion .u-series + .u-series .u-label').focus()")
@@ -507,10 +507,10 @@ def test_the_tour_has_five_sentences_and_keys_move_the_cursor_and_switch_curves(
 
 def test_the_value_under_the_cursor_is_that_of_the_row_at_its_time(open_page):
     page = open_page("#stop=60")
-    own = rows(run_to_the_end(page))
+    results = rows(run_to_the_end(page))
     page.evaluate("new Promise((done) => setTimeout(done, 500))")
     places = page.places("#force .u-over", [k / 101 for k in range(1, 101)])
-    times = own["time"]
+    times = results["time"]
     for x, y in places:
         page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         page.evaluate("new Promise((done) => requestAnimationFrame(done))")
@@ -519,7 +519,7 @@ def test_the_value_under_the_cursor_is_that_of_the_row_at_its_time(open_page):
         )
         k = np.argmin(abs(times - at))
         assert times[k] == pytest.approx(at, rel=1e-5)
-        assert [force, estimate] == pytest.approx([own["plant.f_fric"][k], own["controller.f_hat"][k]], rel=1e-5)
+        assert [force, estimate] == pytest.approx([results["plant.f_fric"][k], results["controller.f_hat"][k]], rel=1e-5)
 
 
 def test_two_fingers_zoom_the_figures_until_a_double_tap_and_one_finger_scrolls_the_page(open_page):

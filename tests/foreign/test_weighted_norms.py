@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eig
 
-from design_oracle import made
+from design_oracle import design_and_report
 from test_norm_designs import A_0, C_0, NOISE, PLANT, RATES, A, B, C
 
 SWEEP = np.logspace(-5, 5, 3000)
@@ -55,12 +55,12 @@ def observer_norm(gain, weight_of_noise, weight_of_error):
 def least_filter(a, b, c, d, e):
     """The least norm of a filter of x' = a x + b w, y = c x + d w for e x: bisection over its Riccati equation."""
     inverse = d.T @ np.linalg.inv(d @ d.T)
-    own, process = a - b @ inverse @ c, b @ (np.eye(b.shape[1]) - inverse @ d) @ b.T
+    dynamics, process = a - b @ inverse @ c, b @ (np.eye(b.shape[1]) - inverse @ d) @ b.T
     n, (low, high) = len(a), (1e-4, 1e4)
     while high > low * 1.0002:
         gamma = np.sqrt(low * high)
         quadratic = e.T @ e / gamma**2 - c.T @ np.linalg.inv(d @ d.T) @ c
-        values, vectors = eig(np.block([[own.T, quadratic], [-process, -own]]))
+        values, vectors = eig(np.block([[dynamics.T, quadratic], [-process, -dynamics]]))
         stable = vectors[:, values.real < -1e-9]
         exists = stable.shape[1] == n
         if exists:
@@ -75,23 +75,23 @@ def designed(aso_ftc, tmp_path):
     """Designs a plant file; returns the matrices of the design file and the report."""
 
     def design(text):
-        own, report = made(aso_ftc, tmp_path, text)
-        assert own is not None, report
-        return own, report
+        matrices, report = design_and_report(aso_ftc, tmp_path, text)
+        assert matrices is not None, report
+        return matrices, report
 
     return design
 
 
-def observer_gain(own):
-    return np.vstack([own.L_x, -own.L_f])
+def observer_gain(design):
+    return np.vstack([design.L_x, -design.L_f])
 
 
 def test_the_norm_of_an_observer_with_weights_is_that_of_a_frequency_sweep(designed):
-    own, report = designed(PLANT + OBSERVER)
+    design, report = designed(PLANT + OBSERVER)
     norm = report["observer"]["norm"]
-    expected = observer_norm(observer_gain(own), formula(COLOURED, SWEEP), formula(LOW, SWEEP))
+    expected = observer_norm(observer_gain(design), formula(COLOURED, SWEEP), formula(LOW, SWEEP))
     assert norm["norm"] == pytest.approx(expected, rel=1e-3)
-    assert norm["unweighted"] == pytest.approx(peak(response(1j * SWEEP, *unweighted(observer_gain(own)))), rel=2e-3)
+    assert norm["unweighted"] == pytest.approx(peak(response(1j * SWEEP, *unweighted(observer_gain(design)))), rel=2e-3)
     assert norm["gain"] < 1000
     assert norm["certified"] is None or norm["norm"] < 1.001 * norm["certified"] < 1.02 * norm["norm"]
 
@@ -141,13 +141,13 @@ def test_the_norm_of_a_sampled_observer_with_weights_is_that_of_a_frequency_swee
     period = 0.5
     feedback = "feedback.region = { decay = 0.03 }\n"
     text = PLANT[: PLANT.index("feedback.region")] + feedback + f"sample_time = {period}\n" + OBSERVER
-    own, report = designed(text)
-    a_0, c_0, gain = own.augmented
+    design, report = designed(text)
+    a_0, c_0, gain = design.augmented
     rates = np.vstack([np.zeros((4, 2)), period * np.eye(2)])
     frequencies = np.append(np.logspace(-5, np.log10(0.9999 * np.pi / period), 3000), 1e-7)
-    seen = c_0 @ a_0
+    output = c_0 @ a_0
     entering = np.hstack([rates - gain @ c_0 @ rates, -gain])
-    transfer = response(np.exp(1j * frequencies * period), a_0 - gain @ seen, entering, RATES.T)
+    transfer = response(np.exp(1j * frequencies * period), a_0 - gain @ output, entering, RATES.T)
     transfer[:, :, 2:] *= formula(COLOURED, frequencies, period)[:, None, None]
     transfer[:, 0] *= formula(LOW, frequencies, period)[:, None]
     norm = report["observer"]["norm"]
@@ -166,8 +166,8 @@ def test_a_weight_of_a_command_that_rises_with_frequency_slows_the_feedback_down
     text += "[-0.2, -0.22, -0.24, -0.26, -0.28, -0.3]\nfeedback.region = { disc = { center = -3, radius = 2.999 } }\n"
     norms, gains = [], []
     for command in ("1.0", toml(*rising)):
-        own, report = designed(text + f"feedback.weights = {{ y1 = 20.0, u1 = {command} }}\n")
-        k = own.K_x
+        design, report = designed(text + f"feedback.weights = {{ y1 = 20.0, u1 = {command} }}\n")
+        k = design.K_x
         transfer = response(1j * SWEEP, A + B @ k, B, np.vstack([np.diag([20.0, 1.0]) @ C, k]))
         if command != "1.0":
             transfer[:, 2] *= formula(rising, SWEEP)[:, None]
@@ -193,8 +193,8 @@ def test_a_weight_by_table_has_the_stated_deviation(designed):
     _, report = designed(text + f"observer.weights = {{ f_u2 = {{ table = {table}, order = 2 }} }}\n")
     (weight,) = report["observer"]["norm"]["weights"]
     frequencies, magnitudes = np.array(table).T
-    found = np.abs(np.polyval(weight["numerator"], 1j * frequencies) / np.polyval(weight["denominator"], 1j * frequencies))
-    deviation = np.exp(np.abs(np.log(found / magnitudes)).max())
+    fit = np.abs(np.polyval(weight["numerator"], 1j * frequencies) / np.polyval(weight["denominator"], 1j * frequencies))
+    deviation = np.exp(np.abs(np.log(fit / magnitudes)).max())
     assert deviation <= weight["table_deviation"] + 1e-9 < 1.4
     for polynomial in (weight["numerator"], weight["denominator"]):
         assert np.roots(polynomial).real.max() < 0

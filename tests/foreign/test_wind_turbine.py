@@ -78,9 +78,9 @@ def test_the_turbine_follows_the_equations_of_the_benchmark(aso_ftc, fmus, tmp_p
             lambda _, x: slopes(x, *held), (0, PERIOD), state, "DOP853", rtol=1e-10, atol=1e-10
         )
         state = solved.y[:, -1]
-        found = [column[name][k + 1] for name in ("omega_r", "omega_g", "tau_g", "beta[1]", "beta[3]")]
+        values = [column[name][k + 1] for name in ("omega_r", "omega_g", "tau_g", "beta[1]", "beta[3]")]
         expected = state[[0, 1, 3, 4, 6]]
-        assert np.allclose(found, expected, rtol=1e-4, atol=1e-4), (k, found, expected)
+        assert np.allclose(values, expected, rtol=1e-4, atol=1e-4), (k, values, expected)
 
 
 # Fault, start, end, alarm, largest number of samples until the alarm.

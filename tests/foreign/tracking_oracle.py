@@ -21,17 +21,17 @@ class TrackingLoop:
         self.period, self.current = design.get("sample_time"), design.get("estimator") == "current"
         self.filter = np.asarray(design["filter"]) if "filter" in design else None
         (self.n, m), (p, q) = self.B.shape, self.F_s.shape
-        own = self.design
-        self.t = (own["K_i"] if "K_i" in own else own["N_r"]).shape[1]
+        matrices = self.design
+        self.t = (matrices["K_i"] if "K_i" in matrices else matrices["N_r"]).shape[1]
         shapes = {"H": (self.t, p), "K_i": (m, self.t), "F_i": (self.t, q), "L_w": (self.t, m), "N_r": (m, self.t)}
         for name in OPTIONAL:
-            own.setdefault(name, np.zeros(shapes[name]))
+            matrices.setdefault(name, np.zeros(shapes[name]))
         self.limits = limits
         if self.period is not None:
             inputs = np.hstack([self.B, self.F])
             held = cont2discrete((self.A, inputs, self.C, np.zeros((p, m + q))), self.period)
             self.Phi, self.Gamma, self.Xi = held[0], held[1][:, :m], held[1][:, m:]
-        self.sizes = [self.n, len(own["A"]), q, p if self.filter is not None else 0, self.t if "K_i" in design else 0]
+        self.sizes = [self.n, len(matrices["A"]), q, p if self.filter is not None else 0, self.t if "K_i" in design else 0]
         self.order, self.q = sum(self.sizes), q
 
     def parts(self, state):
@@ -39,22 +39,22 @@ class TrackingLoop:
 
     def evaluate(self, state, r, f):
         """The derivative of the state, or the next state, and u."""
-        own = self.design
+        matrices = self.design
         x, x_hat, f_hat, y_f, x_i = self.parts(state)
         y = self.C @ x + self.F_s @ f
-        e = (y if self.filter is None else y_f) - own["C"] @ x_hat
+        e = (y if self.filter is None else y_f) - matrices["C"] @ x_hat
         if self.current:
-            x_hat, f_hat = x_hat + own["L_x"] @ e, f_hat + own["L_f"] @ e
-        integral = own["K_i"] @ x_i if len(x_i) else 0.0
-        free = own["K_x"] @ x_hat + own["K_f"] @ f_hat + integral + own["N_r"] @ r
+            x_hat, f_hat = x_hat + matrices["L_x"] @ e, f_hat + matrices["L_f"] @ e
+        integral = matrices["K_i"] @ x_i if len(x_i) else 0.0
+        free = matrices["K_x"] @ x_hat + matrices["K_f"] @ f_hat + integral + matrices["N_r"] @ r
         u = free if self.limits is None else np.clip(free, *self.limits)
         e = 0.0 * e if self.current else e
-        after = own["A"] @ x_hat + own["B"] @ u + own["F_a"] @ f_hat + own["L_x"] @ e
-        A_f = own.get("A_f", np.zeros((self.q, self.q)) if self.period is None else np.eye(self.q))
-        fault = A_f @ f_hat + own["L_f"] @ e
+        after = matrices["A"] @ x_hat + matrices["B"] @ u + matrices["F_a"] @ f_hat + matrices["L_x"] @ e
+        A_f = matrices.get("A_f", np.zeros((self.q, self.q)) if self.period is None else np.eye(self.q))
+        fault = A_f @ f_hat + matrices["L_f"] @ e
         filtered = y_f if self.filter is None else self.filter * (y - y_f)
-        error = r - own["H"] @ y + own["F_i"] @ f_hat
-        back = own["L_w"] @ (u - free)
+        error = r - matrices["H"] @ y + matrices["F_i"] @ f_hat
+        back = matrices["L_w"] @ (u - free)
         if self.period is None:
             moved = self.A @ x + self.B @ u + self.F @ f
             integrals = (error + back)[: len(x_i)]
@@ -84,7 +84,7 @@ class TrackingLoop:
         M, N, U, V = self.matrices()
         entry = size * N[:, [which]]
         direct = size * V[:, which]
-        found = []
+        rows = []
         if self.period is None:
             whole = np.block([[M, entry], [np.zeros((1, len(M) + 1))]])
             state, before, steps = np.append(np.zeros(len(M)), 1.0), 0.0, {}
@@ -93,8 +93,8 @@ class TrackingLoop:
                 if size not in steps:
                     steps[size] = expm(whole * size)
                 state, before = steps[size] @ state, before + size
-                found.append((state[: self.n], U @ state[:-1] + direct))
-            return [np.array(one) for one in zip(*found)]
+                rows.append((state[: self.n], U @ state[:-1] + direct))
+            return [np.array(one) for one in zip(*rows)]
         held = np.block([[self.A, self.B], [np.zeros((self.B.shape[1], self.n + self.B.shape[1]))]])
         state, k, steps = np.zeros(len(M)), 0, {}
         for time in times:
@@ -104,5 +104,5 @@ class TrackingLoop:
             size = round(time - k * self.period, 12)
             if size not in steps:
                 steps[size] = expm(held * size)
-            found.append(((steps[size] @ np.append(state[: self.n], u))[: self.n], u))
-        return [np.array(one) for one in zip(*found)]
+            rows.append(((steps[size] @ np.append(state[: self.n], u))[: self.n], u))
+        return [np.array(one) for one in zip(*rows)]

@@ -64,30 +64,30 @@ def libcosim(system, steps, csv):
     log_output_level(CosimLogLevel.ERROR)
     step = round(system["step"] * NANOSECONDS)
     assert step == system["step"] * NANOSECONDS, "libcosim counts ns"
-    made = CosimExecution.from_step_size(step)
+    execution = CosimExecution.from_step_size(step)
     last, index, references = CosimObserver.create_last_value(), {}, {}
 
     def start():
         for fmu in system["fmus"]:
             name = fmu["name"]
-            index[name] = made.add_local_slave(CosimLocalSlave(fmu["path"], name))
-            listed = made.slave_variables(index[name])
+            index[name] = execution.add_local_slave(CosimLocalSlave(fmu["path"], name))
+            listed = execution.slave_variables(index[name])
             references[name] = {v.name.decode(): v.reference for v in listed}
             for variable, value in fmu["set"].items():
-                assert made.real_initial_value(index[name], references[name][variable], value)
+                assert execution.real_initial_value(index[name], references[name][variable], value)
         for source, output, sink, name in system["links"]:
             ends = (index[source], references[source][output], index[sink], references[sink][name])
-            assert made.connect_real_variables(*ends) == 0
+            assert execution.connect_real_variables(*ends) == 0
         if csv:
             folder = Path(csv).with_suffix("")
             folder.mkdir()
-            assert made.add_observer(CosimObserver.create_to_dir(str(folder)))
-        made.step(0)
+            assert execution.add_observer(CosimObserver.create_to_dir(str(folder)))
+        execution.step(0)
         # The last step follows below, with its outputs observed.
-        return lambda count: made.step(count - 1) or sys.exit("libcosim fails")
+        return lambda count: execution.step(count - 1) or sys.exit("libcosim fails")
 
     def outputs():
-        assert made.add_observer(last) and made.step()
+        assert execution.add_observer(last) and execution.step()
         ends = [(name, references[name][output]) for name, output in names(system)]
         return [last.last_real_values(index[name], [each])[0] for name, each in ends]
 
@@ -227,20 +227,20 @@ def fmpy_container(system, folder):
         grouped.setdefault((source, sink), []).append(
             (variables[source][output], variables[sink][name])
         )
-    made = ModelDescription(
+    container = ModelDescription(
         fmiVersion="2.0", modelName="container", instantiationToken=str(uuid.uuid4())
     )
-    made.coSimulation = CoSimulation(
+    container.coSimulation = CoSimulation(
         modelIdentifier="container_fmu", fixedInternalStepSize=system["step"]
     )
-    made.coSimulation.canHandleVariableCommunicationStepSize = True
+    container.coSimulation.canHandleVariableCommunicationStepSize = True
     # In the runtime, the time has value reference 0.
     clock = ModelVariable("time", 0, causality="independent", variability="continuous")
     clock.type = "Real"
-    made.modelVariables = [clock, *mapped]
+    container.modelVariables = [clock, *mapped]
     outputs = [variable for variable in mapped if variable.causality == "output"]
-    made.outputs = [Unknown(variable=variable) for variable in outputs]
-    made.initialUnknowns = [Unknown(variable=variable) for variable in outputs]
+    container.outputs = [Unknown(variable=variable) for variable in outputs]
+    container.initialUnknowns = [Unknown(variable=variable) for variable in outputs]
     connections = [
         Connection(
             components[source], [a for a, _ in pairs], components[sink], [b for _, b in pairs]
@@ -250,7 +250,7 @@ def fmpy_container(system, folder):
     path = Path(folder) / "fmpy_container.fmu"
     configuration = Configuration(
         parallelDoStep=False,
-        modelDescription=made,
+        modelDescription=container,
         components=list(components.values()),
         connections=connections,
         variableMappings=mapped,
@@ -267,20 +267,20 @@ def toolbox_container(system, folder):
     from fmu_manipulation_toolbox.container import FMUContainer
 
     logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
-    made = FMUContainer("container", Path(system["fmus"][0]["path"]).parent)
+    container = FMUContainer("container", Path(system["fmus"][0]["path"]).parent)
     file = {fmu["name"]: Path(fmu["path"]).name for fmu in system["fmus"]}
     assert len(set(file.values())) == len(file), "a file for each FMU"
     for fmu in system["fmus"]:
-        made.get_fmu(file[fmu["name"]])
+        container.get_fmu(file[fmu["name"]])
         for name, value in fmu["set"].items():
-            made.add_start_value(file[fmu["name"]], name, str(value))
+            container.add_start_value(file[fmu["name"]], name, str(value))
         for name in fmu["outputs"]:
-            made.add_output(file[fmu["name"]], name, f"{fmu['name']}.{name}")
+            container.add_output(file[fmu["name"]], name, f"{fmu['name']}.{name}")
     for source, output, sink, name in system["links"]:
-        made.add_link(file[source], output, file[sink], name)
-    made.add_implicit_rule(auto_input=False, auto_output=False, auto_link=False)
+        container.add_link(file[source], output, file[sink], name)
+    container.add_implicit_rule(auto_input=False, auto_output=False, auto_link=False)
     path = Path(folder) / "toolbox_container.fmu"
-    made.make_fmu(path, step_size=system["step"])
+    container.make_fmu(path, step_size=system["step"])
     return path
 
 

@@ -25,7 +25,7 @@ def write(
     """Writes the folder of a campaign: columns of parameters and measures, positions of a sample."""
     names = list(columns)
     runs = len(next(iter(columns.values())))
-    numeric = {name: np.asarray(own).dtype.kind in "fi" for name, own in columns.items()}
+    numeric = {name: np.asarray(column).dtype.kind in "fi" for name, column in columns.items()}
     manifest = {
         "name": "test",
         "runs": runs,
@@ -74,7 +74,7 @@ def problem(count):
 
 def campaign(folder, design, unit, function, **more):
     """A campaign whose parameters are the positions of the sample scaled to 0 to 10."""
-    columns = {name: 10 * own for name, own in zip(problem(unit.shape[1])["names"], unit.T)}
+    columns = {name: 10 * column for name, column in zip(problem(unit.shape[1])["names"], unit.T)}
     return write(folder, design, columns, {"y": function(unit)}, unit=unit, **more)
 
 

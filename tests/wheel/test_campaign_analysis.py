@@ -25,10 +25,10 @@ def sobol_g(unit):
 
 def sobol_g_indices():
     """Closed form: V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) - 1."""
-    own = 1 / (3 * (1 + A) ** 2)
-    total = np.prod(1 + own) - 1
-    rest = [np.prod(1 + np.delete(own, i)) for i in range(len(A))]
-    return {"S1": own / total, "ST": own * rest / total}
+    variances = 1 / (3 * (1 + A) ** 2)
+    total = np.prod(1 + variances) - 1
+    rest = [np.prod(1 + np.delete(variances, i)) for i in range(len(A))]
+    return {"S1": variances / total, "ST": variances * rest / total}
 
 
 @pytest.mark.parametrize("second_order", [True, False])
@@ -40,24 +40,24 @@ def test_sobol_indices_are_within_their_confidence_of_the_closed_form(
 ):
     unit = sobol.sample(problem(count), 4096, calc_second_order=second_order, seed=1)
     design = {"method": "saltelli", "base": 4096, "second-order": second_order}
-    found = campaign(tmp_path / "c", design, unit, function).sobol("y")
-    assert list(found.index) == problem(count)["names"]
+    indices = campaign(tmp_path / "c", design, unit, function).sobol("y")
+    assert list(indices.index) == problem(count)["names"]
     for name, values in expected.items():
-        assert (abs(found[name] - values) <= found[f"{name}_conf"]).all(), name
-        assert (found[f"{name}_conf"] < 0.1).all(), name
+        assert (abs(indices[name] - values) <= indices[f"{name}_conf"]).all(), name
+        assert (indices[f"{name}_conf"] < 0.1).all(), name
 
 
 def test_second_order_indices_of_ishigami_show_its_only_interaction(tmp_path):
     unit = sobol.sample(problem(3), 4096, calc_second_order=True, seed=1)
     outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": True}, unit, ishigami)
-    found = outcome.sobol_second_order("y")
+    indices = outcome.sobol_second_order("y")
     expected = {
         ("plant.p0", "plant.p1"): 0.0,
         ("plant.p0", "plant.p2"): 0.2437,
         ("plant.p1", "plant.p2"): 0.0,
     }
-    assert list(found.index) == list(expected)
-    assert (abs(found["S2"] - list(expected.values())) <= found["S2_conf"]).all()
+    assert list(indices.index) == list(expected)
+    assert (abs(indices["S2"] - list(expected.values())) <= indices["S2_conf"]).all()
     without = sobol.sample(problem(3), 64, calc_second_order=False, seed=1)
     outcome = campaign(tmp_path / "d", {"method": "saltelli", "second-order": False}, without, ishigami)
     with pytest.raises(ConfigurationError, match="second-order = true"):
@@ -84,20 +84,20 @@ def test_morris_of_a_linear_function_returns_its_slopes(tmp_path):
     slopes = np.array([3.0, -2.0, 0.5])
     unit = morris.sample(problem(3), 20, num_levels=6, seed=1)
     design = {"method": "morris", "trajectories": 20, "levels": 6}
-    found = campaign(tmp_path / "c", design, unit, lambda u: u @ slopes + 7).morris("y")
-    assert np.allclose(found["mu"], slopes, rtol=0, atol=1e-12)
-    assert np.allclose(found["mu_star"], abs(slopes), rtol=0, atol=1e-12)
-    assert np.allclose(found[["sigma", "mu_star_conf"]], 0, atol=1e-12)
+    effects = campaign(tmp_path / "c", design, unit, lambda u: u @ slopes + 7).morris("y")
+    assert np.allclose(effects["mu"], slopes, rtol=0, atol=1e-12)
+    assert np.allclose(effects["mu_star"], abs(slopes), rtol=0, atol=1e-12)
+    assert np.allclose(effects[["sigma", "mu_star_conf"]], 0, atol=1e-12)
 
 
 def test_morris_of_a_product_has_the_effect_of_the_other_factor(tmp_path):
     """d(ab)/da = b: mean and standard deviation of b over the trajectories."""
     unit = morris.sample(problem(2), 200, num_levels=4, seed=2)
-    found = campaign(tmp_path / "c", {"method": "morris", "levels": 4}, unit, lambda u: u[:, 0] * u[:, 1])
+    outcome = campaign(tmp_path / "c", {"method": "morris", "levels": 4}, unit, lambda u: u[:, 0] * u[:, 1])
     other = unit.reshape(200, 3, 2)
-    moves = [np.argmax(abs(np.diff(own[:, 0]))) for own in other]
-    b = np.array([own[at, 1] for own, at in zip(other, moves)])
-    row = found.morris("y").loc["plant.p0"]
+    moves = [np.argmax(abs(np.diff(trajectory[:, 0]))) for trajectory in other]
+    b = np.array([trajectory[at, 1] for trajectory, at in zip(other, moves)])
+    row = outcome.morris("y").loc["plant.p0"]
     assert np.isclose(row["mu"], b.mean(), rtol=1e-12) and np.isclose(row["sigma"], b.std(ddof=1), rtol=1e-12)
 
 
@@ -106,12 +106,12 @@ def test_fast_indices_of_ishigami_are_near_the_closed_form(tmp_path):
     outcome = campaign(tmp_path / "c", {"method": "fast", "harmonics": 4}, unit, ishigami)
     np.random.seed(5)
     before = np.random.get_state()[1].copy()
-    found = outcome.fast("y")
+    indices = outcome.fast("y")
     assert np.array_equal(np.random.get_state()[1], before)
-    assert found.equals(outcome.fast("y")) and not found.equals(outcome.fast("y", seed=1))
+    assert indices.equals(outcome.fast("y")) and not indices.equals(outcome.fast("y", seed=1))
     # The method is biased: harmonics above the fourth, and harmonics of the other parameters.
     for name, values in ISHIGAMI.items():
-        assert np.allclose(found[name], values, rtol=0, atol=0.03), name
+        assert np.allclose(indices[name], values, rtol=0, atol=0.03), name
 
 
 def test_indices_name_the_design_that_they_need(tmp_path):
@@ -149,28 +149,28 @@ def test_a_stated_value_of_unfinished_runs_completes_a_design(tmp_path):
     columns, design = dict(zip(problem(3)["names"], unit.T)), {"method": "saltelli", "second-order": False}
     status = ["crashed" if run in (3, 70) else "ok" for run in range(len(unit))]
     stated = {"measures": {"y": {"expression": "last(plant.x_p)", "unfinished": 5.0}}}
-    found = write(tmp_path / "c", design, columns, {"y": values}, unit=unit, status=status, changes=stated)
+    outcome = write(tmp_path / "c", design, columns, {"y": values}, unit=unit, status=status, changes=stated)
     finished = write(tmp_path / "d", design, columns, {"y": values}, unit=unit)
-    assert found.sobol("y").equals(finished.sobol("y"))
+    assert outcome.sobol("y").equals(finished.sobol("y"))
 
 
 @pytest.mark.parametrize(("failures", "runs"), [(0, 300), (3, 40), (40, 40), (17, 1000)])
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
 def test_failure_probability_has_clopper_pearson_bounds(tmp_path, failures, runs, confidence):
     values = np.where(np.arange(runs) < failures, 2.0, 0.5)
-    found = random_campaign(tmp_path / "c", values, {"below": 1.0}).failure_probability("y", confidence)
+    estimate = random_campaign(tmp_path / "c", values, {"below": 1.0}).failure_probability("y", confidence)
     a = 1 - confidence
     low = stats.beta.ppf(a / 2, failures, runs - failures + 1) if failures else 0.0
     high = stats.beta.ppf(1 - a / 2, failures + 1, runs - failures) if failures < runs else 1.0
-    assert (found.failures, found.runs, found.probability) == (failures, runs, failures / runs)
-    assert np.allclose([found.lower, found.upper], [low, high], rtol=1e-9, atol=1e-12) and found.note == ""
+    assert (estimate.failures, estimate.runs, estimate.probability) == (failures, runs, failures / runs)
+    assert np.allclose([estimate.lower, estimate.upper], [low, high], rtol=1e-9, atol=1e-12) and estimate.note == ""
 
 
 def test_without_failure_the_upper_bound_follows_the_rule_of_three(tmp_path):
     """One-sided 95 % is two-sided 90 %: 1 - 0.05^(1/n), about 3/n."""
-    found = random_campaign(tmp_path / "c", np.zeros(1000), {"below": 1.0}).failure_probability("y", 0.9)
-    assert found.lower == 0 and np.isclose(found.upper, 1 - 0.05 ** (1 / 1000), rtol=1e-9)
-    assert np.isclose(found.upper, 3 / 1000, rtol=5e-3)
+    estimate = random_campaign(tmp_path / "c", np.zeros(1000), {"below": 1.0}).failure_probability("y", 0.9)
+    assert estimate.lower == 0 and np.isclose(estimate.upper, 1 - 0.05 ** (1 / 1000), rtol=1e-9)
+    assert np.isclose(estimate.upper, 3 / 1000, rtol=5e-3)
 
 
 def test_what_counts_as_a_failure(tmp_path):
@@ -197,16 +197,16 @@ def test_a_run_fails_if_any_limit_fails(tmp_path):
 
 def test_designs_that_are_not_independent_samples_are_refused_or_noted(tmp_path):
     for method in ("latin-hypercube", "sobol", "halton"):
-        found = random_campaign(tmp_path / method, np.zeros(8), {"below": 1.0}, design={"method": method})
-        assert "more even than independent" in found.failure_probability().note
+        outcome = random_campaign(tmp_path / method, np.zeros(8), {"below": 1.0}, design={"method": method})
+        assert "more even than independent" in outcome.failure_probability().note
     for method in ("grid", "table", "saltelli", "morris", "fast"):
-        found = random_campaign(tmp_path / method, np.zeros(8), {"below": 1.0}, design={"method": method})
+        outcome = random_campaign(tmp_path / method, np.zeros(8), {"below": 1.0}, design={"method": method})
         with pytest.raises(ConfigurationError, match=f"needs a design of random samples.* found '{method}'"):
-            found.failure_probability()
-    found = random_campaign(tmp_path / "part", np.zeros(8), {"below": 1.0}, runs=20)
-    assert "number of runs depends on the results" in found.failure_probability().note
-    found = random_campaign(tmp_path / "now", np.zeros(8), {"below": 1.0}, runs=20, complete=False)
-    assert "8 of 20 runs have ended" in found.failure_probability().note
+            outcome.failure_probability()
+    outcome = random_campaign(tmp_path / "part", np.zeros(8), {"below": 1.0}, runs=20)
+    assert "number of runs depends on the results" in outcome.failure_probability().note
+    outcome = random_campaign(tmp_path / "now", np.zeros(8), {"below": 1.0}, runs=20, complete=False)
+    assert "8 of 20 runs have ended" in outcome.failure_probability().note
 
 
 def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_path):
@@ -229,17 +229,17 @@ def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_p
         limits={"y": {"above": -0.5}},
         status=status,
     )
-    found = outcome.influence("y")
-    assert list(found.index) == ["strong", "weak", "constant", "kind", "kind"]
+    influence = outcome.influence("y")
+    assert list(influence.index) == ["strong", "weak", "constant", "kind", "kind"]
     good = np.arange(2000) != 10
     for name in ("weak", "strong"):
-        ranks = [stats.rankdata(own[good]) for own in (columns[name], values)]
-        assert np.isclose(found.loc[name, "correlation"], np.corrcoef(ranks)[0, 1], rtol=1e-9)
+        ranks = [stats.rankdata(column[good]) for column in (columns[name], values)]
+        assert np.isclose(influence.loc[name, "correlation"], np.corrcoef(ranks)[0, 1], rtol=1e-9)
     failed = ~(values > -0.5)
-    assert found.loc["strong", "lowest_tenth"] == failed[np.argsort(columns["strong"])[:200]].mean()
-    assert found.loc["strong", "highest_tenth"] == 1.0
-    assert found.loc["strong", "p_value"] < 1e-100 and np.isnan(found.loc["constant", "correlation"])
-    kinds = found.loc["kind"].set_index("value")
+    assert influence.loc["strong", "lowest_tenth"] == failed[np.argsort(columns["strong"])[:200]].mean()
+    assert influence.loc["strong", "highest_tenth"] == 1.0
+    assert influence.loc["strong", "p_value"] < 1e-100 and np.isnan(influence.loc["constant", "correlation"])
+    kinds = influence.loc["kind"].set_index("value")
     assert (
         list(kinds["failed"]) == [failed[1::2].mean(), failed[::2].mean()]
         and list(kinds["runs"]) == [1000] * 2
@@ -248,13 +248,13 @@ def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_p
 
 
 def test_the_heat_map_has_the_worst_value_of_each_fault(tmp_path):
-    found = fault_campaign(tmp_path / "c", {"below": 4.5}).heat_map("y")
-    assert list(found.index) == [("gain", "a.y"), ("stuck", "a.y"), ("stuck", "b.y")]
-    assert found.columns.names == ["size", "from"] and found.shape == (3, 3)
+    table = fault_campaign(tmp_path / "c", {"below": 4.5}).heat_map("y")
+    assert list(table.index) == [("gain", "a.y"), ("stuck", "a.y"), ("stuck", "b.y")]
+    assert table.columns.names == ["size", "from"] and table.shape == (3, 3)
     cells = {
         (*row, None if np.isnan(size) else size, start): value
-        for row, own in zip(found.index, found.to_numpy())
-        for (size, start), value in zip(found.columns, own)
+        for row, values in zip(table.index, table.to_numpy())
+        for (size, start), value in zip(table.columns, values)
         if not np.isnan(value)
     }
     expected = {
@@ -274,8 +274,8 @@ def test_probability_and_influence_of_a_fault_campaign_are_by_fault(tmp_path):
     assert outcome.failure_probability("y", fault="").failures == 1
     with pytest.raises(ConfigurationError, match="needs one fault of the campaign.*found None"):
         outcome.failure_probability("y")
-    found = outcome.influence("y")
-    kinds = found.loc["fault.kind"].set_index("value")["failed"].to_dict()
+    influence = outcome.influence("y")
+    kinds = influence.loc["fault.kind"].set_index("value")["failed"].to_dict()
     assert kinds == {"": 1.0, "gain": 1 / 3, "stuck": 1 / 3}
     with pytest.raises(ConfigurationError, match="has no faults"):
         random_campaign(tmp_path / "d", np.zeros(3), {"below": 1}).heat_map("y")

@@ -78,12 +78,12 @@ def measures(folder):
 
 def expected(file):
     """The same by runs in this process."""
-    own, found = af.campaign.Campaign.from_toml(file), []
-    for run in range(len(own)):
-        values = own.changes(run)["start_values"]
+    plan, friction = af.campaign.Campaign.from_toml(file), []
+    for run in range(len(plan)):
+        values = plan.changes(run)["start_values"]
         results = af.paper().run(start_values=values, stop_time=3.0, record_every="step")
-        found.append(float(np.sqrt(np.mean(np.square(results["plant.f_fric"])))))
-    return found
+        friction.append(float(np.sqrt(np.mean(np.square(results["plant.f_fric"])))))
+    return friction
 
 
 @pytest.fixture
@@ -125,5 +125,5 @@ def test_a_campaign_that_is_watched_paused_and_stopped_goes_on_to_the_same_rows(
         state = page.until(lambda state: state["outcome"])
         assert state["outcome"] == "All 24 runs are done." and state["time"] == 24
         assert page.end()[0] == 0
-    found = measures(folder)
-    assert found == expected(file) and len(set(found)) > 20
+    values = measures(folder)
+    assert values == expected(file) and len(set(values)) > 20

@@ -46,9 +46,9 @@ class Page(html.parser.HTMLParser):
             self.packed[self.inside[1]] += data
 
     def column(self, name, kind):
-        (found,) = [own for own in self.data["columns"] if (own["name"], own["kind"]) == (name, kind)]
-        labels = found.get("labels")
-        return [labels[value] for value in found["values"]] if labels else found["values"]
+        (column,) = [entry for entry in self.data["columns"] if (entry["name"], entry["kind"]) == (name, kind)]
+        labels = column.get("labels")
+        return [labels[value] for value in column["values"]] if labels else column["values"]
 
 
 def page(outcome, path):
@@ -57,17 +57,17 @@ def page(outcome, path):
 
 
 def test_the_page_is_one_file_that_makes_no_request(tmp_path):
-    found = page(random_campaign(tmp_path / "c", np.linspace(0, 2, 90), {"below": 1.0}), tmp_path / "p.html")
-    names = {name for _, attributes in found.tags for name in attributes}
+    document = page(random_campaign(tmp_path / "c", np.linspace(0, 2, 90), {"below": 1.0}), tmp_path / "p.html")
+    names = {name for _, attributes in document.tags for name in attributes}
     assert not names & {"src", "href", "action", "srcset", "data", "poster", "background"}
     policies = [
-        own["content"] for tag, own in found.tags if own.get("http-equiv") == "Content-Security-Policy"
+        attributes["content"] for tag, attributes in document.tags if attributes.get("http-equiv") == "Content-Security-Policy"
     ]
     (policy,) = policies
     assert "default-src 'none'" in policy and "http" not in policy and "connect-src" not in policy
-    style = found.source[found.source.index("<style>") : found.source.index("</style>")]
+    style = document.source[document.source.index("<style>") : document.source.index("</style>")]
     assert "url(" not in style and "@import" not in style
-    assert "plotly.js v" in found.library and sorted(path.name for path in tmp_path.iterdir()) == [
+    assert "plotly.js v" in document.library and sorted(path.name for path in tmp_path.iterdir()) == [
         "c",
         "p.html",
     ]
@@ -87,12 +87,12 @@ def test_hostile_names_are_text(tmp_path):
     outcome = write(
         folder, {"method": "random"}, columns, measures, limits=limits, status=status, changes=manifest
     )
-    found = page(outcome, tmp_path / "p.html")
-    assert [tag for tag, _ in found.tags].count("script") == 3
-    assert not {tag for tag, _ in found.tags} & {"img", "iframe", "object", "a", "form", "link"}
-    assert not [own for _, own in found.tags if set(own) & {"onerror", "onclick", "onload"}]
-    assert found.text.count(HOSTILE) > 8 and outcome.command(0) in found.text
-    assert found.data["columns"][1]["name"] == HOSTILE and found.data["measures"][0]["unit"] == HOSTILE
+    document = page(outcome, tmp_path / "p.html")
+    assert [tag for tag, _ in document.tags].count("script") == 3
+    assert not {tag for tag, _ in document.tags} & {"img", "iframe", "object", "a", "form", "link"}
+    assert not [attributes for _, attributes in document.tags if set(attributes) & {"onerror", "onclick", "onload"}]
+    assert document.text.count(HOSTILE) > 8 and outcome.command(0) in document.text
+    assert document.data["columns"][1]["name"] == HOSTILE and document.data["measures"][0]["unit"] == HOSTILE
 
 
 def test_the_pictures_have_the_values_of_the_runs(tmp_path):
@@ -105,18 +105,18 @@ def test_the_pictures_have_the_values_of_the_runs(tmp_path):
     values[3], values[4] = np.inf, np.nan
     status = ["ok"] * 4 + ["time limit"] + ["ok"] * 695
     outcome = write(tmp_path / "c", {"method": "random"}, columns, {"y": values}, status=status)
-    found = page(outcome, tmp_path / "p.html")
-    assert found.data["runs"] == list(range(700)) and found.column("status", "status") == status
-    assert found.column("k", "input") == list(columns["k"])
-    assert np.allclose(found.column("p", "input"), columns["p"], rtol=5e-6)
-    drawn = [np.nan if value is None else value for value in found.column("y", "measure")]
+    document = page(outcome, tmp_path / "p.html")
+    assert document.data["runs"] == list(range(700)) and document.column("status", "status") == status
+    assert document.column("k", "input") == list(columns["k"])
+    assert np.allclose(document.column("p", "input"), columns["p"], rtol=5e-6)
+    drawn = [np.nan if value is None else value for value in document.column("y", "measure")]
     assert np.allclose(drawn, np.where(np.isfinite(values), values, np.nan), rtol=5e-6, equal_nan=True)
-    (own,) = found.data["measures"]
+    (measure,) = document.data["measures"]
     finite = values[np.isfinite(values)]
-    counts, _ = np.histogram(finite, own["histogram"]["edges"])
-    assert own["histogram"]["counts"] == counts.tolist() and sum(counts) == 698 == len(finite)
-    assert own["histogram"]["others"] == 2 and own["histogram"]["outside"] == 0 and not own["logarithmic"]
-    assert "5".join(found.data["command"]) == outcome.command(5) and "All runs are drawn" in found.text
+    counts, _ = np.histogram(finite, measure["histogram"]["edges"])
+    assert measure["histogram"]["counts"] == counts.tolist() and sum(counts) == 698 == len(finite)
+    assert measure["histogram"]["others"] == 2 and measure["histogram"]["outside"] == 0 and not measure["logarithmic"]
+    assert "5".join(document.data["command"]) == outcome.command(5) and "All runs are drawn" in document.text
 
 
 def test_outliers_and_decades_do_not_hide_the_distribution(tmp_path):
@@ -143,30 +143,30 @@ def test_of_many_runs_all_that_failed_are_drawn(tmp_path):
     values[lost] = np.nan
     outcome = random_campaign(tmp_path / "c", values, {"below": 0.999}, status=status, parts=30)
     begin = time.monotonic()
-    found = page(outcome, tmp_path / "p.html")
+    document = page(outcome, tmp_path / "p.html")
     seconds = time.monotonic() - begin
     outside = np.flatnonzero(values >= 0.999)
-    drawn = np.array(found.data["runs"])
+    drawn = np.array(document.data["runs"])
     assert len(drawn) == 10_000 == len(set(drawn)) and np.all(np.diff(drawn) > 0)
     assert set(lost) | set(outside) <= set(drawn)
-    assert np.allclose(found.column("y", "measure")[1], values[drawn[1]], rtol=5e-6)
+    assert np.allclose(document.column("y", "measure")[1], values[drawn[1]], rtol=5e-6)
     assert (
         f"50 of the 50 runs that did not finish, {len(outside)} of the {len(outside)} runs outside"
-        in found.text
+        in document.text
     )
     # The others are spread evenly over the run numbers.
     others = np.setdiff1d(drawn, np.concatenate([lost, outside]))
     parts = np.histogram(others, 10, (0, count))[0]
     assert parts.max() - parts.min() < 20
-    assert sum(found.data["measures"][0]["histogram"]["counts"]) == count - 50
-    assert len(found.source) < 8e6 and seconds < 60
+    assert sum(document.data["measures"][0]["histogram"]["counts"]) == count - 50
+    assert len(document.source) < 8e6 and seconds < 60
 
 
 def test_frequent_failures_leave_half_of_the_points_to_the_other_runs(tmp_path):
     values = np.r_[np.full(60_000, 2.0), np.zeros(20_000)]
-    found = page(random_campaign(tmp_path / "c", values, {"below": 1.0}), tmp_path / "p.html")
+    document = page(random_campaign(tmp_path / "c", values, {"below": 1.0}), tmp_path / "p.html")
     assert (
-        np.count_nonzero(np.array(found.column("y", "measure")) == 2) == 5000 == len(found.data["runs"]) / 2
+        np.count_nonzero(np.array(document.column("y", "measure")) == 2) == 5000 == len(document.data["runs"]) / 2
     )
 
 
@@ -178,19 +178,19 @@ def test_the_page_opens_on_the_answer(tmp_path):
         tmp_path / "c", {"method": "random"}, {"c": c, "b": b, "a": a}, {"other": c, "y": a - b / 4},
         limits={"y": {"below": 0.5}},
     )  # fmt: skip
-    found = page(outcome, tmp_path / "p.html")
+    document = page(outcome, tmp_path / "p.html")
     failed = int((a - b / 4 >= 0.5).sum())
-    assert f"{failed:,} of 5,000 runs ({100 * failed / 5000:.3g} %) fail: y is not below 0.5." in found.text
-    assert "a decides most: rank correlation with y 0.9" in found.text and "; next b, -0.2" in found.text
-    assert ("option", {"value": "1", "selected": None}) in found.tags
-    assert found.text.index("fail: y is not below") < found.text.index("What was run")
-    border = found.data["border"]
+    assert f"{failed:,} of 5,000 runs ({100 * failed / 5000:.3g} %) fail: y is not below 0.5." in document.text
+    assert "a decides most: rank correlation with y 0.9" in document.text and "; next b, -0.2" in document.text
+    assert ("option", {"value": "1", "selected": None}) in document.tags
+    assert document.text.index("fail: y is not below") < document.text.index("What was run")
+    border = document.data["border"]
     assert border["names"] == ["a", "b"] and border["measure"] == "y"
     surface = border["surface"]
     for along, row in zip(surface["y"], surface["z"]):
         crossing = np.interp(0.5, row, surface["x"])
         assert crossing == pytest.approx(0.5 + along / 4, abs=0.02)
-    assert surface["wrong"] < 0.01 and len(found.source) < 2e6
+    assert surface["wrong"] < 0.01 and len(document.source) < 2e6
 
 
 def test_of_few_failures_no_surface_is_fitted(tmp_path):
@@ -199,8 +199,8 @@ def test_of_few_failures_no_surface_is_fitted(tmp_path):
         tmp_path / "c", {"method": "random"}, {"p": values + np.arange(100), "q": np.arange(100.0)}, {"y": values},
         limits={"y": {"below": 1.0}},
     )  # fmt: skip
-    found = page(outcome, tmp_path / "p.html")
-    assert found.data["border"]["surface"] is None and "Too few runs fail" in found.text
+    document = page(outcome, tmp_path / "p.html")
+    assert document.data["border"]["surface"] is None and "Too few runs fail" in document.text
     none = page(random_campaign(tmp_path / "n", np.zeros(100), {"below": 1.0}), tmp_path / "n.html")
     upper = 1 - 0.025 ** (1 / 100)
     assert f"None of the 100 runs fails: y is below 1. The probability of a failure is below {upper:.2g} (95 %)" in none.text
@@ -209,19 +209,19 @@ def test_of_few_failures_no_surface_is_fitted(tmp_path):
 def test_runs_that_did_not_finish_are_a_table_with_their_commands(tmp_path):
     status = ["crashed", "ok"] * 60
     outcome = random_campaign(tmp_path / "c", [0.0] * 120, {"below": 1.0}, status=status)
-    found = page(outcome, tmp_path / "p.html")
-    assert found.text.count("the FMU ended the process") == 50 == found.source.count('<button class="copy">')
-    assert outcome.command(98) in found.text and outcome.command(100) not in found.text
-    assert "And 10 more runs." in found.text
+    document = page(outcome, tmp_path / "p.html")
+    assert document.text.count("the FMU ended the process") == 50 == document.source.count('<button class="copy">')
+    assert outcome.command(98) in document.text and outcome.command(100) not in document.text
+    assert "And 10 more runs." in document.text
 
 
 def test_the_page_has_the_numbers_of_the_analysis(tmp_path):
     outcome = random_campaign(tmp_path / "c", np.linspace(0, 2, 500), {"below": 1.5})
-    found = page(outcome, tmp_path / "p.html")
+    document = page(outcome, tmp_path / "p.html")
     chance = outcome.failure_probability("y")
     row = outcome.influence("y").loc["p"]
     for number in (chance.probability, chance.lower, chance.upper, row["correlation"], row["lowest_tenth"]):
-        assert f"{number:.4g}" in found.text
+        assert f"{number:.4g}" in document.text
     grid = page(
         random_campaign(tmp_path / "g", [0.0, 2.0], {"below": 1.0}, design={"method": "grid"}),
         tmp_path / "g.html",
@@ -242,13 +242,13 @@ def test_the_page_has_the_indices_of_the_design(tmp_path):
     lost = campaign(
         tmp_path / "d", {"method": "saltelli", "second-order": False}, unit, ishigami, status=status
     )
-    found = page(lost, tmp_path / "d.html")
-    assert "1 of 320 have no value: 1 failed" in found.text and "indices" not in found.data["measures"][0]
+    document = page(lost, tmp_path / "d.html")
+    assert "1 of 320 have no value: 1 failed" in document.text and "indices" not in document.data["measures"][0]
 
 
 def test_the_heat_map_marks_faults_whose_run_did_not_finish(tmp_path):
-    found = page(fault_campaign(tmp_path / "c", {"below": 4.5}), tmp_path / "p.html")
-    heat = found.data["measures"][0]["heat"]
+    document = page(fault_campaign(tmp_path / "c", {"below": 4.5}), tmp_path / "p.html")
+    heat = document.data["measures"][0]["heat"]
     assert heat["rows"] == ["gain: a.y", "stuck: a.y", "stuck: b.y"]
     assert sorted(heat["columns"]) == ["from 1 s", "size 2, from 1 s", "size 3, from 5 s"]
     cells = {
@@ -263,7 +263,7 @@ def test_the_heat_map_marks_faults_whose_run_did_not_finish(tmp_path):
         ("stuck: a.y", "from 1 s"): 4.0,
         ("stuck: b.y", "from 1 s"): "lost",
     }
-    assert "5 faults" not in found.text and "4 faults in 6 runs" in found.text and "(none)" in found.text
+    assert "5 faults" not in document.text and "4 faults in 6 runs" in document.text and "(none)" in document.text
 
 
 def test_the_page_does_not_depend_on_the_parts(tmp_path):
@@ -300,7 +300,7 @@ def test_only_pages_of_campaigns_are_overwritten(tmp_path):
     assert path.read_bytes() == first and len(first) > 1e6
     with pytest.raises(ResultsError, match="cannot write the page: No such file or directory"):
         outcome.page(tmp_path / "none" / "p.html")
-    assert sorted(own.name for own in tmp_path.iterdir()) == ["c", "p.html"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["c", "p.html"]
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
@@ -330,10 +330,10 @@ def test_a_browser_draws_the_page_and_a_click_shows_the_command(tmp_path):
         ["chromium", *words, "--dump-dom", (tmp_path / "probe.html").as_uri()],
         capture_output=True, text=True, timeout=120, check=True,
     )  # fmt: skip
-    found = html.unescape(done.stdout.split("<title>")[1].split("</title>")[0])
-    command, points, heat, histogram, buttons, requests = json.loads(found)
+    title = html.unescape(done.stdout.split("<title>")[1].split("</title>")[0])
+    command, points, heat, histogram, buttons, requests = json.loads(title)
     assert (
         command == outcome.command(2) and sum(points) == 7 and heat == 1 and histogram == 2 and requests == 0
     )
-    assert [own.lower() for own in buttons] == ["download plot as a png", "zoom", "pan", "reset axes"]
+    assert [button.lower() for button in buttons] == ["download plot as a png", "zoom", "pan", "reset axes"]
     assert "CONSOLE" not in done.stderr, done.stderr

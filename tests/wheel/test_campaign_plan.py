@@ -34,15 +34,15 @@ def test_a_grid_has_every_combination_once():
     rows = list(zip(*columns(campaign).values(), strict=True))
     expected = list(itertools.product([20.0, 25.0, 30.0], [True, False], [1e-4, 1e-3, 1e-2]))
     assert len(rows) == len(expected) == len(campaign)
-    for found, wanted in zip(rows, expected, strict=True):
-        assert found[:2] == wanted[:2]
-        assert found[2] == pytest.approx(wanted[2], rel=1e-14)
+    for row, combination in zip(rows, expected, strict=True):
+        assert row[:2] == combination[:2]
+        assert row[2] == pytest.approx(combination[2], rel=1e-14)
 
 
 def test_whole_levels_between_whole_ends_stay_whole():
-    own = {"from": 1, "to": 7, "steps": 4, "set": "plant.F_c"}
+    parameter = {"from": 1, "to": 7, "steps": 4, "set": "plant.F_c"}
     for change, expected in (({}, [1, 3, 5, 7]), ({"to": 7.0}, [1.0, 3.0, 5.0, 7.0]), ({"steps": 5}, [1.0, 2.5, 4.0, 5.5, 7.0])):
-        levels = columns(paper(parameters={"n": own | change}))["n"]
+        levels = columns(paper(parameters={"n": parameter | change}))["n"]
         assert levels == expected and {type(level) for level in levels[1:-1]} == {type(expected[1])}
 
 
@@ -94,13 +94,13 @@ def test_each_tenth_of_a_latin_hypercube_has_a_tenth_of_the_runs():
 
 def test_the_same_seed_gives_the_same_runs_and_another_seed_others():
     def values(seed):
-        own = paper(
+        campaign = paper(
             parameters={"plant.F_c": {"relative": 0.2}},
             disturbances={"noise": {"connection": "controller.x_p", "noise": {"deviation": 1e-5}}},
             design={"method": "random", "runs": 5},
             seed=seed,
         )
-        return [json.dumps(own.changes(run)) for run in range(5)]
+        return [json.dumps(campaign.changes(run)) for run in range(5)]
 
     assert values(7) == values(7)
     assert all(one != two for one, two in zip(values(7), values(8), strict=True))
@@ -119,10 +119,10 @@ def test_a_parameter_sets_variables_steps_and_entries_of_disturbances():
         },
         disturbances={"late": {"connection": "plant.u", "delay": {"seconds": 0.0, "hold": True}}},
     )
-    own = campaign.changes(0)
-    assert list(own["start_values"].values()) == [2.0, 2.0]
-    assert own["algorithm"] == {"step": 0.002}
-    assert own["faults"] == [{"connection": "plant.u", "delay": {"seconds": 0.01, "hold": True}}]
+    changes = campaign.changes(0)
+    assert list(changes["start_values"].values()) == [2.0, 2.0]
+    assert changes["algorithm"] == {"step": 0.002}
+    assert changes["faults"] == [{"connection": "plant.u", "delay": {"seconds": 0.01, "hold": True}}]
 
 
 def test_a_fault_campaign_has_each_fault_at_each_connection_time_and_size():
@@ -176,8 +176,8 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         expected = TIME[outside[-1] + 1]
     if text.startswith("last_time"):
         expected = TIME[SIGNALS["a.x"] > 0.5][-1]
-    found = Expression("m", text).value(SIGNALS, TIME, {"k": 3.0}, 0.5)
-    assert found == pytest.approx(expected, rel=tolerance, abs=tolerance, nan_ok=True)
+    value = Expression("m", text).value(SIGNALS, TIME, {"k": 3.0}, 0.5)
+    assert value == pytest.approx(expected, rel=tolerance, abs=tolerance, nan_ok=True)
 
 
 @pytest.mark.parametrize(
@@ -254,7 +254,7 @@ def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
         "plant.F_s": {"distribution": "uniform", "loc": 28.0, "scale": 4.0},
     }
     design = {"method": "latin-hypercube", "runs": np.int64(8)}
-    one, other = (paper(parameters=own, design=design, seed=np.uint8(3)) for own in (frozen, named))
+    one, other = (paper(parameters=entries, design=design, seed=np.uint8(3)) for entries in (frozen, named))
     assert columns(one) == columns(other) and one.describe() == other.describe()
     whole = paper(
         parameters={"n": {"distribution": stats.randint(1, 5), "set": "algorithm.jobs"}},
@@ -264,11 +264,11 @@ def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
 
 
 def test_tables_have_names_of_python_or_of_the_file():
-    own = [
+    stop_times = [
         Campaign("paper", experiment={name: 0.1}, measures=MEASURES).system.experiment["stop-time"]
         for name in ("stop_time", "stop-time")
     ]
-    assert own == [0.1, 0.1]
+    assert stop_times == [0.1, 0.1]
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])

@@ -91,18 +91,18 @@ def expected(tmp_path_factory):
     folder = tmp_path_factory.mktemp("expected")
     file = folder / "small.toml"
     file.write_text(CAMPAIGN.format(runs=24, stop=0.3), encoding="utf-8")
-    own = af.campaign.Campaign.from_toml(file)
-    found = []
-    for run in range(len(own)):
-        new = own.changes(run)
+    campaign = af.campaign.Campaign.from_toml(file)
+    measures = []
+    for run in range(len(campaign)):
+        new = campaign.changes(run)
         results = af.paper().run(
             start_values=new["start_values"], faults=new["faults"], stop_time=0.3, record_every="step"
         )
         error = results["plant.f_fric"] - results["controller.f_hat"]
-        found.append((np.max(np.abs(results["plant.x_p"])), np.sqrt(np.mean(np.square(error)))))
+        measures.append((np.max(np.abs(results["plant.x_p"])), np.sqrt(np.mean(np.square(error)))))
     return {
         name: np.array(column).tobytes()
-        for name, column in zip(("peak", "estimate"), zip(*found, strict=True), strict=True)
+        for name, column in zip(("peak", "estimate"), zip(*measures, strict=True), strict=True)
     }
 
 
@@ -112,17 +112,17 @@ def test_rows_are_those_of_single_runs_bit_for_bit_for_any_number_of_workers(
 ):
     status, out, messages = done(campaign(), "--out", tmp_path / "out", "--workers", workers)
     assert (status, messages) == (0, "")
-    found = rows(tmp_path / "out")
-    assert {name: found[name] for name in expected} == expected
-    assert found["run"] == list(range(24))
+    table = rows(tmp_path / "out")
+    assert {name: table[name] for name in expected} == expected
+    assert table["run"] == list(range(24))
     assert "24 runs" in out
 
 
 def free_port():
     """A port that is free now."""
-    with socket.socket() as own:
-        own.bind(("127.0.0.1", 0))
-        return own.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
 
 
 class Cluster:
@@ -165,14 +165,14 @@ class Cluster:
 @pytest.fixture
 def cluster(tmp_path):
     """A scheduler and two workers with folders of their own."""
-    own = Cluster(tmp_path / "cluster")
-    own.folder.mkdir()
-    own.scheduler()
-    own.worker("one")
-    own.worker("two")
-    yield own
-    for name in list(own.processes):
-        own.kill(name)
+    cluster = Cluster(tmp_path / "cluster")
+    cluster.folder.mkdir()
+    cluster.scheduler()
+    cluster.worker("one")
+    cluster.worker("two")
+    yield cluster
+    for name in list(cluster.processes):
+        cluster.kill(name)
 
 
 def parts(folder):
@@ -200,10 +200,10 @@ def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, 
     assert process.poll() is None, process.communicate()
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    kept = parts(folder)
-    assert 0 < kept < 30
+    count = parts(folder)
+    assert 0 < count < 30
     process = command(*words)
-    wait_for(lambda: parts(folder) > kept or process.poll() is not None)
+    wait_for(lambda: parts(folder) > count or process.poll() is not None)
     cluster.kill("scheduler")
     out, messages = process.communicate(timeout=120)
     assert process.returncode == 1, (out, messages)
@@ -353,9 +353,9 @@ def test_runs_that_fail_or_last_too_long_have_their_reason_and_the_others_go_on(
     assert "F_c" in table["reason"][4]
     assert np.isnan(table["peak"][4])
     assert "5 of 8 runs did not finish" in out
-    kept = parquet.read_table(folder / "signals" / "run-000000000.parquet")
-    assert kept.column_names == ["time", "plant.x_p"]
-    assert np.max(np.abs(kept["plant.x_p"].to_numpy())) == table["peak"][0]
+    signals = parquet.read_table(folder / "signals" / "run-000000000.parquet")
+    assert signals.column_names == ["time", "plant.x_p"]
+    assert np.max(np.abs(signals["plant.x_p"].to_numpy())) == table["peak"][0]
 
 
 MISBEHAVING = """<?xml version="1.0" encoding="UTF-8"?>
@@ -456,9 +456,9 @@ def test_a_random_campaign_ends_when_its_bound_is_tight_whatever_the_number_of_w
         folder = tmp_path / f"out-{workers}"
         assert done(file, "--out", folder, "--workers", workers)[0] == 0
         outcome = af.campaign.load(folder)
-        found = outcome.failure_probability("start")
-        assert found.upper - found.lower <= 0.1
-        assert found.lower < 0.1 < found.upper
+        estimate = outcome.failure_probability("start")
+        assert estimate.upper - estimate.lower <= 0.1
+        assert estimate.lower < 0.1 < estimate.upper
         ends.append(rows(folder))
     assert ends[0] == ends[1]
     assert 50 < len(ends[0]["run"]) < 400
@@ -502,14 +502,14 @@ def test_a_full_disk_ends_the_campaign_with_one_sentence(campaign, tmp_path):
 def test_the_command_passes_campaigns_to_python(campaign, tmp_path):
     words = [str(af.command()), "campaign", str(campaign()), "--check"]
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    found = subprocess.run(
+    process = subprocess.run(
         words, capture_output=True, text=True, env={**os.environ, "PATH": path}, cwd=tmp_path
     )
-    assert (found.returncode, found.stdout, found.stderr) == (0, "small: 24 runs\n", "")
+    assert (process.returncode, process.stdout, process.stderr) == (0, "small: 24 runs\n", "")
     nowhere = {**os.environ, "ASO_FTC_PYTHON": "/nowhere/python"}
-    found = subprocess.run(words, capture_output=True, text=True, env=nowhere)
-    assert found.returncode == 2
-    assert found.stderr.startswith("error: campaigns need Python, and /nowhere/python cannot be started")
+    process = subprocess.run(words, capture_output=True, text=True, env=nowhere)
+    assert process.returncode == 2
+    assert process.stderr.startswith("error: campaigns need Python, and /nowhere/python cannot be started")
 
 
 def test_the_help_of_the_command_lists_the_options_of_the_package():

@@ -30,20 +30,20 @@ def test_the_worst_case_is_the_largest_value_of_the_function(tmp_path):
         "a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]},
         "b": {"from": 0.1, "to": 0.2, "set": PLACES["b"]},
     }
-    own = campaign({"method": "random", "runs": 600}, hills, parameters=ranges, seed=1)
-    found = own.worst_case(tmp_path / "search", "y", workers=2)
-    assert found.value == pytest.approx(3.0, abs=1e-2) and found.runs <= 600 and found.unfinished == 0
-    assert [found.values["a"], 100 * found.values["b"]] == pytest.approx([27.0, 12.0], abs=0.1)
-    assert list(found.history) == sorted(found.history) and found.history[-1] == found.value
-    assert found.arguments["start_values"]["plant.F_c"] == found.values["a"]
+    study = campaign({"method": "random", "runs": 600}, hills, parameters=ranges, seed=1)
+    worst_case = study.worst_case(tmp_path / "search", "y", workers=2)
+    assert worst_case.value == pytest.approx(3.0, abs=1e-2) and worst_case.runs <= 600 and worst_case.unfinished == 0
+    assert [worst_case.values["a"], 100 * worst_case.values["b"]] == pytest.approx([27.0, 12.0], abs=0.1)
+    assert list(worst_case.history) == sorted(worst_case.history) and worst_case.history[-1] == worst_case.value
+    assert worst_case.arguments["start_values"]["plant.F_c"] == worst_case.values["a"]
     # All runs are in the folder: the same call does none of them again, also without workers.
-    again = own.worst_case(tmp_path / "search", "y", scheduler="tcp://127.0.0.1:9")
-    assert again == found
+    again = study.worst_case(tmp_path / "search", "y", scheduler="tcp://127.0.0.1:9")
+    assert again == worst_case
 
 
 def test_the_probability_of_a_half_space_is_that_of_the_normal_distribution(tmp_path):
     # The sum of two independent standard normal variables has the deviation sqrt(2): P(z > 3.5) = 2.33e-4.
-    own = campaign(
+    study = campaign(
         {"method": "random", "runs": 500},
         '(parameter("a") - 25) / 0.5 + (parameter("b") - 0.1) / 0.005',
         parameters={
@@ -53,13 +53,13 @@ def test_the_probability_of_a_half_space_is_that_of_the_normal_distribution(tmp_
         limits={"y": {"below": 3.5 * math.sqrt(2)}},
         seed=1,
     )
-    found = own.rare_event(tmp_path / "rare", "y", workers=2)
+    estimate = study.rare_event(tmp_path / "rare", "y", workers=2)
     exact = norm.sf(3.5)
-    assert found.lower < exact < found.upper and 0.5 * exact < found.probability < 2 * exact
-    assert 0 < found.variation < 0.5 and found.upper / found.lower < 10
+    assert estimate.lower < exact < estimate.upper and 0.5 * exact < estimate.probability < 2 * exact
+    assert 0 < estimate.variation < 0.5 and estimate.upper / estimate.lower < 10
     # Counting needs 1 / exact runs for one failure.
-    assert found.runs < 0.6 / exact and found.levels[-1] == pytest.approx(0.0)
-    assert list(found.levels) == sorted(found.levels)
+    assert estimate.runs < 0.6 / exact and estimate.levels[-1] == pytest.approx(0.0)
+    assert list(estimate.levels) == sorted(estimate.levels)
 
 
 def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):

@@ -14,23 +14,23 @@ def pendulum():
     return af.fmus()["FrictionPendulum"]
 
 
-def is_whole(own):
+def is_whole(container):
     """What collections.abc promises: length, iteration and membership agree, and each name has its value."""
-    names = list(own)
-    assert isinstance(own, Collection) and len(own) == len(names) == len(set(names)) > 0
-    assert all(name in own for name in names) and "no such name" not in own and 0 not in own
-    assert all(np.array_equal(own[name], own[name]) for name in names)
+    names = list(container)
+    assert isinstance(container, Collection) and len(container) == len(names) == len(set(names)) > 0
+    assert all(name in container for name in names) and "no such name" not in container and 0 not in container
+    assert all(np.array_equal(container[name], container[name]) for name in names)
     with pytest.raises(KeyError, match="no such name"):
-        own["no such name"]
-    assert bool(own)
+        container["no such name"]
+    assert bool(container)
 
 
 def test_descriptions_results_and_simulations_are_whole_containers(paper, pendulum):
     description, results = af.read_model_description(pendulum), paper.run()
-    for own in (description, results):
-        is_whole(own)
-        assert isinstance(own, Mapping) and list(own.keys()) == list(own) == [name for name, _ in own.items()]
-        assert own.get("no such name", 3) == 3 and dict(own).keys() == own.keys()
+    for container in (description, results):
+        is_whole(container)
+        assert isinstance(container, Mapping) and list(container.keys()) == list(container) == [name for name, _ in container.items()]
+        assert container.get("no such name", 3) == 3 and dict(container).keys() == container.keys()
     with paper.simulation() as simulation:
         is_whole(simulation)
         assert list(simulation) == simulation.names()
@@ -81,10 +81,10 @@ def test_every_representation_is_short_and_every_page_is_a_table(paper, pendulum
     campaign = af.campaign.Campaign(
         paper, parameters={"plant.F_c": [20.0, 30.0]}, measures={"peak": "max(plant.x_p)"}
     )
-    for own in (description, results, paper, design, campaign, af.check(pendulum, run=False)):
-        assert len(repr(own)) < 200 and "\n" not in repr(own), own
-        html = own._repr_html_()
-        assert html.count("<table>") == html.count("</table>") == 1 and html.count("<tr>") >= 2, own
+    for item in (description, results, paper, design, campaign, af.check(pendulum, run=False)):
+        assert len(repr(item)) < 200 and "\n" not in repr(item), item
+        html = item._repr_html_()
+        assert html.count("<table>") == html.count("</table>") == 1 and html.count("<tr>") >= 2, item
     name = "<script>"
     assert "<script>" not in af.System().add(name, pendulum)._repr_html_()
 

@@ -14,20 +14,20 @@ PLANT = ROOT / "fmu-controller" / "pendulum.toml"
 
 
 @pytest.fixture(scope="module")
-def made():
+def design():
     return af.design(PLANT)
 
 
-def test_a_design_has_the_numbers_and_the_verdict_of_the_command(made, tmp_path):
+def test_a_design_has_the_numbers_and_the_verdict_of_the_command(design, tmp_path):
     words = ["design", PLANT, "--out", tmp_path / "design.toml", "--report", tmp_path / "r.html", "--json"]
     done = subprocess.run([af.command(), *words], check=False, capture_output=True, text=True)
     # The paper's design is red: its peak of S at the measurements is above 4.
-    assert done.returncode == 1 and made.verdict == "red" and not made.ok
-    assert made.report == json.loads(done.stdout)
-    assert made.design_file == (tmp_path / "design.toml").read_text(encoding="utf-8")
-    assert made.page() == (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert all(own["holds"] for own in made.checks)
-    assert {name: gain.shape for name, gain in made.gains.items()} == {
+    assert done.returncode == 1 and design.verdict == "red" and not design.ok
+    assert design.report == json.loads(done.stdout)
+    assert design.design_file == (tmp_path / "design.toml").read_text(encoding="utf-8")
+    assert design.page() == (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert all(check["holds"] for check in design.checks)
+    assert {name: gain.shape for name, gain in design.gains.items()} == {
         "K_x": (1, 4),
         "K_f": (1, 1),
         "L_x": (4, 2),
@@ -38,20 +38,20 @@ def test_a_design_has_the_numbers_and_the_verdict_of_the_command(made, tmp_path)
 def matrices():
     """The pendulum of the plant file."""
     tomllib = pytest.importorskip("tomllib")
-    own = tomllib.loads(PLANT.read_text(encoding="utf-8"))
-    return own, [np.array(own[name]) for name in ("A", "B", "C")]
+    pendulum = tomllib.loads(PLANT.read_text(encoding="utf-8"))
+    return pendulum, [np.array(pendulum[name]) for name in ("A", "B", "C")]
 
 
-def test_a_dict_and_matrices_give_the_same_gains(made, tmp_path):
-    own, (a, b, c) = matrices()
-    of_dict = af.design(own)
-    assert all(np.array_equal(of_dict.gains[name], made.gains[name]) for name in made.gains)
-    rest = {name: value for name, value in own.items() if name not in ("A", "B", "C", "F_a")}
-    rest["F_a"] = np.array(own["F_a"])
+def test_a_dict_and_matrices_give_the_same_gains(design, tmp_path):
+    pendulum, (a, b, c) = matrices()
+    of_dict = af.design(pendulum)
+    assert all(np.array_equal(of_dict.gains[name], design.gains[name]) for name in design.gains)
+    rest = {name: value for name, value in pendulum.items() if name not in ("A", "B", "C", "F_a")}
+    rest["F_a"] = np.array(pendulum["F_a"])
     np.savez(tmp_path / "plant.npz", A=a, B=b, C=c, F_a=rest["F_a"])
     for plant in ((a, b, c), tmp_path / "plant.npz"):
         of_matrices = af.design(plant, **rest)
-        assert all(np.array_equal(of_matrices.gains[name], made.gains[name]) for name in made.gains)
+        assert all(np.array_equal(of_matrices.gains[name], design.gains[name]) for name in design.gains)
 
 
 def test_matrices_alone_get_names_and_a_linear_system_is_accepted():
@@ -75,36 +75,36 @@ def test_matrices_alone_get_names_and_a_linear_system_is_accepted():
     assert all(np.array_equal(third.gains[name], first.gains[name]) for name in first.gains)
 
 
-def test_the_controller_fmu_runs(made, tmp_path):
-    path = made.controller.fmu(tmp_path / "Own.fmu")
-    names = {own.name for own in af.read_model_description(path).variables}
+def test_the_controller_fmu_runs(design, tmp_path):
+    path = design.controller.fmu(tmp_path / "Own.fmu")
+    names = {variable.name for variable in af.read_model_description(path).variables}
     assert "f_hat" in names
     system = af.paper().add("controller", path, replace=True)
-    own, packed = system.run(stop_time=0.1), af.paper().run(stop_time=0.1)
-    assert np.array_equal(own["plant.x_p"], packed["plant.x_p"])
+    results, packed = system.run(stop_time=0.1), af.paper().run(stop_time=0.1)
+    assert np.array_equal(results["plant.x_p"], packed["plant.x_p"])
 
 
 def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
-    own, _ = matrices()
-    sampled = af.design({**own, "sample_time": 0.01})
+    pendulum, _ = matrices()
+    sampled = af.design({**pendulum, "sample_time": 0.01})
     header, source, runtime = sampled.controller.c_code(tmp_path / "c", single=True)
     assert header.endswith(".h") and runtime.endswith("aso_controller.h") and "float" in Path(source).read_text(encoding="ascii")
     _, library, *_ = sampled.controller.rust_crate(tmp_path / "rust")
     assert "#![no_std]" in Path(library).read_text(encoding="ascii")
     with pytest.raises(af.DesignError, match="sample_time"):
-        af.design(own).controller.c_code(tmp_path / "none")
+        af.design(pendulum).controller.c_code(tmp_path / "none")
 
 
-def test_a_kalman_filter_needs_the_fmu_of_the_plant(made, tmp_path):
+def test_a_kalman_filter_needs_the_fmu_of_the_plant(design, tmp_path):
     with pytest.raises(af.DesignError, match="states an FMU"):
-        made.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
+        design.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
     assert not (tmp_path / "Filter.fmu").exists()
 
 
 def test_a_wrong_plant_is_a_design_error(tmp_path):
-    own, _ = matrices()
+    pendulum, _ = matrices()
     with pytest.raises(af.DesignError) as caught:
-        af.design({**own, "feedback": {"eigenvalues": [1.0]}})
+        af.design({**pendulum, "feedback": {"eigenvalues": [1.0]}})
     assert isinstance(caught.value, ValueError)
     file = tmp_path / "plant.toml"
     file.write_text("A = 1\n", encoding="utf-8")
@@ -139,8 +139,8 @@ def test_a_plant_of_any_package_gives_the_same_loop(servo, kind):
         "control": control.ss(a, b, c, 0),
         "control transfer function": control.tf([0.5], [1, 0.5, 0]),
     }[kind]
-    made = af.design(plant, **REQUIREMENTS)
-    ours, theirs = servo.controller.system, made.controller.system
+    design = af.design(plant, **REQUIREMENTS)
+    ours, theirs = servo.controller.system, design.controller.system
     at = 1j * np.logspace(-1, 2, 20)
     assert np.allclose(ours(at), theirs(at), rtol=1e-9)
 
@@ -148,13 +148,13 @@ def test_a_plant_of_any_package_gives_the_same_loop(servo, kind):
 def test_a_transfer_function_of_several_inputs_has_its_poles_once_and_its_response():
     control = pytest.importorskip("control")
     plant = control.tf([[[1], [2]], [[1, 1], [3]]], [[[1, 1], [1, 3, 2]], [[1, 5, 6], [1, 1]]])
-    made = af.design(
+    design = af.design(
         plant, actuator_faults="all", feedback={"region": {"decay": 1.5}}, observer={"region": {"decay": 3.0}}
     )
     # McMillan degree: -1 twice, -2 twice, -3 once (minors: 3 / (s + 1)^2 - 2 / ((s + 2)^2 (s + 3))).
-    assert sorted(made.plant.poles().real.round(6)) == [-3.0, -2.0, -2.0, -1.0, -1.0]
+    assert sorted(design.plant.poles().real.round(6)) == [-3.0, -2.0, -2.0, -1.0, -1.0]
     for s in 1j * np.logspace(-1, 1, 5):
-        assert np.allclose(made.plant(s), plant(s), rtol=1e-8)
+        assert np.allclose(design.plant(s), plant(s), rtol=1e-8)
 
 
 def test_the_loop_is_that_of_python_control(servo):
@@ -202,9 +202,9 @@ def test_a_design_travels_and_is_changed(servo):
 
 
 def test_matrices_alone_get_bandwidths_and_a_green_verdict():
-    made = af.design(([[0, 1], [0, -0.5]], [0, 0.5], [1, 0]), actuator_faults="all")
-    assert made.ok and made.verdict == "green"
-    assert all("bandwidth" in made.report[part]["method"] for part in ("feedback", "observer"))
+    design = af.design(([[0, 1], [0, -0.5]], [0, 0.5], [1, 0]), actuator_faults="all")
+    assert design.ok and design.verdict == "green"
+    assert all("bandwidth" in design.report[part]["method"] for part in ("feedback", "observer"))
 
 
 def test_a_sampled_system_gives_the_design_of_the_plant_that_was_sampled():
@@ -223,8 +223,8 @@ def test_a_trade_off_shows_what_speed_costs(tmp_path):
     compared = af.trade_off(SERVO, {"observer.eigenvalues": speeds}, **REQUIREMENTS)
     assert [row["verdict"] == "refused" for row in compared] == [False, False, False, True]
     assert [row["observer_speed"] for row in compared][:3] == pytest.approx([4, 8, 16])
-    for row, made in list(zip(compared, compared.designs))[:3]:
-        assert row["peak_of_S"] == max(point["judged"] for point in made.report["robustness"]["points"])
+    for row, design in list(zip(compared, compared.designs))[:3]:
+        assert row["peak_of_S"] == max(point["judged"] for point in design.report["robustness"]["points"])
     noise = [row["noise"] for row in compared][:3]
     assert noise == sorted(noise) and noise[2] > 2 * noise[0]
     assert compared.pareto("observer_speed", "noise") == [0, 1, 2]

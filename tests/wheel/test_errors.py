@@ -79,9 +79,9 @@ def test_errors_survive_pickle_with_their_fields(paper):
         assert type(error) is af.TimeLimitError
         assert (str(error), error.kind, error.time) == (str(caught.value), "TimeLimit", caught.value.time)
     for name in af.__all__:
-        own = getattr(af, name)
-        if isinstance(own, type) and issubclass(own, af.Error):
-            error = pickle.loads(pickle.dumps(own("a sentence", "Kind", {"what": 1})))
+        member = getattr(af, name)
+        if isinstance(member, type) and issubclass(member, af.Error):
+            error = pickle.loads(pickle.dumps(member("a sentence", "Kind", {"what": 1})))
             assert (str(error), error.kind, error.what) == ("a sentence", "Kind", 1)
 
 

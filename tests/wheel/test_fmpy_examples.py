@@ -68,9 +68,9 @@ def pendulum_as(path, names, stop_time="10"):
             content = old.read(name)
             if name == "modelDescription.xml":
                 text = content.decode()
-                for own, other in names.items():
-                    text, count = re.subn(f'(<ScalarVariable name=)"{own}"', rf'\1"{other}"', text)
-                    assert count == 1, own
+                for variable, other in names.items():
+                    text, count = re.subn(f'(<ScalarVariable name=)"{variable}"', rf'\1"{other}"', text)
+                    assert count == 1, variable
                 content = re.sub(r'stopTime="\S+"', f'stopTime="{stop_time}"', text).encode()
             new.writestr(name, content)
 
@@ -100,8 +100,8 @@ def recorded(monkeypatch):
         return results[-1]
 
     for name, module, function in (("theirs", fmpy, "simulate_fmu"), ("ours", af, "simulate")):
-        own = functools.partial(record, getattr(module, function), runs[name])
-        monkeypatch.setattr(module, function, own)
+        recorder = functools.partial(record, getattr(module, function), runs[name])
+        monkeypatch.setattr(module, function, recorder)
     return runs
 
 
@@ -137,7 +137,7 @@ def test_a_notebook_of_fmpy_gives_the_rows_of_fmpy(model, folder, packed):
     util.create_jupyter_notebook("model.fmu")
     cells = nbformat.read("model.ipynb", as_version=4).cells
     (text,) = (cell.source for cell in cells if cell.cell_type == "code")
-    theirs, ours = (execute(own)["result"] for own in (text, changed(text, table(1))[0]))
+    theirs, ours = (execute(code)["result"] for code in (text, changed(text, table(1))[0]))
     assert list(ours) == list(theirs.dtype.names)
     # FMPy doubles the step until a run has at most 1000 of them.
     rows = np.searchsorted(ours.time, theirs["time"] - 1e-6)

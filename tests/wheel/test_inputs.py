@@ -22,15 +22,15 @@ def first():
 
 
 FORMS = {
-    "results": lambda own: own,
-    "pandas": lambda own: own.to_pandas(),
-    "a column of pandas": lambda own: own.to_pandas().reset_index(),
-    "polars": lambda own: own.to_polars(),
-    "xarray": lambda own: own.to_xarray(),
-    "arrow": lambda own: own.to_arrow(),
-    "a batch of arrow": lambda own: own.to_arrow().to_batches()[0],
-    "numpy": lambda own: own.to_numpy(),
-    "lists": lambda own: {"time": own.time.tolist(), "u": own["u"].tolist()},
+    "results": lambda results: results,
+    "pandas": lambda results: results.to_pandas(),
+    "a column of pandas": lambda results: results.to_pandas().reset_index(),
+    "polars": lambda results: results.to_polars(),
+    "xarray": lambda results: results.to_xarray(),
+    "arrow": lambda results: results.to_arrow(),
+    "a batch of arrow": lambda results: results.to_arrow().to_batches()[0],
+    "numpy": lambda results: results.to_numpy(),
+    "lists": lambda results: {"time": results.time.tolist(), "u": results["u"].tolist()},
 }
 
 
@@ -62,7 +62,7 @@ def test_units_of_a_table_are_converted(first):
 
 
 @pytest.mark.parametrize(
-    ("given", "text"),
+    ("table", "text"),
     [
         ({"time": TIME, "U": FORCE}, "no variable 'U'; similar: u"),
         ({"time": TIME, "u": FORCE, "x_p": FORCE}, r"found x_p \(continuous output\)"),
@@ -76,9 +76,9 @@ def test_units_of_a_table_are_converted(first):
         (3.0, "found float"),
     ],
 )
-def test_a_wrong_table_is_refused_with_its_row_and_no_path(given, text):
+def test_a_wrong_table_is_refused_with_its_row_and_no_path(table, text):
     with pytest.raises(af.ConfigurationError, match=text) as caught:
-        run(input=given)
+        run(input=table)
     assert str(caught.value).startswith("input: ") and "/" not in str(caught.value)
 
 
@@ -108,8 +108,8 @@ def test_arrays_go_in_and_come_out_in_their_dimensions(packed):
         lambda t: {"u": u},
         {"time": [0.0, 1.0], "u[1]": [1.0, 1.0], "u[2]": [-2.0, -2.0]},
     ]
-    for given in inputs:
-        results = af.simulate(fmu, stop_time=1.0, start_values=values, input=given, tolerance=1e-9)
+    for signal in inputs:
+        results = af.simulate(fmu, stop_time=1.0, start_values=values, input=signal, tolerance=1e-9)
         rows = len(results.time)
         assert results["y"].shape == (rows, 2) and "y" in results and results.names == ["time", "y[1]", "y[2]"]
         assert np.array_equal(results["y"][:, 1], results["y[2]"])

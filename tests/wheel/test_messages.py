@@ -45,8 +45,8 @@ def pendulum():
 def test_a_sentence_has_the_words_of_python(call, text):
     with pytest.raises((af.ConfigurationError, af.DesignError), match=text) as caught:
         call()
-    found = FOREIGN.search(str(caught.value))
-    assert not found, f"{found[0]!r} in: {caught.value}"
+    match = FOREIGN.search(str(caught.value))
+    assert not match, f"{match[0]!r} in: {caught.value}"
 
 
 @pytest.mark.parametrize("call", [af.simulate, lambda fmu, **other: af.paper().run(**other)])
@@ -69,14 +69,14 @@ def test_every_keyword_of_fmpy_that_is_missing_here_has_an_answer_or_is_unknown(
     from aso_ftc._system import _FMPY
 
     theirs = set(inspect.signature(fmpy.simulate_fmu).parameters)
-    own = set(inspect.signature(af.simulate).parameters)
-    assert set(_FMPY) <= theirs - own
+    ours = set(inspect.signature(af.simulate).parameters)
+    assert set(_FMPY) <= theirs - ours
     # Switches of FMPy's own work, which have nothing to do here.
     rest = {
         "filename", "apply_default_start_values", "visible", "model_description", "set_input_derivatives",
         "remote_platform", "early_return_allowed", "use_event_mode", "initialize", "terminate", "set_stop_time",
     }  # fmt: skip
-    assert theirs - own - set(_FMPY) == rest
+    assert theirs - ours - set(_FMPY) == rest
 
 
 def test_each_fmu_has_a_logger_and_debugging_is_its_level(paper, caplog):

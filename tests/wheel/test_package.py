@@ -50,12 +50,12 @@ def test_every_type_of_the_public_interface_is_stated(tmp_path):
 
 def test_every_public_name_has_a_docstring():
     for name in af.__all__:
-        own = getattr(af, name)
+        value = getattr(af, name)
         if name == "__version__":
             continue
-        assert inspect.getdoc(own), name
-        if inspect.isclass(own):
-            members = vars(own).items()
+        assert inspect.getdoc(value), name
+        if inspect.isclass(value):
+            members = vars(value).items()
             functions = [(k, v) for k, v in members if callable(v) and not k.startswith("_")]
             assert all(inspect.getdoc(v) for _, v in functions), name
 
@@ -63,7 +63,7 @@ def test_every_public_name_has_a_docstring():
 def test_the_examples_of_docstrings_hold():
     modules = [af, *(sys.modules[name] for name in list(sys.modules) if name.startswith("aso_ftc._"))]
     done = [doctest.testmod(module) for module in modules]
-    assert sum(own.failed for own in done) == 0 and sum(own.attempted for own in done) >= 4
+    assert sum(result.failed for result in done) == 0 and sum(result.attempted for result in done) >= 4
 
 
 def test_importing_loads_neither_numpy_nor_other_packages(python):

@@ -27,10 +27,10 @@ def test_columns_are_read_only_arrays_of_the_types_of_their_variables(results):
 
 def test_a_column_outlives_its_results(paper):
     column = paper.run()["plant.x_p"]
-    kept = column.copy()
+    snapshot = column.copy()
     for _ in range(20):
         paper.run()
-    assert np.array_equal(column, kept)
+    assert np.array_equal(column, snapshot)
 
 
 def test_results_survive_pickle(results):
@@ -128,10 +128,10 @@ def test_a_picture_is_drawn_into_axes_that_are_given(results):
 
 
 def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
-    own, other = tmp_path / "own.parquet", tmp_path / "other.csv"
-    results.to_parquet(own)
+    parquet, other = tmp_path / "own.parquet", tmp_path / "other.csv"
+    results.to_parquet(parquet)
     other.write_text("time;plant.x_p\n0,0;1,5\n0,1;1,25\n", encoding="utf-8")
-    page = af.report(own, against=other, variables=["plant.x_p"], stop_time=0.05)
+    page = af.report(parquet, against=other, variables=["plant.x_p"], stop_time=0.05)
     text = page.read_text(encoding="utf-8")
     assert page == tmp_path / "own.html" and "plant.x_p" in text and "plant.theta" not in text
     assert af.report(other, out=tmp_path / "page.html") == tmp_path / "page.html"

@@ -74,8 +74,8 @@ def test_the_paper_is_the_experiment_of_the_command(command, tmp_path):
 
 def test_a_dict_a_text_and_calls_describe_the_same_system(paper):
     text = paper.to_toml()
-    own = paper.to_dict()
-    for other in (af.System(text), af.System(own), pickle.loads(pickle.dumps(paper)), paper.copy()):
+    entries = paper.to_dict()
+    for other in (af.System(text), af.System(entries), pickle.loads(pickle.dumps(paper)), paper.copy()):
         assert other.to_toml() == text
         assert same(other.run(), paper.run())
 
@@ -115,7 +115,7 @@ def test_runs_in_threads_give_the_same_rows(paper):
 
     with ThreadPoolExecutor(4) as pool:
         threaded = list(pool.map(run, values))
-    assert all(same(run(value), own) for value, own in zip(values, threaded))
+    assert all(same(run(value), results) for value, results in zip(values, threaded))
 
 
 def test_a_run_ends_at_its_time_limit_with_the_rows_up_to_it(paper):
@@ -172,9 +172,9 @@ def test_ctrl_c_ends_a_run_of_slow_steps_after_the_present_one():
 
 
 def test_progress_goes_from_zero_to_one(paper):
-    seen = []
-    paper.run(stop_time=30.0, progress=seen.append)
-    assert seen == sorted(seen) and seen[-1] == 1.0 and all(0.0 <= part <= 1.0 for part in seen)
+    fractions = []
+    paper.run(stop_time=30.0, progress=fractions.append)
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0 and all(0.0 <= part <= 1.0 for part in fractions)
 
     def refuse(part):
         raise RuntimeError(f"at {part}")
@@ -238,7 +238,7 @@ def test_a_changed_fmu_is_opened_again(tmp_path):
     packed, target = af.fmus(), tmp_path / "model.fmu"
     for name in ("FrictionPendulum", "AsoController"):
         target.write_bytes(packed[name].read_bytes())
-        names = {own.name for own in af.System().add("m", target).variables()}
+        names = {variable.name for variable in af.System().add("m", target).variables()}
         assert f"m.{'F_c' if name == 'FrictionPendulum' else 'f_hat'}" in names
 
 

@@ -16,16 +16,16 @@ def pendulum():
 
 def test_the_description_is_that_of_fmpy():
     for path in af.fmus().values():
-        own, theirs = af.read_model_description(path), fmpy.read_model_description(str(path))
-        assert (own.model_name, own.guid, own.fmi_version) == (
+        description, theirs = af.read_model_description(path), fmpy.read_model_description(str(path))
+        assert (description.model_name, description.guid, description.fmi_version) == (
             theirs.modelName,
             theirs.guid,
             theirs.fmiVersion,
         )
-        assert own.model_identifier == theirs.coSimulation.modelIdentifier
-        assert own.capabilities["canGetAndSetFMUstate"] == theirs.coSimulation.canGetAndSetFMUstate
-        assert len(own.variables) == len(theirs.modelVariables)
-        for variable, other in zip(own.variables, theirs.modelVariables):
+        assert description.model_identifier == theirs.coSimulation.modelIdentifier
+        assert description.capabilities["canGetAndSetFMUstate"] == theirs.coSimulation.canGetAndSetFMUstate
+        assert len(description.variables) == len(theirs.modelVariables)
+        for variable, other in zip(description.variables, theirs.modelVariables):
             assert (variable.name, variable.value_reference) == (other.name, other.valueReference)
             assert (variable.type, variable.causality) == (other.type, other.causality)
             assert (variable.variability, variable.unit) == (other.variability, other.unit)
@@ -33,7 +33,7 @@ def test_the_description_is_that_of_fmpy():
             if variable.type == "Real":
                 start = None if other.start is None else float(other.start)
                 assert variable.start == start, variable.name
-        assert own[own.variables[3].name] is own.variables[3]
+        assert description[description.variables[3].name] is description.variables[3]
 
 
 def columns(result):
@@ -45,12 +45,12 @@ def test_outputs_and_values_are_those_of_fmpy(pendulum):
     theirs = columns(
         fmpy.simulate_fmu(pendulum, stop_time=1.0, step_size=0.01, output_interval=0.01, start_values=values)
     )
-    own = af.simulate(pendulum, stop_time=1.0, step=0.01, start_values=values)
-    assert own.names == list(theirs)
-    assert np.allclose(own.time, theirs["time"], rtol=0, atol=1e-12)
-    for name in own.names[1:]:
+    results = af.simulate(pendulum, stop_time=1.0, step=0.01, start_values=values)
+    assert results.names == list(theirs)
+    assert np.allclose(results.time, theirs["time"], rtol=0, atol=1e-12)
+    for name in results.names[1:]:
         # FMPy adds up its times, so that the last bits of a step's length differ.
-        assert np.allclose(own[name], theirs[name], rtol=1e-9, atol=1e-12), name
+        assert np.allclose(results[name], theirs[name], rtol=1e-9, atol=1e-12), name
 
 
 @pytest.mark.parametrize("form", ["array", "mapping", "pandas"])
@@ -58,9 +58,9 @@ def test_inputs_over_time_act_as_in_fmpy(pendulum, form):
     # A staircase: FMPy holds the input during a step, aso_ftc passes its slope on.
     time, force = np.array([0.0, 0.3, 0.3, 0.7, 0.7, 1.0]), np.array([5.0, 5.0, -4.0, -4.0, 2.0, 2.0])
     array = np.array(list(zip(time, force)), dtype=[("time", float), ("u", float)])
-    given = {"array": array, "mapping": {"u": force, "time": list(time)}}
+    inputs = {"array": array, "mapping": {"u": force, "time": list(time)}}
     if form == "pandas":
-        given[form] = pytest.importorskip("pandas").DataFrame({"time": time, "u": force})
+        inputs[form] = pytest.importorskip("pandas").DataFrame({"time": time, "u": force})
     options = {"stop_time": 1.0, "start_values": {"F_c": 1.0, "F_s": 1.5}}
     names = ["u", "x_p", "theta"]
     theirs = fmpy.simulate_fmu(
@@ -71,21 +71,21 @@ def test_inputs_over_time_act_as_in_fmpy(pendulum, form):
         output=names,
         **options,
     )
-    own = af.simulate(pendulum, step=0.01, input=given[form], output=names, **options)
+    results = af.simulate(pendulum, step=0.01, input=inputs[form], output=names, **options)
     for name in names[1:]:
-        assert np.allclose(own[name], theirs[name], rtol=1e-9, atol=1e-12), name
+        assert np.allclose(results[name], theirs[name], rtol=1e-9, atol=1e-12), name
     # A row has the input at its time; FMPy's rows have the one that the FMU got for the step before.
-    assert np.allclose(own["u"][:-1], theirs["u"][1:], rtol=0, atol=1e-9)
+    assert np.allclose(results["u"][:-1], theirs["u"][1:], rtol=0, atol=1e-9)
 
 
 def test_a_function_of_time_drives_inputs(pendulum):
-    own = af.simulate(pendulum, stop_time=0.5, step=0.01, input=lambda t: {"u": 2.0 * t}, output=["u", "x_p"])
-    assert np.array_equal(own["u"], 2.0 * own.time)
+    results = af.simulate(pendulum, stop_time=0.5, step=0.01, input=lambda t: {"u": 2.0 * t}, output=["u", "x_p"])
+    assert np.array_equal(results["u"], 2.0 * results.time)
     # The same signal as a staircase: each value holds from its communication point to the next.
     system = af.System().add("p", pendulum)
-    system.add_signal("p.u", steps=[[float(t), 2.0 * float(t)] for t in own.time])
+    system.add_signal("p.u", steps=[[float(t), 2.0 * float(t)] for t in results.time])
     stairs = system.run(stop_time=0.5, step=0.01, record=["p.u", "p.x_p"])
-    assert np.array_equal(own["x_p"], stairs["p.x_p"])
+    assert np.array_equal(results["x_p"], stairs["p.x_p"])
     with pytest.raises(af.ConfigurationError, match="no variable"):
         af.simulate(pendulum, input=lambda t: {"force": t})
     with pytest.raises(af.ConfigurationError, match="expected an input without a connection"):
@@ -128,8 +128,8 @@ def test_a_check_has_the_findings_of_the_command(pendulum):
 
 def test_a_start_value_with_the_unit_of_its_variable_is_taken_and_another_unit_is_refused(pendulum):
     values = {"x_p_0": 0.2, "F_c": 15.0}
-    own = af.simulate(pendulum, stop_time=0.1, start_values={"x_p_0": (0.2, "m"), "F_c": 15.0})
-    assert own == af.simulate(pendulum, stop_time=0.1, start_values=values)
+    results = af.simulate(pendulum, stop_time=0.1, start_values={"x_p_0": (0.2, "m"), "F_c": 15.0})
+    assert results == af.simulate(pendulum, stop_time=0.1, start_values=values)
     with pytest.raises(af.ConfigurationError, match="start_values: expected F_c in N, found kN"):
         af.simulate(pendulum, start_values={"F_c": (0.025, "kN")})
     with pytest.raises(af.ConfigurationError, match="start_values: expected linearised in no unit, found s"):

@@ -250,10 +250,10 @@ class Outcome:
     def _sample(self, measure: str, method: str, what: str) -> tuple[dict[str, Any], NDArray[np.float64]]:
         """Return SALib's description of the parameters, and the measure of every row of the design."""
         entry = self._measured(measure)
-        found = self.manifest["design"]["method"]
-        if found != method:
-            sentence = f"{what} need a campaign with the design {method!r}; this one has {found!r}"
-            raise ConfigurationError(sentence, "WrongDesign", {"expected": method, "found": found})
+        design = self.manifest["design"]["method"]
+        if design != method:
+            sentence = f"{what} need a campaign with the design {method!r}; this one has {design!r}"
+            raise ConfigurationError(sentence, "WrongDesign", {"expected": method, "found": design})
         if self.manifest.get("faults"):
             sentence = f"{what} need a campaign without faults; in this one the fault varies, too"
             raise ConfigurationError(sentence, "WrongDesign", {"expected": method, "found": "faults"})
@@ -311,8 +311,8 @@ class Outcome:
         rows = values.reshape(-1, self._block)
         # The rows of second order between A, AB and B are not needed here.
         first = np.ascontiguousarray(np.delete(rows, np.s_[1 + len(self._units) : -1], axis=1)).ravel()
-        found = _sobol(problem, first, False, len(rows), confidence, seed)
-        return self._table(self._units, {name: found[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
+        indices = _sobol(problem, first, False, len(rows), confidence, seed)
+        return self._table(self._units, {name: indices[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
 
     def sobol_second_order(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
         """Return Sobol indices of second order of a design ``saltelli`` with ``second-order = true``.
@@ -327,11 +327,11 @@ class Outcome:
         if self._block == len(self._units) + 2:
             sentence = "Sobol indices of second order need the design 'saltelli' with second-order = true"
             raise ConfigurationError(sentence, "WrongDesign", {"expected": "second-order"})
-        found = _sobol(problem, values, True, len(values) // self._block, confidence, seed)
+        indices = _sobol(problem, values, True, len(values) // self._block, confidence, seed)
         upper = np.triu_indices(len(self._units), 1)
         pairs = [(self._units[i], self._units[j]) for i, j in zip(*upper)]
         index = package("pandas").MultiIndex.from_tuples(pairs, names=["first", "second"])
-        frame = self._table(range(len(pairs)), {name: found[name][upper] for name in ("S2", "S2_conf")})
+        frame = self._table(range(len(pairs)), {name: indices[name][upper] for name in ("S2", "S2_conf")})
         return frame.set_axis(index)
 
     @property
@@ -367,7 +367,7 @@ class Outcome:
         ).sort_by("row")
         positions = np.column_stack([plan.column(f"unit:{name}").to_numpy() for name in self._units])
         levels = int(self.manifest["design"].get("levels", 4))
-        found = package("SALib.analyze.morris").analyze(
+        indices = package("SALib.analyze.morris").analyze(
             problem,
             np.asarray(positions, dtype=np.float64),
             values,
@@ -376,7 +376,7 @@ class Outcome:
             seed=seed,
         )
         return self._table(
-            self._units, {name: found[name] for name in ("mu_star", "mu_star_conf", "mu", "sigma")}
+            self._units, {name: indices[name] for name in ("mu_star", "mu_star_conf", "mu", "sigma")}
         )
 
     def fast(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
@@ -406,10 +406,10 @@ class Outcome:
             np.random.seed(seed)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                found = analyze(problem, values, M=harmonics, conf_level=confidence)
+                indices = analyze(problem, values, M=harmonics, conf_level=confidence)
         finally:
             np.random.set_state(state)
-        return self._table(self._units, {name: found[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
+        return self._table(self._units, {name: indices[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
 
     # Limits.
 
@@ -558,8 +558,8 @@ class Outcome:
         numbers.sort(key=lambda row: -abs(np.nan_to_num(row["correlation"])))
         columns = ["parameter", "value", "runs", "correlation", "p_value", "lowest_tenth", "highest_tenth"]
         pandas_ = package("pandas")
-        found = pandas_.DataFrame(numbers + others, columns=[*columns, "failed", "median"])
-        result: pandas.DataFrame = found.set_index("parameter")
+        table = pandas_.DataFrame(numbers + others, columns=[*columns, "failed", "median"])
+        result: pandas.DataFrame = table.set_index("parameter")
         return result
 
     def heat_map(self, measure: str) -> pandas.DataFrame:
@@ -626,15 +626,15 @@ def _sobol(
     analyze = package("SALib.analyze.sobol").analyze
     sizes = (_RESAMPLES, 50, 25, 10, 5, 2)
     size = next((size for size in sizes if size * base <= _ROWS_OF_A_CALL), sizes[-1])
-    found: dict[str, Any] = {}
+    indices: dict[str, Any] = {}
     parts = _RESAMPLES // size
     # SALib takes the seed 0 for no seed.
     seeds = 1 + np.random.SeedSequence(seed).generate_state(parts).astype(np.int64)
-    for own in seeds:
-        part = analyze(problem, values, second, size, confidence, seed=int(own))
+    for part_seed in seeds:
+        part = analyze(problem, values, second, size, confidence, seed=int(part_seed))
         for name, array in part.items():
-            found[name] = found.get(name, 0.0) + array**2 / parts if name.endswith("_conf") else array
-    return {name: np.sqrt(array) if name.endswith("_conf") else array for name, array in found.items()}
+            indices[name] = indices.get(name, 0.0) + array**2 / parts if name.endswith("_conf") else array
+    return {name: np.sqrt(array) if name.endswith("_conf") else array for name, array in indices.items()}
 
 
 def _group(values: NDArray[np.float64], failed: NDArray[Any]) -> dict[str, Any]:

@@ -50,11 +50,11 @@ def border(x: Numbers, y: Numbers, failed: NDArray[np.bool_]) -> Border | None:
     wrong = 0
     for fold in range(_FOLDS):
         rest = part != fold
-        found = _logistic(matrix[~rest] @ _fit(matrix[rest], failed[rest])) > 0.5
-        wrong += int((found != failed[~rest]).sum())
-    across, along = (np.linspace(own.min(), own.max(), _CELLS) for own in (x, y))
+        predicted = _logistic(matrix[~rest] @ _fit(matrix[rest], failed[rest])) > 0.5
+        wrong += int((predicted != failed[~rest]).sum())
+    across, along = (np.linspace(values.min(), values.max(), _CELLS) for values in (x, y))
     cells = np.meshgrid(across, along)
-    surface = _logistic(terms(*(own.ravel() for own in cells)) @ _fit(matrix, failed))
+    surface = _logistic(terms(*(grid.ravel() for grid in cells)) @ _fit(matrix, failed))
     return Border(across, along, surface.reshape(_CELLS, _CELLS), wrong / len(x))
 
 
@@ -62,10 +62,10 @@ class _Terms:
     """1, x, y, x^2, x y, y^2 of parameters with mean 0 and deviation 1."""
 
     def __init__(self, x: Numbers, y: Numbers) -> None:
-        self._scales = [(own.mean(), own.std()) for own in (x, y)]
+        self._scales = [(values.mean(), values.std()) for values in (x, y)]
 
     def __call__(self, x: Numbers, y: Numbers) -> Numbers:
-        a, b = ((own - mean) / deviation for own, (mean, deviation) in zip((x, y), self._scales))
+        a, b = ((values - mean) / deviation for values, (mean, deviation) in zip((x, y), self._scales))
         return np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=1)
 
 

@@ -109,17 +109,17 @@ class Campaign:
         **options: Any,
     ) -> None:
         folder = options.pop("folder", None)
-        own: dict[str, Any] = {name.replace("_", "-"): value for name, value in options.items()}
-        own["system"] = system
+        entries: dict[str, Any] = {name.replace("_", "-"): value for name, value in options.items()}
+        entries["system"] = system
         stated = {
             "parameters": parameters, "design": design, "measures": measures, "limits": limits,
             "disturbances": disturbances, "faults": faults, "keep": keep, "stop": stop,
         }  # fmt: skip
-        own |= {name: value for name, value in stated.items() if value is not None}
+        entries |= {name: value for name, value in stated.items() if value is not None}
         for name in TABLES:
-            if isinstance(own.get(name), Mapping):
-                own[name] = {str(entry).replace("_", "-"): value for entry, value in own[name].items()}
-        self._read(own, Path(folder) if folder is not None else Path.cwd())
+            if isinstance(entries.get(name), Mapping):
+                entries[name] = {str(entry).replace("_", "-"): value for entry, value in entries[name].items()}
+        self._read(entries, Path(folder) if folder is not None else Path.cwd())
 
     @classmethod
     def from_toml(cls, path: PathLike) -> Campaign:
@@ -129,16 +129,16 @@ class Campaign:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigurationError(f"cannot read {path}: {error}", "File", {"path": str(path)}) from None
-        own = cls.__new__(cls)
+        campaign = cls.__new__(cls)
         try:
             entries = _core.parse_toml(text)
             entries.setdefault("name", path.stem)
-            own._read(entries, path.absolute().parent)
+            campaign._read(entries, path.absolute().parent)
         except ConfigurationError as error:
             fields = {**error.fields, "path": str(path), "line": _line(text, error.fields.get("name"))}
             where = str(path) if fields["line"] is None else f"{path}:{fields['line']}"
             raise ConfigurationError(f"{where}: {error}", error.kind, fields) from None
-        return own
+        return campaign
 
     def _read(self, entries: dict[str, Any], folder: Path) -> None:
         entries = plain(entries)
@@ -174,15 +174,15 @@ class Campaign:
 
     def _inputs(self) -> list[str]:
         """The inputs that a connection drives, which are those that a fault can disturb."""
-        found = []
+        inputs = []
         for name, variable in self._variables.items():
             if variable.causality == "input" and variable.type in ("Real", "Float64", "Float32"):
                 try:
                     self.system.check(faults=[fault(name, "bias", value=0.0)])
                 except Error:
                     continue
-                found.append(name)
-        return found
+                inputs.append(name)
+        return inputs
 
     def _nominal(self, place: str) -> tuple[Any, str | None]:
         variable = self._variables.get(place)
@@ -191,33 +191,33 @@ class Campaign:
         return self.system.start_values.get(place, variable.start), variable.unit
 
     def _parameters(self, entries: Mapping[str, Any], folder: Path) -> list[Parameter]:
-        own = table("parameters", entries.get("parameters", {}))
+        definitions = table("parameters", entries.get("parameters", {}))
         design = entries.get("design", {})
         if isinstance(design, Mapping) and design.get("method") == "table":
             columns = columns_of_table(design.get("file"), folder)
-            for name in own:
+            for name in definitions:
                 if name not in columns:
                     known = ", ".join(columns)
                     raise fail(f"parameters.{name}", f"the table has no such column, it has {known}")
-            stated = own or dict.fromkeys(columns, {})
-            own = {
+            stated = definitions or dict.fromkeys(columns, {})
+            definitions = {
                 name: {**table(f"parameters.{name}", entry), "values": columns[name]}
                 for name, entry in stated.items()
             }
         parameters = []
-        for name, entry in own.items():
+        for name, entry in definitions.items():
             if not _NAME.fullmatch(name):
                 raise fail(f"parameters.{name}", "a name has letters, digits, dots and brackets")
             parameter = Parameter.read(name, entry, self._nominal)
             for place in parameter.places:
                 self._check_place(f"parameters.{name}", place)
             parameters.append(parameter)
-        taken: dict[str, str] = {}
+        owners: dict[str, str] = {}
         for parameter in parameters:
             for place in parameter.places:
-                if place in taken:
-                    raise fail(f"parameters.{parameter.name}", f"{place} is set by {taken[place]}, too")
-                taken[place] = parameter.name
+                if place in owners:
+                    raise fail(f"parameters.{parameter.name}", f"{place} is set by {owners[place]}, too")
+                owners[place] = parameter.name
         return parameters
 
     def _check_place(self, where: str, place: str) -> None:
@@ -228,18 +228,18 @@ class Campaign:
         raise fail(where, f"{place} is neither a variable of the system nor an entry of a disturbance{hint}")
 
     def _measures(self, entries: Mapping[str, Any], folder: Path) -> None:
-        own = table("measures", entries.get("measures", {}))
+        measures = table("measures", entries.get("measures", {}))
         if entries.get("claims", False):
-            own = {**PAPER_CLAIMS, **own}
-        if not own:
+            measures = {**PAPER_CLAIMS, **measures}
+        if not measures:
             raise fail(
                 "measures", 'a campaign needs at least one measure, such as peak = "max(abs(plant.x))"'
             )
         self.expressions: dict[str, Expression] = {}
         self.functions: dict[str, Function] = {}
         self.unfinished: dict[str, float] = {}
-        columns = {"run", "status", "reason", "seconds", "fault", *(own.name for own in self.parameters)}
-        for name, entry in own.items():
+        columns = {"run", "status", "reason", "seconds", "fault", *(parameter.name for parameter in self.parameters)}
+        for name, entry in measures.items():
             if name in columns or name.startswith(("fault.", "unit:")):
                 raise fail(f"measures.{name}", "a column of the results has this name, choose another one")
             short = {"expression": entry} if isinstance(entry, str) else {"python": entry}
@@ -257,9 +257,9 @@ class Campaign:
                 )
         self.limits: dict[str, Any] = table("limits", entries.get("limits", {}))
         for name, limit in self.limits.items():
-            if name not in own:
-                hint = similar(name, own)
-                raise fail(f"limits.{name}", f"no measure has this name, there are {', '.join(own)}{hint}")
+            if name not in measures:
+                hint = similar(name, measures)
+                raise fail(f"limits.{name}", f"no measure has this name, there are {', '.join(measures)}{hint}")
             limit = table(f"limits.{name}", limit)
             if len(limit) != 1 or not set(limit) <= {"below", "above"}:
                 raise fail(f"limits.{name}", "expected { below = number } or { above = number }")
@@ -303,17 +303,17 @@ class Campaign:
     @property
     def signals(self) -> list[str]:
         """The signals that the expressions read."""
-        return sorted(set().union(*(own.signals for own in self.expressions.values())))
+        return sorted(set().union(*(expression.signals for expression in self.expressions.values())))
 
     def sources(self) -> list[str]:
         """Return the paths of the files with functions of the user."""
-        return [own[0] for own in self.functions.values() if isinstance(own, tuple)]
+        return [function[0] for function in self.functions.values() if isinstance(function, tuple)]
 
     def changes(self, run: int) -> dict[str, Any]:
         """Return the arguments of :meth:`System.run` with the values and the fault of a run."""
         values, case = self.plan.row(run)
         return changes(
-            [own.place for own in self.parameters],
+            [parameter.place for parameter in self.parameters],
             self.disturbances,
             self.plan.faults[case],
             values,
@@ -332,13 +332,13 @@ class Campaign:
             "plan": _digest_of_plan(self.plan),
             "parameters": [
                 {
-                    "name": own.name,
-                    "set": list(own.places),
-                    "unit": own.unit,
-                    "numeric": own.numeric,
-                    "levels": None if own.numeric else {text(value): value for value in own.levels or ()},
+                    "name": parameter.name,
+                    "set": list(parameter.places),
+                    "unit": parameter.unit,
+                    "numeric": parameter.numeric,
+                    "levels": None if parameter.numeric else {text(value): value for value in parameter.levels or ()},
                 }
-                for own in self.parameters
+                for parameter in self.parameters
             ],
             "disturbances": self.disturbances,
             "cases": [case.entry for case in self.plan.faults],
@@ -355,13 +355,13 @@ class Campaign:
         }
 
     def _described(self) -> dict[str, dict[str, Any]]:
-        found: dict[str, dict[str, Any]] = {
-            **{name: {"expression": own.text} for name, own in self.expressions.items()},
-            **{name: _describe_function(own) for name, own in self.functions.items()},
+        measures: dict[str, dict[str, Any]] = {
+            **{name: {"expression": expression.text} for name, expression in self.expressions.items()},
+            **{name: _describe_function(function) for name, function in self.functions.items()},
         }
         for name, value in self.unfinished.items():
-            found[name]["unfinished"] = value
-        return found
+            measures[name]["unfinished"] = value
+        return measures
 
     def check(self) -> None:
         """Find what is known before the first run: tries the first and the last run without a step.
@@ -372,7 +372,7 @@ class Campaign:
         recorded = self.signals
         for name in recorded:
             if name not in self._variables:
-                reader = next(key for key, own in self.expressions.items() if name in own.signals)
+                reader = next(key for key, expression in self.expressions.items() if name in expression.signals)
                 hint = similar(name, self._variables)
                 raise fail(f"measures.{reader}", f"the system has no variable {name}{hint}")
         for run in sorted({0, len(self.plan) - 1}):
@@ -497,28 +497,28 @@ class Campaign:
 
     def _repr_html_(self) -> str:
         rows = []
-        for own in self.parameters:
-            values = self.plan.sampled.values[own.name]
-            ends = [f"{min(values):.6g}", f"{max(values):.6g}"] if own.numeric else ["", ""]
-            rows.append([own.name, own.unit or "", *ends, ", ".join(own.places)])
+        for parameter in self.parameters:
+            values = self.plan.sampled.values[parameter.name]
+            ends = [f"{min(values):.6g}", f"{max(values):.6g}"] if parameter.numeric else ["", ""]
+            rows.append([parameter.name, parameter.unit or "", *ends, ", ".join(parameter.places)])
         return page(repr(self), ("parameter", "unit", "min", "max", "sets"), rows)
 
 
 def _system(entries: dict[str, Any], folder: Path) -> System:
     if "system" not in entries:
         raise fail("system", 'a campaign needs a system: a system.toml, an SSP or "paper"')
-    given = entries["system"]
-    if isinstance(given, System):
-        system = given.copy()
-    elif given == "paper":
+    source = entries["system"]
+    if isinstance(source, System):
+        system = source.copy()
+    elif source == "paper":
         system = paper()
-    elif isinstance(given, (str, os.PathLike)):
-        path = folder / given
+    elif isinstance(source, (str, os.PathLike)):
+        path = folder / source
         if not path.exists():
             raise fail("system", f"there is no file {path}")
         system = System.from_toml(path) if path.suffix == ".toml" else System.from_ssp(path)
     else:
-        raise fail("system", f'{given!r}: expected a path or "paper"')
+        raise fail("system", f'{source!r}: expected a path or "paper"')
     for name, value in table("settings", entries.get("settings", {})).items():
         system.start_values[name] = value
     for name in TABLES:

@@ -18,12 +18,12 @@ __all__ = ["arguments", "changed", "changes"]
 
 def changed(system: System, new: Mapping[str, Any]) -> System:
     """Return a copy of the system with the changes of a run."""
-    own = system.copy()
-    own.start_values.update(new["start_values"])
+    variant = system.copy()
+    variant.start_values.update(new["start_values"])
     for name in TABLES:
-        getattr(own, name).update(new[name])
-    own.scenario.setdefault("fault", []).extend(new["faults"])
-    return own
+        getattr(variant, name).update(new[name])
+    variant.scenario.setdefault("fault", []).extend(new["faults"])
+    return variant
 
 
 def changes(
@@ -39,7 +39,7 @@ def changes(
     Noise and random dropouts without a seed of their own get one that depends on the seed of the
     campaign, the number of the run and their position.
     """
-    own: dict[str, Any] = {"start_values": {}, "algorithm": {}, "experiment": {}}
+    overrides: dict[str, Any] = {"start_values": {}, "algorithm": {}, "experiment": {}}
     faults = copy.deepcopy(dict(disturbances))
     for parameter in parameters:
         value = values[parameter.name]
@@ -49,9 +49,9 @@ def changes(
                 kind = next(key for key in faults[table] if key in KINDS)
                 faults[table][kind][entry] = value
             elif table in TABLES:
-                own[table][entry] = value
+                overrides[table][entry] = value
             else:
-                own["start_values"][place] = value
+                overrides["start_values"][place] = value
     entries: list[dict[str, Any]] = []
     for disturbance in faults.values():
         connections = disturbance.pop("connection")
@@ -64,17 +64,17 @@ def changes(
             if kind in disturbed and "seed" not in disturbed[kind]:
                 drawn = np.random.SeedSequence([seed, run, position]).generate_state(1, np.uint32)
                 disturbed[kind]["seed"] = int(drawn[0])
-    own["faults"] = entries
-    return own
+    overrides["faults"] = entries
+    return overrides
 
 
-def arguments(own: Mapping[str, Any]) -> dict[str, Any]:
+def arguments(overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Return the changes of a run as arguments of :meth:`System.run`."""
-    experiment = {name.replace("-", "_"): value for name, value in own["experiment"].items()}
+    experiment = {name.replace("-", "_"): value for name, value in overrides["experiment"].items()}
     for name in experiment:
         if name not in ("start_time", "stop_time", "tolerance"):
             raise fail(f"experiment.{name}", "expected start-time, stop-time or tolerance")
-    found: dict[str, Any] = {"start_values": own["start_values"], "faults": own["faults"], **experiment}
-    if own["algorithm"]:
-        found["algorithm"] = own["algorithm"]
-    return found
+    keywords: dict[str, Any] = {"start_values": overrides["start_values"], "faults": overrides["faults"], **experiment}
+    if overrides["algorithm"]:
+        keywords["algorithm"] = overrides["algorithm"]
+    return keywords

@@ -85,16 +85,16 @@ def _say(word: str, text: object) -> None:
 
 
 def _perform(chosen: argparse.Namespace) -> int:
-    given: Path = chosen.campaign
+    path: Path = chosen.campaign
     if chosen.show is not None:
-        sys.stdout.write(system_of(given, chosen.show).to_toml())
+        sys.stdout.write(system_of(path, chosen.show).to_toml())
         return 0
     if chosen.report is not None:
-        load(given).page(chosen.report)
+        load(path).page(chosen.report)
         return 0
-    if (given / MANIFEST).is_file():
-        raise ConfigurationError(f"{given} has results: name the campaign.toml, or use --report or --show")
-    campaign = Campaign.from_toml(given)
+    if (path / MANIFEST).is_file():
+        raise ConfigurationError(f"{path} has results: name the campaign.toml, or use --report or --show")
+    campaign = Campaign.from_toml(path)
     folder = chosen.out if chosen.out is not None else Path("results") / campaign.name
     if chosen.check:
         campaign.check()
@@ -148,11 +148,11 @@ def _reasons(outcome: Outcome, name: str) -> list[str]:
         shown = "; ".join(label or "no fault" for label in labels[:_SHOWN])
         more = f"; and {len(labels) - _SHOWN} more" if len(labels) > _SHOWN else ""
         return [f"  outside: {shown}{more}"] if labels else []
-    found = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
-    order = (found["highest_tenth"] - found["lowest_tenth"]).abs().sort_values(ascending=False)
+    influence = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
+    order = (influence["highest_tenth"] - influence["lowest_tenth"]).abs().sort_values(ascending=False)
     parts = [
-        f"{own} {100 * found['lowest_tenth'][own]:.0f} % to {100 * found['highest_tenth'][own]:.0f} %"
-        for own in order.index[:_SHOWN]
-        if order[own] > 0
+        f"{parameter} {100 * influence['lowest_tenth'][parameter]:.0f} % to {100 * influence['highest_tenth'][parameter]:.0f} %"
+        for parameter in order.index[:_SHOWN]
+        if order[parameter] > 0
     ]
     return [f"  runs outside, from the lowest to the highest tenth: {', '.join(parts)}"] if parts else []

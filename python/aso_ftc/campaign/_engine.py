@@ -269,7 +269,7 @@ class _Tasks:
                 "Scheduler",
             )
 
-    def wanted(self) -> int:
+    def tasks_to_submit(self) -> int:
         """Return how many tasks keep the cluster busy."""
         self._look()
         ahead = max(_AHEAD, min(_MOST_AHEAD, math.ceil(self.backlog / max(self._seconds, 1e-3))))
@@ -351,7 +351,7 @@ class _Work:
                 if self._is_held() and not tasks:
                     time.sleep(_PAUSE)
                     continue
-                while not self._is_held() and len(tasks) < tasks.wanted() and (first := next(left, self.last)) < self.last:
+                while not self._is_held() and len(tasks) < tasks.tasks_to_submit() and (first := next(left, self.last)) < self.last:
                     tasks.submit(self._numbers(first))
                 # One run of a task may have ended its worker. Each runs alone, so that none is blamed for another.
                 if not tasks and suspects:
@@ -449,12 +449,12 @@ class _Work:
     def _table(self, rows: Sequence[Row]) -> Any:
         arrow = package("pyarrow")
         campaign = self.campaign
-        found = [campaign.plan.row(row.run) for row in rows]
+        plan_rows = [campaign.plan.row(row.run) for row in rows]
         columns: dict[str, Any] = {"run": arrow.array([row.run for row in rows], arrow.int64())}
         for parameter in campaign.parameters:
-            columns[parameter.name] = column(parameter.kind, [own[0][parameter.name] for own in found])
+            columns[parameter.name] = column(parameter.kind, [plan_row[0][parameter.name] for plan_row in plan_rows])
         if campaign.cases:
-            cases = [campaign.plan.faults[own[1]] for own in found]
+            cases = [campaign.plan.faults[plan_row[1]] for plan_row in plan_rows]
             for name, values, kind in (
                 ("fault", [case.label for case in cases], arrow.string()),
                 ("fault.connection", [case.connection for case in cases], arrow.string()),
@@ -491,28 +491,28 @@ class _Stopper:
     """Reads parts in their order and says when the interval of a limit is narrow enough."""
 
     def __init__(self, campaign: Campaign) -> None:
-        self.own, self.limit = campaign.stop, campaign.limits[campaign.stop["limit"]]
+        self.stopping, self.limit = campaign.stop, campaign.limits[campaign.stop["limit"]]
         self.size = campaign.runs_per_task
         # The first run of the next part.
         self.next = self.runs = self.failures = 0
 
     def take(self, part: Path) -> bool:
         """Count the runs of the next part."""
-        table = package("pyarrow.parquet").read_table(part, columns=[self.own["limit"], "status"])
-        pairs = zip(table[self.own["limit"]].to_pylist(), table["status"].to_pylist(), strict=True)
+        table = package("pyarrow.parquet").read_table(part, columns=[self.stopping["limit"], "status"])
+        pairs = zip(table[self.stopping["limit"]].to_pylist(), table["status"].to_pylist(), strict=True)
         bad = sum(status != "ok" or not holds(self.limit, value) for value, status in pairs)
         self.runs, self.failures = self.runs + table.num_rows, self.failures + bad
         self.next += self.size
         test = package("scipy.stats").binomtest(self.failures, self.runs)
-        bounds = test.proportion_ci(confidence_level=self.own["confidence"], method="exact")
-        return bool(bounds.high - bounds.low <= self.own["width"])
+        bounds = test.proportion_ci(confidence_level=self.stopping["confidence"], method="exact")
+        return bool(bounds.high - bounds.low <= self.stopping["width"])
 
 
 def _plugin(name: str, job: bytes) -> Any:
     """Return the plugin, of the class that Dask expects."""
     base = package("distributed").diagnostics.plugin.WorkerPlugin
-    made = type("CampaignPlugin", (_Plugin, base), {"idempotent": True})
-    return made(name, job)
+    plugin = type("CampaignPlugin", (_Plugin, base), {"idempotent": True})
+    return plugin(name, job)
 
 
 def _of_worker(error: BaseException) -> Error:

@@ -38,13 +38,13 @@ NO_FAULT = FaultCase("", None, None, None, None, None)
 
 
 def disturbances(entry: Any) -> dict[str, dict[str, Any]]:
-    own = {name: table(f"disturbances.{name}", value) for name, value in table("disturbances", entry).items()}
-    for name, value in own.items():
+    entries = {name: table(f"disturbances.{name}", value) for name, value in table("disturbances", entry).items()}
+    for name, value in entries.items():
         place = f"disturbances.{name}"
         if name in TABLES or "." in name:
             raise fail(place, "choose another name: it is a table of the system, or has a dot")
         _check_fault(place, value)
-    return own
+    return entries
 
 
 def _check_fault(place: str, value: Mapping[str, Any]) -> str:
@@ -65,21 +65,21 @@ def cases(entries: Any, inputs: Any) -> tuple[FaultCase, ...]:
     cases: list[FaultCase] = []
     for number, entry in enumerate(entries):
         place = f"faults[{number}]"
-        own = table(place, entry)
-        own.setdefault("connection", "all")
-        kind = _check_fault(place, own)
-        connections = inputs() if own["connection"] == "all" else own["connection"]
+        fault = table(place, entry)
+        fault.setdefault("connection", "all")
+        kind = _check_fault(place, fault)
+        connections = inputs() if fault["connection"] == "all" else fault["connection"]
         connections = [connections] if isinstance(connections, str) else connections
         if not connections:
             raise fail(place, "the system has no connection that a fault can disturb")
-        body = dict(own[kind])
+        body = dict(fault[kind])
         names = list(body)
         lists = [value if isinstance(value, (list, tuple)) else [value] for value in body.values()]
         for connection, *values in itertools.product(connections, *lists):
             filled = dict(zip(names, values, strict=True))
             full = {"connection": connection, kind: filled}
-            if "unit" in own:
-                full["unit"] = own["unit"]
+            if "unit" in fault:
+                full["unit"] = fault["unit"]
             size, start = filled.get(_SIZES.get(kind, "")), filled.get("from")
             text = ", ".join(f"{key} = {value}" for key, value in filled.items())
             cases.append(

@@ -80,8 +80,8 @@ class Folder:
                     f"the folder {self.path} is not empty and has no campaign: choose another one"
                 )
             return
-        for entry, found in known.items():
-            if entry not in ("complete", "runs_done", "identity") and found != json.loads(
+        for entry, value in known.items():
+            if entry not in ("complete", "runs_done", "identity") and value != json.loads(
                 json.dumps(self.manifest.get(entry))
             ):
                 raise ConfigurationError(
@@ -130,14 +130,14 @@ def read_manifest(path: Path) -> dict[str, Any] | None:
     """Return the manifest of a folder, or ``None`` if there is none."""
     try:
         text = (path / MANIFEST).read_text(encoding="utf-8")
-        found = json.loads(text)
+        manifest = json.loads(text)
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
         raise ConfigurationError(f"cannot read {path / MANIFEST}: {error}") from None
-    if not isinstance(found, dict) or found.get("format") != _FORMAT:
+    if not isinstance(manifest, dict) or manifest.get("format") != _FORMAT:
         raise ConfigurationError(f"{path / MANIFEST} is not the manifest of a campaign of this version")
-    return found
+    return manifest
 
 
 def _plan_table(campaign: Campaign) -> Any:
@@ -182,13 +182,13 @@ def system_of(path: Path, run: int) -> System:
     row, number = divmod(run, len(manifest["cases"]))
     parquet = package("pyarrow.parquet")
     parameters = manifest["parameters"]
-    table = parquet.read_table(path / "plan.parquet", columns=[own["name"] for own in parameters])
+    table = parquet.read_table(path / "plan.parquet", columns=[parameter["name"] for parameter in parameters])
     values = {}
-    for own in parameters:
-        value = table[own["name"]][row].as_py()
-        values[own["name"]] = own["levels"][value] if own["levels"] is not None else value
+    for parameter in parameters:
+        value = table[parameter["name"]][row].as_py()
+        values[parameter["name"]] = parameter["levels"][value] if parameter["levels"] is not None else value
     entry = manifest["cases"][number]
     case = FaultCase("", None, None, None, None, entry)
-    places = [Place(own["name"], tuple(own["set"])) for own in parameters]
+    places = [Place(parameter["name"], tuple(parameter["set"])) for parameter in parameters]
     new = changes(places, manifest["disturbances"], case, values, manifest["seed"], run)
     return changed(System(manifest["system"]), new)

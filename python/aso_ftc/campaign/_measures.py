@@ -285,11 +285,11 @@ class Expression:
         if name in ("signal", "parameter"):
             if len(node.args) != 1 or not isinstance(node.args[0], ast.Constant) or node.keywords:
                 raise self._wrong(f"{name}(...): expected one name in quotes")
-            own = str(node.args[0].value)
+            identifier = str(node.args[0].value)
             if name == "signal":
-                return self._signal(own)
-            self.parameters.add(own)
-            return lambda run: run.parameters[own]
+                return self._signal(identifier)
+            self.parameters.add(identifier)
+            return lambda run: run.parameters[identifier]
         if name not in _REDUCTIONS and name not in _FUNCTIONS:
             known = [*_REDUCTIONS, *_FUNCTIONS]
             hint = similar(name, known) or f": expected one of {', '.join(known)}"
@@ -309,9 +309,9 @@ class Expression:
         reduction = _REDUCTIONS[name]
 
         def reduced(run: _Run) -> float:
-            own = {key: code(run) for key, code in keywords.items()}
-            window = _Window(run.time, own.pop("start", None), own.pop("end", None))
-            return reduction(window, *(code(run) for code in arguments), **own)
+            options = {key: code(run) for key, code in keywords.items()}
+            window = _Window(run.time, options.pop("start", None), options.pop("end", None))
+            return reduction(window, *(code(run) for code in arguments), **options)
 
         return self._checked(name, reduced)
 

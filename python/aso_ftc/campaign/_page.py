@@ -80,7 +80,7 @@ def _page(outcome: Outcome, script: str) -> str:
         "runs": outcome.runs[rows].tolist(),
     }
     indices = "".join(
-        f'<div class="of-measure">{_indices_note(outcome, own)}</div>' for own in data["measures"]
+        f'<div class="of-measure">{_indices_note(outcome, measure)}</div>' for measure in data["measures"]
     )
     influence = "".join(f'<div class="of-measure">{_influence(outcome, name)}</div>' for name in measures)
     options = "".join(
@@ -194,8 +194,8 @@ def _answer(outcome: Outcome, opened: str) -> str:
     if not outcome.limits:
         lines.append(f"{_share(lost, total)} did not finish. The campaign has no limits, so that nothing else fails.")
     if outcome.inputs and opened:
-        found = outcome.influence(opened)
-        numeric = found[found["correlation"].notna()]["correlation"]
+        influence = outcome.influence(opened)
+        numeric = influence[influence["correlation"].notna()]["correlation"]
         if len(numeric):
             strongest = f"rank correlation with {opened} {numeric.iloc[0]:.2f}"
             decides = abs(numeric.iloc[0]) >= _DECISIVE
@@ -214,8 +214,8 @@ def _border(outcome: Outcome, measure: str) -> dict[str, Any] | None:
     """The two strongest parameters, and the probability of failure over both."""
     if measure not in outcome.limits:
         return None
-    found = outcome.influence(measure)
-    names = list(found[found["correlation"].notna()].index[:2])
+    influence = outcome.influence(measure)
+    names = list(influence[influence["correlation"].notna()].index[:2])
     if len(names) < 2:
         return None
     frame = outcome.read(names)
@@ -292,9 +292,9 @@ def _parameters(outcome: Outcome) -> str:
                 ends = [float(np.nanmin(values)), float(np.nanmax(values))]
                 rows.append(_row([name, units[name] or "", *ends]))
             else:
-                found = sorted(str(value) for value in frame[name].unique())
-                more = f" and {len(found) - 5:,} more" if len(found) > 5 else ""
-                rows.append(_row([name, units[name] or "", ", ".join(found[:5]) + more, ""]))
+                levels = sorted(str(value) for value in frame[name].unique())
+                more = f" and {len(levels) - 5:,} more" if len(levels) > 5 else ""
+                rows.append(_row([name, units[name] or "", ", ".join(levels[:5]) + more, ""]))
     return _table(("parameter", "unit", "lowest", "highest"), rows)
 
 
@@ -316,10 +316,10 @@ def _limits(outcome: Outcome) -> str:
             len(failed),
         ]
         try:
-            found = outcome.failure_probability(name)
-            cells += [found.probability, found.lower, found.upper]
-            if found.note:
-                note = f"Bounds: Clopper and Pearson, 95 %; {found.note}."
+            estimate = outcome.failure_probability(name)
+            cells += [estimate.probability, estimate.lower, estimate.upper]
+            if estimate.note:
+                note = f"Bounds: Clopper and Pearson, 95 %; {estimate.note}."
         except ConfigurationError as error:
             cells += [float(failed.mean()), "", ""]
             note = f"No bounds: {error}."
@@ -350,10 +350,10 @@ def _unfinished(outcome: Outcome) -> str:
 
 
 def _influence(outcome: Outcome, measure: str) -> str:
-    found = outcome.influence(measure)
+    influence = outcome.influence(measure)
     limited = measure in outcome.limits
-    numeric = found[found["value"].isna()]
-    others = found[found["value"].notna()]
+    numeric = influence[influence["value"].isna()]
+    others = influence[influence["value"].notna()]
     text = ""
     if len(numeric):
         head = ["parameter", "rank correlation", "", "p-value"]
@@ -400,7 +400,7 @@ def _measure(outcome: Outcome, name: str) -> dict[str, Any]:
     entry = outcome.manifest["measures"][name]
     values = np.asarray(outcome.read([name])[name].to_numpy(), dtype=np.float64)
     limit = outcome.limits.get(name, {})
-    found: dict[str, Any] = {
+    data: dict[str, Any] = {
         "name": name,
         "unit": entry.get("unit"),
         "expression": str(entry.get("expression") or entry.get("python") or ""),
@@ -412,25 +412,25 @@ def _measure(outcome: Outcome, name: str) -> dict[str, Any]:
     if method in _INDICES:
         try:
             frame = getattr(outcome, _INDICES[method][0])(name)
-            bars = {own: own + "_conf" for own in frame.columns if own + "_conf" in frame.columns}
+            bars = {column: column + "_conf" for column in frame.columns if column + "_conf" in frame.columns}
             bars |= {"sigma": ""} if method == "morris" else {}
-            found["indices"] = {
+            data["indices"] = {
                 "names": list(frame.index),
                 "bars": [
                     {
-                        "name": own,
-                        "values": _numbers(frame[own]),
+                        "name": column,
+                        "values": _numbers(frame[column]),
                         "confidence": _numbers(frame[to]) if to else None,
                     }
-                    for own, to in bars.items()
+                    for column, to in bars.items()
                 ],
                 "unit": entry.get("unit") if method == "morris" else None,
             }
         except ConfigurationError as error:
-            found["no-indices"] = str(error)
+            data["no-indices"] = str(error)
     if _faults(outcome):
-        found["heat"] = _heat(outcome, name)
-    return found
+        data["heat"] = _heat(outcome, name)
+    return data
 
 
 def _indices_note(outcome: Outcome, measure: Mapping[str, Any]) -> str:
@@ -483,12 +483,12 @@ def _histogram(values: NDArray[np.float64]) -> dict[str, Any]:
 
 def _histograms(measures: Iterable[Mapping[str, Any]]) -> str:
     text = ""
-    for at, own in enumerate(measures):
-        notes = [f"{escape(own['expression'])}"]
-        if own["histogram"]["others"]:
-            notes.append(f"{own['histogram']['others']:,} runs without a finite value")
-        if own["histogram"]["outside"]:
-            notes.append(f"{own['histogram']['outside']:,} runs outside the picture")
+    for at, measure in enumerate(measures):
+        notes = [f"{escape(measure['expression'])}"]
+        if measure["histogram"]["others"]:
+            notes.append(f"{measure['histogram']['others']:,} runs without a finite value")
+        if measure["histogram"]["outside"]:
+            notes.append(f"{measure['histogram']['outside']:,} runs outside the picture")
         text += (
             f'<figure><div id="histogram-{at}" class="histogram"></div>'
             f"<figcaption>{'; '.join(note for note in notes if note)}</figcaption></figure>"
@@ -534,8 +534,8 @@ def _choose(outcome: Outcome) -> tuple[NDArray[np.int64], str]:
     second = _even(np.flatnonzero(failed), max(rest // 2, rest - int((~lost & ~failed).sum())))
     third = _even(np.flatnonzero(~lost & ~failed), rest - len(second))
     parts = [
-        f"{len(own):,} of the {int(all_.sum()):,} {text}"
-        for own, all_, text in (
+        f"{len(subset):,} of the {int(all_.sum()):,} {text}"
+        for subset, all_, text in (
             (first, lost, "runs that did not finish"),
             (second, failed, "runs outside a limit"),
             (third, ~lost & ~failed, "other runs"),

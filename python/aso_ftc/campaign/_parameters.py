@@ -96,19 +96,19 @@ class Parameter:
             entry = {"distribution": entry}
         if not isinstance(entry, Mapping):
             raise fail(place, f"expected a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
-        own = dict(entry)
-        places = own.pop("set", [name])
+        entries = dict(entry)
+        places = entries.pop("set", [name])
         places = [places] if isinstance(places, str) else places
         if not places or not all(isinstance(text, str) for text in places):
             raise fail(place, f"set = {places!r}: expected names of variables")
-        unit = own.pop("unit", None)
-        kinds = [kind for kind in ("values", "from", "relative", "distribution") if kind in own]
+        unit = entries.pop("unit", None)
+        kinds = [kind for kind in ("values", "from", "relative", "distribution") if kind in entries]
         if len(kinds) != 1:
             raise fail(place, "expected one of values, from and to, relative, distribution")
-        value, found = (None, unit) if unit is not None and kinds[0] != "relative" else nominal(places[0])
-        unit = found if unit is None else unit
+        value, nominal_unit = (None, unit) if unit is not None and kinds[0] != "relative" else nominal(places[0])
+        unit = nominal_unit if unit is None else unit
         make = {"values": _listed, "from": _range, "relative": _relative, "distribution": _distribution}
-        levels, quantile = make[kinds[0]](place, own, value)
+        levels, quantile = make[kinds[0]](place, entries, value)
         tried = quantile(np.array([0.25, 0.5])) if levels is None else levels
         return cls(name, tuple(places), unit, levels, _kind(tried), quantile)
 
@@ -124,8 +124,8 @@ def _kind(values: Iterable[Any]) -> str:
     return "text" if any(isinstance(value, (bool, str)) for value in values) else "number"
 
 
-def _unknown(place: str, own: Mapping[str, Any], known: Sequence[str]) -> None:
-    for entry in own:
+def _unknown(place: str, entries: Mapping[str, Any], known: Sequence[str]) -> None:
+    for entry in entries:
         if entry not in known:
             hint = similar(entry, known) or f": expected {', '.join(known)}"
             raise fail(place, f"unknown entry {entry}{hint}")
@@ -135,9 +135,9 @@ def _is_distribution(value: Any) -> bool:
     return hasattr(value, "ppf") or hasattr(value, "icdf")
 
 
-def _listed(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
-    _unknown(place, own, ["values", "set", "unit"])
-    values = own["values"]
+def _listed(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any]:
+    _unknown(place, entries, ["values", "set", "unit"])
+    values = entries["values"]
     if not isinstance(values, (list, tuple)) or not values:
         raise fail(place, f"values = {values!r}: expected a list of at least one value")
     if not all(isinstance(value, (bool, int, float, str)) for value in values):
@@ -146,8 +146,8 @@ def _listed(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     return levels, lambda unit: [levels[int(i)] for i in np.minimum(unit * len(levels), len(levels) - 1)]
 
 
-def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tuple[Any, Any]:
-    logarithmic = own.get("logarithmic", False)
+def _between(place: str, entries: Mapping[str, Any], low: float, high: float) -> tuple[Any, Any]:
+    logarithmic = entries.get("logarithmic", False)
     if not isinstance(logarithmic, bool):
         raise fail(place, f"logarithmic = {logarithmic!r}: expected true or false")
     if not low < high:
@@ -161,42 +161,42 @@ def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tup
         return low + unit * (high - low)
 
     levels = None
-    if "steps" in own:
-        steps = whole(f"{place}.steps", own["steps"], 2, MOST_RUNS)
+    if "steps" in entries:
+        steps = whole(f"{place}.steps", entries["steps"], 2, MOST_RUNS)
         inner = quantile(np.linspace(0.0, 1.0, steps))[1:-1]
         levels = (low, *(float(value) for value in inner), high)
     return levels, quantile
 
 
-def _range(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
-    _unknown(place, own, [*_RANGES, "set", "unit"])
-    if "to" not in own:
+def _range(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any]:
+    _unknown(place, entries, [*_RANGES, "set", "unit"])
+    if "to" not in entries:
         raise fail(place, "from without to")
-    levels, quantile = _between(place, own, _number(place, "from", own["from"]), _number(place, "to", own["to"]))
-    ends = (own["from"], own["to"])
-    if levels is not None and all(isinstance(end, int) for end in ends) and "logarithmic" not in own:
+    levels, quantile = _between(place, entries, _number(place, "from", entries["from"]), _number(place, "to", entries["to"]))
+    ends = (entries["from"], entries["to"])
+    if levels is not None and all(isinstance(end, int) for end in ends) and "logarithmic" not in entries:
         # Whole levels stay whole: variables of type Integer take no 1.0.
-        size, rest = divmod(ends[1] - ends[0], own["steps"] - 1)
+        size, rest = divmod(ends[1] - ends[0], entries["steps"] - 1)
         levels = tuple(range(ends[0], ends[1] + 1, size)) if rest == 0 else levels
     return levels, quantile
 
 
-def _relative(place: str, own: dict[str, Any], value: Any) -> tuple[Any, Any]:
-    _unknown(place, own, ["relative", "steps", "set", "unit"])
-    part = _number(place, "relative", own["relative"])
+def _relative(place: str, entries: dict[str, Any], value: Any) -> tuple[Any, Any]:
+    _unknown(place, entries, ["relative", "steps", "set", "unit"])
+    part = _number(place, "relative", entries["relative"])
     if part <= 0:
         raise fail(place, f"relative = {part}: expected a number above 0")
     if isinstance(value, (bool, str)) or value is None or value == 0:
         raise fail(place, f"relative needs a start value other than 0, found {value!r}")
     ends = sorted((value * (1 - part), value * (1 + part)))
-    return _between(place, own, *ends)
+    return _between(place, entries, *ends)
 
 
-def _distribution(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
+def _distribution(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any]:
     stats = package("scipy.stats")
-    name = own["distribution"]
+    name = entries["distribution"]
     if _is_distribution(name):
-        _unknown(place, own, ["distribution", "set", "unit"])
+        _unknown(place, entries, ["distribution", "set", "unit"])
         # A frozen distribution, or one of the classes of scipy.stats.
         quantile = name.ppf if hasattr(name, "ppf") else name.icdf
         if not np.isfinite(quantile(np.array([0.25, 0.5, 0.75]))).all():
@@ -208,15 +208,15 @@ def _distribution(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     discrete = isinstance(family, stats.rv_discrete)
     if not isinstance(family, stats.rv_continuous) and not discrete:
         kinds = (stats.rv_continuous, stats.rv_discrete)
-        hint = similar(name, [own for own in dir(stats) if isinstance(getattr(stats, own), kinds)])
+        hint = similar(name, [attribute for attribute in dir(stats) if isinstance(getattr(stats, attribute), kinds)])
         raise fail(place, f"distribution = {name!r}: expected a name of scipy.stats, such as norm{hint}")
     shapes = [] if family.shapes is None else [text.strip() for text in family.shapes.split(",")]
     allowed = [*shapes, "loc"] if discrete else [*shapes, "loc", "scale"]
-    _unknown(place, own, ["distribution", *allowed, "set", "unit"])
-    missing = [shape for shape in shapes if shape not in own]
+    _unknown(place, entries, ["distribution", *allowed, "set", "unit"])
+    missing = [shape for shape in shapes if shape not in entries]
     if missing:
         raise fail(place, f"distribution {name} needs {', '.join(missing)}")
-    frozen = family(**{key: _number(place, key, own[key]) for key in allowed if key in own})
+    frozen = family(**{key: _number(place, key, entries[key]) for key in allowed if key in entries})
     if not np.isfinite(frozen.ppf([0.25, 0.5, 0.75])).all():
         raise fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
     if discrete:
@@ -244,14 +244,14 @@ def _options(design: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     if method not in METHODS:
         hint = similar(method, METHODS)
         raise fail("design", f"method = {method!r}: expected one of {', '.join(METHODS)}{hint}")
-    own = {**_OPTIONAL.get(method, {}), **{key: value for key, value in design.items() if key != "method"}}
-    _unknown("design", own, list(METHODS[method]))
+    options = {**_OPTIONAL.get(method, {}), **{key: value for key, value in design.items() if key != "method"}}
+    _unknown("design", options, list(METHODS[method]))
     for entry, least in METHODS[method].items():
-        if entry not in own:
+        if entry not in options:
             raise fail("design", f"method {method} needs {entry}")
         if least is not None:
-            whole(f"design.{entry}", own[entry], least, MOST_RUNS)
-    return method, own
+            whole(f"design.{entry}", options[entry], least, MOST_RUNS)
+    return method, options
 
 
 def sample(
@@ -262,28 +262,28 @@ def sample(
     The same design, parameters and seed give the same values on every machine with the same versions
     of NumPy, scipy and SALib; a campaign that goes on takes them from its folder.
     """
-    method, own = _options(design)
-    complete = {"method": method, **own}
+    method, options = _options(design)
+    complete = {"method": method, **options}
     if method == "table":
-        values: dict[str, Any] = {own.name: list(own.levels or ()) for own in parameters}
-        return {**complete, "file": str(own["file"])}, Sampled(values, None, len(next(iter(values.values()))))
+        values: dict[str, Any] = {parameter.name: list(parameter.levels or ()) for parameter in parameters}
+        return {**complete, "file": str(options["file"])}, Sampled(values, None, len(next(iter(values.values()))))
     if not parameters:
         if method != "grid":
             raise fail("parameters", f"a design {method} needs at least one parameter")
         return complete, Sampled({}, None, 1)
     if method == "grid":
         return complete, _grid(parameters)
-    unit = _unit(method, own, len(parameters), seed)
+    unit = _unit(method, options, len(parameters), seed)
     values = {}
     for column, parameter in enumerate(parameters):
-        found = parameter.quantile(unit[:, column])
-        if parameter.numeric and not np.isfinite(np.asarray(found, dtype=float)).all():
+        quantiles = parameter.quantile(unit[:, column])
+        if parameter.numeric and not np.isfinite(np.asarray(quantiles, dtype=float)).all():
             raise fail(
                 f"parameters.{parameter.name}",
                 f"the design {method} reaches the ends of a distribution that has none: "
                 "use a bounded one, such as truncnorm, or from and to",
             )
-        values[parameter.name] = found
+        values[parameter.name] = quantiles
     return complete, Sampled(values, unit, len(unit))
 
 
@@ -295,10 +295,10 @@ def _grid(parameters: Sequence[Parameter]) -> Sampled:
     count = math.prod(map(len, levels))
     if count > MOST_RUNS:
         raise fail("design", f"the grid has {count} runs, expected at most {MOST_RUNS}")
-    places = np.unravel_index(np.arange(np.prod([len(own) for own in levels])), [len(own) for own in levels])
+    places = np.unravel_index(np.arange(np.prod([len(axis) for axis in levels])), [len(axis) for axis in levels])
     values = {
-        parameter.name: [own[i] for i in column]
-        for parameter, own, column in zip(parameters, levels, places, strict=True)
+        parameter.name: [axis[i] for i in column]
+        for parameter, axis, column in zip(parameters, levels, places, strict=True)
     }
     return Sampled(values, None, len(places[0]))
 
@@ -324,13 +324,13 @@ def columns_of_table(file: Any, folder: Path) -> dict[str, list[Any]]:
     return columns
 
 
-def _unit(method: str, own: Mapping[str, Any], count: int, seed: int) -> Numbers:
+def _unit(method: str, options: Mapping[str, Any], count: int, seed: int) -> Numbers:
     if method == "random":
-        return np.random.default_rng(seed).random((own["runs"], count))
+        return np.random.default_rng(seed).random((options["runs"], count))
     if method in ("latin-hypercube", "sobol", "halton"):
         qmc = package("scipy.stats").qmc
         engine = {"latin-hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol, "halton": qmc.Halton}[method]
-        runs = own["runs"]
+        runs = options["runs"]
         if method == "sobol" and runs & (runs - 1):
             power = 1 << (runs - 1).bit_length()
             warnings.warn(
@@ -342,18 +342,18 @@ def _unit(method: str, own: Mapping[str, Any], count: int, seed: int) -> Numbers
             return np.asarray(engine(count, rng=np.random.default_rng(seed)).random(runs))
     problem = {"num_vars": count, "names": [f"x{i}" for i in range(count)], "bounds": [[0.0, 1.0]] * count}
     if method == "saltelli":
-        if own["base"] & (own["base"] - 1):
-            raise fail("design", f"base = {own['base']}: expected a power of two")
+        if options["base"] & (options["base"] - 1):
+            raise fail("design", f"base = {options['base']}: expected a power of two")
         sampler = package("SALib.sample.sobol")
         return np.asarray(
-            sampler.sample(problem, own["base"], calc_second_order=own["second-order"], seed=seed)
+            sampler.sample(problem, options["base"], calc_second_order=options["second-order"], seed=seed)
         )
     if method == "morris":
         sampler = package("SALib.sample.morris")
-        unit = sampler.sample(problem, own["trajectories"], num_levels=own["levels"], seed=seed)
+        unit = sampler.sample(problem, options["trajectories"], num_levels=options["levels"], seed=seed)
         return np.asarray(unit)
-    least = 4 * own["harmonics"] ** 2 + 1
-    if own["base"] < least:
-        raise fail("design", f"base = {own['base']}: {own['harmonics']} harmonics need at least {least}")
+    least = 4 * options["harmonics"] ** 2 + 1
+    if options["base"] < least:
+        raise fail("design", f"base = {options['base']}: {options['harmonics']} harmonics need at least {least}")
     sampler = package("SALib.sample.fast_sampler")
-    return np.asarray(sampler.sample(problem, own["base"], M=own["harmonics"], seed=seed))
+    return np.asarray(sampler.sample(problem, options["base"], M=options["harmonics"], seed=seed))

@@ -89,7 +89,7 @@ class _Batches:
     def part(self, unit: Numbers) -> Campaign:
         """Return the campaign with one run for each row of positions in [0, 1], and each fault."""
         unit = np.clip(unit, _END, 1 - _END)
-        values = {own.name: own.quantile(unit[:, k]) for k, own in enumerate(self.campaign.parameters)}
+        values = {parameter.name: parameter.quantile(unit[:, k]) for k, parameter in enumerate(self.campaign.parameters)}
         part = copy.copy(self.campaign)
         part.name = f"{self.campaign.name} {self.count}"
         design = {"method": "search", "batch": self.count}
@@ -126,10 +126,10 @@ def _batches(
     campaign: Campaign, path: Path, measure: str, workers: int | None, scheduler: str | None
 ) -> Iterator[_Batches]:
     # Neither the end of a random campaign nor kept signals belong to a search.
-    own = copy.copy(campaign)
-    own.stop, own.keep = {}, {}
-    with Session(own, workers, scheduler) as session:
-        yield _Batches(own, path, session, measure)
+    variant = copy.copy(campaign)
+    variant.stop, variant.keep = {}, {}
+    with Session(variant, workers, scheduler) as session:
+        yield _Batches(variant, path, session, measure)
 
 
 def worst_case(
@@ -187,7 +187,7 @@ def worst_case(
             values=values,
             fault=part.plan.faults[case].label if campaign.cases else None,
             arguments=arguments(part.changes(run)),
-            history=tuple(float(own) for own in history),
+            history=tuple(float(entry) for entry in history),
             runs=batches.runs,
             unfinished=batches.unfinished,
         )

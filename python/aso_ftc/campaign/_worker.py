@@ -74,10 +74,10 @@ class Job:
             version=_core.__version__,
             system=campaign.system.copy(),
             files={digest: pack(path) for path, digest in paths.items()},
-            parameters=[own.place for own in campaign.parameters],
+            parameters=[parameter.place for parameter in campaign.parameters],
             disturbances=campaign.disturbances,
             cases=campaign.plan.faults,
-            expressions={name: own.text for name, own in campaign.expressions.items()},
+            expressions={name: expression.text for name, expression in campaign.expressions.items()},
             functions=campaign.functions,
             unfinished=campaign.unfinished,
             limits=campaign.limits,
@@ -98,29 +98,29 @@ class Job:
         for path, digest in self.paths.items():
             name, content = self.files[digest]
             placed[path] = str(_place(folder / digest, name, content))
-        sources = {own[0] for own in self.functions.values() if isinstance(own, tuple)}
+        sources = {function[0] for function in self.functions.values() if isinstance(function, tuple)}
         system = self.system.with_files(
             {path: place for path, place in placed.items() if path not in sources}
         )
         functions = {
-            name: (placed[own[0]], own[1]) if isinstance(own, tuple) else own
-            for name, own in self.functions.items()
+            name: (placed[function[0]], function[1]) if isinstance(function, tuple) else function
+            for name, function in self.functions.items()
         }
         return Runner(self, system, functions)
 
 
 def pack(path: str) -> tuple[str, bytes]:
     """Return the name and the content of a file; of a folder a tar archive."""
-    own = Path(path)
-    if own.is_file():
+    source = Path(path)
+    if source.is_file():
         try:
-            return own.name, own.read_bytes()
+            return source.name, source.read_bytes()
         except OSError as error:
             raise Error(f"cannot read {path}: {error.strerror}") from error
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w") as archive:
-        archive.add(own, arcname=own.name)
-    return own.name + "/", buffer.getvalue()
+        archive.add(source, arcname=source.name)
+    return source.name + "/", buffer.getvalue()
 
 
 def _place(folder: Path, name: str, content: bytes) -> Path:
@@ -155,12 +155,12 @@ class Runner:
             if not isinstance(function, tuple):
                 self.functions[name] = function
                 continue
-            path, own = function
-            found = runpy.run_path(path).get(own)
-            if not callable(found):
-                raise Error(f"measures.{name}: {Path(path).name} has no function {own}")
-            self.functions[name] = found
-        signals = sorted(set().union(*(own.signals for own in self.expressions.values())))
+            path, attribute = function
+            user_function = runpy.run_path(path).get(attribute)
+            if not callable(user_function):
+                raise Error(f"measures.{name}: {Path(path).name} has no function {attribute}")
+            self.functions[name] = user_function
+        signals = sorted(set().union(*(expression.signals for expression in self.expressions.values())))
         # A function of the user may read every input, output and local variable.
         self.record = ["*", *signals] if self.functions else signals or None
 
@@ -185,8 +185,8 @@ class Runner:
         begin = time.perf_counter()
         fault = job.cases[case]
         try:
-            own = changes(job.parameters, job.disturbances, fault, values, job.seed, run)
-            results = self._simulate(own, self.record, job.record_every)
+            overrides = changes(job.parameters, job.disturbances, fault, values, job.seed, run)
+            results = self._simulate(overrides, self.record, job.record_every)
             start = np.nan if fault.start is None else fault.start
             for name, expression in self.expressions.items():
                 row.measures[name] = expression.value(results, results.time, values, start)
@@ -206,17 +206,17 @@ class Runner:
         row.seconds = time.perf_counter() - begin
         if self._kept(row):
             try:
-                kept = self._simulate(own, job.keep.get("record"), job.keep.get("every"))
+                rerun = self._simulate(overrides, job.keep.get("record"), job.keep.get("every"))
             except RunError as error:
-                kept = error.results
+                rerun = error.results
             except Exception:
                 # The run has its reason; there is nothing to keep.
-                kept = None
-            row.signals = None if kept is None else parquet_bytes(kept.to_arrow())
+                rerun = None
+            row.signals = None if rerun is None else parquet_bytes(rerun.to_arrow())
         return row
 
-    def _simulate(self, own: Mapping[str, Any], record: Any, every: Any) -> Any:
-        return self.system.run(**arguments(own), **self.job.options, record=record, record_every=every)
+    def _simulate(self, overrides: Mapping[str, Any], record: Any, every: Any) -> Any:
+        return self.system.run(**arguments(overrides), **self.job.options, record=record, record_every=every)
 
     def _kept(self, row: Row) -> bool:
         keep = self.job.keep
