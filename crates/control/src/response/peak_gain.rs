@@ -5,12 +5,18 @@ use super::impulse_sum::impulse_sums;
 use super::interval::{Bounds, Intervals, Length};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
+use std::collections::HashMap;
+use std::rc::Rc;
 
 /// Largest number of rounds; each round halves the intervals with the widest bounds.
 const ROUNDS: usize = 200;
 /// Intervals wait until no other one has bounds this many times as wide.
 const WIDEST: f64 = 32.0;
 const MOST_INTERVALS: usize = 1 << 18;
+/// Outputs for which the states after an impulse are computed once.
+const OUTPUTS_AT_ONCE: usize = 8;
+/// Largest number of states that are stored for other outputs.
+const MOST_STATES: usize = 1 << 14;
 
 /// Computes the peak-to-peak gain from each input to each output.
 ///
@@ -81,22 +87,68 @@ fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     let mut intervals = Intervals::new(system)?;
     let mut lower = system.d.abs();
     let mut upper = lower.clone();
-    for output in 0..system.c.nrows() {
-        let mut lengths = vec![intervals.first(output)];
+    let outputs: Vec<_> = (0..system.c.nrows()).collect();
+    for outputs in outputs.chunks(OUTPUTS_AT_ONCE) {
+        let mut lengths: Vec<_> = outputs.iter().map(|at| vec![intervals.first(*at)]).collect();
         for input in 0..system.b.ncols() {
-            let count = intervals.extend(&mut lengths, input, 0.25 * width)?;
-            let start = intervals.starts.column(input).into();
-            let (least, most) = integral(&lengths[..count], start, 0.5 * width)?;
-            lower[(output, input)] += least;
-            upper[(output, input)] += most;
+            let mut trajectory = Trajectory::new(intervals.starts.column(input).into());
+            for (output, lengths) in outputs.iter().zip(&mut lengths) {
+                let count = intervals.extend(lengths, input, 0.25 * width)?;
+                let (least, most) = integral(&lengths[..count], &mut trajectory, 0.5 * width)?;
+                lower[(*output, input)] += least;
+                upper[(*output, input)] += most;
+            }
         }
     }
     Ok(Bracket { lower, upper })
 }
 
-/// A part of the time axis: the state at its start, and the bounds over it.
+/// The states after an impulse, which all outputs share.
+struct Trajectory {
+    start: Rc<DVector<f64>>,
+    /// By the time, in shortest intervals.
+    states: HashMap<u128, Rc<DVector<f64>>>,
+}
+
+impl Trajectory {
+    fn new(start: DVector<f64>) -> Self {
+        Self { start: Rc::new(start), states: HashMap::new() }
+    }
+
+    /// The starts of the second halves of intervals that begin at `firsts`; `half`: their length, of 2^`level` of the
+    /// shortest.
+    fn middles(&mut self, half: &Length, level: usize, firsts: &[Start]) -> Vec<Start> {
+        let time = |first: &Start| first.time + (1 << level);
+        let is_missing = |first: &&Start| !self.states.contains_key(&time(first));
+        let missing: Vec<_> = firsts.iter().filter(is_missing).map(|first| &first.state).collect();
+        let products = &*half.phi * columns(&missing);
+        let mut products = products.column_iter();
+        let middle = |first: &Start| {
+            let time = time(first);
+            let state = self.states.get(&time).map(Rc::clone).or_else(|| {
+                let state: Rc<DVector<f64>> = Rc::new(products.next()?.into());
+                if self.states.len() < MOST_STATES {
+                    self.states.insert(time, Rc::clone(&state));
+                }
+                Some(state)
+            })?;
+            Some(Start { time, state })
+        };
+        firsts.iter().filter_map(middle).collect()
+    }
+}
+
+/// Where an interval starts.
+#[derive(Clone)]
+struct Start {
+    /// In shortest intervals.
+    time: u128,
+    state: Rc<DVector<f64>>,
+}
+
+/// An interval with the bounds over it.
 struct Piece {
-    state: DVector<f64>,
+    start: Start,
     bounds: Bounds,
 }
 
@@ -107,12 +159,17 @@ impl Piece {
 }
 
 /// Bounds of the integral of |h| over all time.
-fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64, f64), Error> {
+fn integral(
+    lengths: &[Length],
+    trajectory: &mut Trajectory,
+    width: f64,
+) -> Result<(f64, f64), Error> {
     let longest = lengths.len() - 1;
-    let tail = lengths[longest].tail(&(&*lengths[longest].phi * &start));
+    let start = Start { time: 0, state: Rc::clone(&trajectory.start) };
+    let tail = lengths[longest].tail(&(&*lengths[longest].phi * &*start.state));
     // The pieces of each length: products with all of their states at once are fast.
     let mut pieces: Vec<Vec<Piece>> = lengths.iter().map(|_| Vec::new()).collect();
-    pieces[longest] = of_states(&lengths[longest], &DMatrix::from_columns(&[start]));
+    pieces[longest] = from_starts(&lengths[longest], vec![start]);
     for _ in 0..ROUNDS {
         let sum = |part: fn(&Bounds) -> f64| -> f64 {
             pieces.iter().flatten().map(|piece| part(&piece.bounds)).sum()
@@ -133,24 +190,28 @@ fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64,
         for length in 1..=longest {
             let wide = |piece: &mut Piece| piece.open() > least;
             let wide: Vec<_> =
-                pieces[length].extract_if(.., wide).map(|piece| piece.state).collect();
+                pieces[length].extract_if(.., wide).map(|piece| piece.start).collect();
             if !wide.is_empty() {
-                pieces[length - 1].extend(halves(&lengths[length - 1], &wide));
+                let half = &lengths[length - 1];
+                let middles = trajectory.middles(half, length - 1, &wide);
+                pieces[length - 1].extend(from_starts(half, [wide, middles].concat()));
             }
         }
     }
     Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })
 }
 
-/// The pieces of one length from these states on.
-fn of_states(length: &Length, states: &DMatrix<f64>) -> Vec<Piece> {
-    let pieces = states.column_iter().zip(length.bounds(states));
-    pieces.map(|(state, bounds)| Piece { state: state.into(), bounds }).collect()
+/// The pieces of one length from these starts on.
+fn from_starts(length: &Length, starts: Vec<Start>) -> Vec<Piece> {
+    let states: Vec<_> = starts.iter().map(|start| &start.state).collect();
+    let bounds = length.bounds(&columns(&states));
+    starts.into_iter().zip(bounds).map(|(start, bounds)| Piece { start, bounds }).collect()
 }
 
-/// Both halves of pieces that begin at `states`; `half`: their length.
-fn halves(half: &Length, states: &[DVector<f64>]) -> Vec<Piece> {
-    let first = DMatrix::from_columns(states);
-    let second = &*half.phi * &first;
-    [first, second].iter().flat_map(|states| of_states(half, states)).collect()
+/// The matrix of these columns.
+fn columns(states: &[&Rc<DVector<f64>>]) -> DMatrix<f64> {
+    let order = states.first().map_or(0, |state| state.len());
+    let mut matrix = DMatrix::zeros(order, states.len());
+    matrix.column_iter_mut().zip(states).for_each(|(mut column, state)| column.copy_from(state));
+    matrix
 }
