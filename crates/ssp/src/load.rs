@@ -17,7 +17,7 @@ use super::structure::{
     Element, ElementBase, Implementation, ParameterBinding, System,
 };
 use super::tree::{Binding, Content, Document, File, Node, Tree};
-use files::{Files, Finished};
+use files::Files;
 
 /// Maximum nesting of systems over all files.
 const DEPTH: usize = 64;
@@ -46,16 +46,14 @@ pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Docum
     })?;
     let place = Place { parent: None, path: String::new(), depth: 0, outer: None };
     loader.system(&document.structure.system, &document, place)?;
-    let Loader { mut tree, files, .. } = loader;
-    let Finished { fmus, shown, folders, warnings } = files.finish();
+    let Loader { tree, files: Files { fmus, shown, folders, warnings, .. }, .. } = loader;
     let variables = fmus.iter().map(|fmu| {
         // A name that two variables have stands for the first one.
         let all = fmu.description.variables.iter().enumerate().rev();
         all.map(|(position, variable)| (variable.name.clone(), position)).collect()
     });
     let variables = variables.collect();
-    tree = Tree { fmus, variables, shown, folders, warnings, ..tree };
-    Ok((tree, document))
+    Ok((Tree { fmus, variables, shown, folders, warnings, ..tree }, document))
 }
 
 #[derive(Default)]

@@ -10,7 +10,7 @@ use fmu_description::{Causality, ModelDescription, Position};
 
 use super::error::{SspError, semantic_error};
 use super::load::check_runnable;
-use super::load::files::{Files, Finished};
+use super::load::files::Files;
 use super::source::{Base, Target};
 use super::structure::{DefaultExperiment, Implementation};
 use super::{Folders, Opened};
@@ -37,8 +37,7 @@ pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
     let mut loader = Loader { base: outside.below(&target), ..Loader::default() };
     let document = loader.files.read(&target, document::read)?;
     loader.add(&document).map_err(|error| error.in_file(&path))?;
-    let Loader { files, assembly, steps, .. } = loader;
-    let Finished { fmus, folders, warnings, .. } = files.finish();
+    let Loader { files: Files { fmus, folders, warnings, .. }, assembly, steps, .. } = loader;
     let experiment = DefaultExperiment {
         start_time: document.start,
         stop_time: document.stop,

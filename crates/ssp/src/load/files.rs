@@ -46,28 +46,16 @@ pub(crate) struct Files {
     mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
     fmu_indices: HashMap<PathBuf, usize>,
     archives: HashMap<PathBuf, PathBuf>,
-    folders: Vec<TemporaryFolder>,
+    /// The unpacked archives, which must outlive their use.
+    pub(crate) folders: Vec<TemporaryFolder>,
     pub(crate) fmus: Vec<Unpacked>,
     /// Names of the FMUs for messages.
-    shown: Vec<PathBuf>,
+    pub(crate) shown: Vec<PathBuf>,
     /// Warnings about the files; each names its file.
     pub(crate) warnings: Vec<String>,
 }
 
-/// The unpacked files, which must outlive their use, and the warnings.
-pub(crate) struct Finished {
-    pub(crate) fmus: Vec<Unpacked>,
-    pub(crate) shown: Vec<PathBuf>,
-    pub(crate) folders: Vec<TemporaryFolder>,
-    pub(crate) warnings: Vec<String>,
-}
-
 impl Files {
-    pub(crate) fn finish(self) -> Finished {
-        let Files { fmus, shown, folders, warnings, .. } = self;
-        Finished { fmus, shown, folders, warnings }
-    }
-
     /// Returns the SSD at a path given by the user, or the SSD `fragment` of an SSP.
     pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
