@@ -11,6 +11,7 @@ use fmu_description::limits::{HELP, exceeds};
 use fmu_description::package::Unpacked;
 
 use super::error::{SspError, semantic_error};
+use super::read;
 use super::source::{Base, Target};
 use super::structure::{
     Component, Connector, ConnectorKind, Content as Kind, DictionaryReference, DictionarySource,
@@ -298,12 +299,14 @@ impl Loader {
         for binding in bindings {
             let here =
                 |sentence: String| semantic_error(binding.at.0, sentence).in_file(&file.shown);
-            let values = self.files.values(&binding.values, file, component);
+            let files = &mut self.files;
+            let values =
+                files.content(&binding.values, file, component, |all| &mut all.values, read::ssv);
             let values = values.map_err(|error| error.or(here))?;
-            let mapping = binding.mapping.as_ref();
-            let mapping =
-                mapping.map(|mapping| self.files.mapping(mapping, file, component)).transpose();
-            let mapping = mapping.map_err(|error| error.or(here))?;
+            let mapping = binding.mapping.as_ref().map(|mapping| {
+                files.content(mapping, file, component, |all| &mut all.mappings, read::ssm)
+            });
+            let mapping = mapping.transpose().map_err(|error| error.or(here))?;
             self.count(values.parameters.len())?;
             self.count(mapping.as_ref().map_or(0, |mapping| mapping.entries.len()))?;
             let (prefix, at): (_, Position) = (binding.prefix.clone(), binding.at.0);

@@ -42,8 +42,8 @@ impl Missing {
 #[derive(Default)]
 pub(crate) struct Files {
     documents: HashMap<PathBuf, Rc<Document>>,
-    values: HashMap<PathBuf, Rc<ParameterSet>>,
-    mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
+    pub(super) values: HashMap<PathBuf, Rc<ParameterSet>>,
+    pub(super) mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
     fmu_indices: HashMap<PathBuf, usize>,
     archives: HashMap<PathBuf, PathBuf>,
     /// The unpacked archives, which must outlive their use.
@@ -153,39 +153,29 @@ impl Files {
         Ok(self.fmus.len() - 1)
     }
 
-    pub(super) fn values(
+    /// Returns the content of `source`, inline or in a file that `parse` reads, from `cache` if it was read
+    /// before; `component` is the base of URIs relative to the component.
+    pub(super) fn content<T: Clone>(
         &mut self,
-        source: &Source<ParameterSet>,
+        source: &Source<T>,
         file: &File,
         component: Option<&Base>,
-    ) -> Result<Rc<ParameterSet>, Missing> {
-        let target = match resolve_source(source, file, component)? {
-            ResolvedSource::Inline(content) => return Ok(Rc::new(content)),
-            ResolvedSource::File(target) => target,
+        cache: impl Fn(&mut Self) -> &mut HashMap<PathBuf, Rc<T>>,
+        parse: impl Fn(&[u8]) -> Result<(T, Vec<String>), SspError>,
+    ) -> Result<Rc<T>, Missing> {
+        let (uri, base) = match source {
+            Source::Inline(content) => return Ok(Rc::new(content.clone())),
+            Source::File { uri, in_component: false } => (uri, Some(&file.base)),
+            Source::File { uri, in_component: true } => (uri, component),
         };
-        if let Some(known) = self.values.get(&target.path) {
+        let sentence = "a system has no component that sourceBase could mean";
+        let base = base.ok_or_else(|| Missing::Reference(sentence.to_owned()))?;
+        let target = base.resolve(uri).map_err(Missing::Reference)?;
+        if let Some(known) = cache(self).get(&target.path) {
             return Ok(known.clone());
         }
-        let content = Rc::new(self.read(&target, read::ssv).map_err(Missing::Content)?);
-        self.values.insert(target.path, content.clone());
-        Ok(content)
-    }
-
-    pub(super) fn mapping(
-        &mut self,
-        source: &Source<ParameterMapping>,
-        file: &File,
-        component: Option<&Base>,
-    ) -> Result<Rc<ParameterMapping>, Missing> {
-        let target = match resolve_source(source, file, component)? {
-            ResolvedSource::Inline(content) => return Ok(Rc::new(content)),
-            ResolvedSource::File(target) => target,
-        };
-        if let Some(known) = self.mappings.get(&target.path) {
-            return Ok(known.clone());
-        }
-        let content = Rc::new(self.read(&target, read::ssm).map_err(Missing::Content)?);
-        self.mappings.insert(target.path, content.clone());
+        let content = Rc::new(self.read(&target, parse).map_err(Missing::Content)?);
+        cache(self).insert(target.path, content.clone());
         Ok(content)
     }
 
@@ -223,32 +213,6 @@ impl Files {
             }
         }
     }
-}
-
-/// The inline content of a source, or the file that it refers to.
-enum ResolvedSource<T> {
-    Inline(T),
-    File(Target),
-}
-
-fn resolve_source<T: Clone>(
-    source: &Source<T>,
-    file: &File,
-    component: Option<&Base>,
-) -> Result<ResolvedSource<T>, Missing> {
-    let (uri, in_component) = match source {
-        Source::Inline(content) => return Ok(ResolvedSource::Inline(content.clone())),
-        Source::File { uri, in_component } => (uri, *in_component),
-    };
-    let base = match (in_component, component) {
-        (false, _) => &file.base,
-        (true, Some(base)) => base,
-        (true, None) => {
-            let sentence = "a system has no component that sourceBase could mean";
-            return Err(Missing::Reference(sentence.to_owned()));
-        }
-    };
-    base.resolve(uri).map(ResolvedSource::File).map_err(Missing::Reference)
 }
 
 /// Replaces the path of the unpacked copy in the error by the name that the user knows.
