@@ -96,6 +96,15 @@ impl From<PackageError> for SspError {
     }
 }
 
+/// Returns an error about a file, element or variable that is missing or unsuitable.
+pub(super) fn missing(
+    what: impl Into<String>,
+    expected: impl Into<String>,
+    actual: impl Into<String>,
+) -> SspError {
+    SspError::Missing { what: what.into(), expected: expected.into(), actual: actual.into() }
+}
+
 /// Returns an error about the element at `at`.
 pub(super) fn semantic_error(at: Position, sentence: impl Into<String>) -> SspError {
     SspError::Meaning { at, sentence: sentence.into() }

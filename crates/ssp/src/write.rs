@@ -9,7 +9,7 @@ use fmu_description::package::Unpacked;
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable};
 
 use super::conversion::items_of;
-use super::error::SspError;
+use super::error::{SspError, missing};
 use super::flatten::kind_of;
 use super::render::{render_ssd, render_ssv};
 use super::structure::{
@@ -121,7 +121,7 @@ impl Exporter {
             }
             let kind = kind_of(variable.causality).ok_or_else(|| {
                 let causality = variable.causality.as_str();
-                missing(&format!("{element}.{}", variable.name), "an input or an output", causality)
+                missing(format!("{element}.{}", variable.name), "an input or an output", causality)
             })?;
             connectors.push(Connector {
                 name: variable.name.clone(),
@@ -232,22 +232,17 @@ impl Exporter {
     fn unit(&self, terminal: &Terminal) -> Result<Option<&str>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {
-            missing(&terminal.to_string(), "an element of the assembly", &terminal.element)
+            missing(terminal.to_string(), "an element of the assembly", &terminal.element)
         })?;
         let variable = description.variable(&terminal.variable).ok_or_else(|| {
             let expected = format!("a variable of {}", description.model_name);
-            missing(&terminal.to_string(), &expected, "none of that name")
+            missing(terminal.to_string(), expected, "none of that name")
         })?;
         Ok(match &variable.kind {
             Kind::Real(real) => real.unit.as_deref(),
             _ => None,
         })
     }
-}
-
-fn missing(what: &str, expected: &str, actual: &str) -> SspError {
-    let (what, expected, actual) = (what.to_owned(), expected.to_owned(), actual.to_owned());
-    SspError::Missing { what, expected, actual }
 }
 
 /// Converts a setting to a value of the type of its variable.
@@ -257,9 +252,9 @@ fn value(
     description: &ModelDescription,
 ) -> Result<ParameterValue, SspError> {
     let (name, text) = (format!("{element}.{}", setting.variable), setting.value.trim());
-    let wrong = |expected: &str| missing(&name, expected, &format!("{:?}", setting.value));
+    let wrong = |expected: &str| missing(&name, expected, format!("{:?}", setting.value));
     let variable = description.variable(&setting.variable).ok_or_else(|| {
-        missing(&name, &format!("a variable of {}", description.model_name), "none of that name")
+        missing(&name, format!("a variable of {}", description.model_name), "none of that name")
     })?;
     Ok(match &variable.kind {
         Kind::Real(_) => {

@@ -9,7 +9,7 @@ use std::rc::Rc;
 use fmu_description::limits::in_force;
 use fmu_description::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
 
-use crate::error::SspError;
+use crate::error::{SspError, missing};
 use crate::read;
 use crate::source::{Base, Target};
 use crate::structure::{ParameterMapping, ParameterSet, SignalDictionary, Source};
@@ -79,22 +79,15 @@ impl Files {
             return self.ssd(target, base.below(target));
         }
         let folder = self.unpacked(target)?;
-        let base = Base::archive(&folder, &target.shown);
+        let (base, shown) =
+            (Base::archive(&folder, &target.shown), target.shown.display().to_string());
         let name = target.fragment.as_deref().unwrap_or(DEFAULT);
         if name.contains('/') {
-            let (expected, actual) = ("the name of an SSD at the root of the SSP", name.to_owned());
-            let what = target.shown.display().to_string();
-            return Err(SspError::Missing { what, expected: expected.to_owned(), actual });
+            return Err(missing(shown, "the name of an SSD at the root of the SSP", name));
         }
         let inner = Target::new(folder.join(name), target.shown.join(name));
         if !inner.path.is_file() {
-            let definitions = definitions_in(&folder);
-            let what = target.shown.display().to_string();
-            return Err(SspError::Missing {
-                what,
-                expected: format!("{name} at its root"),
-                actual: definitions,
-            });
+            return Err(missing(shown, format!("{name} at its root"), definitions_in(&folder)));
         }
         self.ssd(&inner, base)
     }
@@ -228,9 +221,7 @@ fn with_shown_path(error: PackageError, target: &Target) -> SspError {
             PackageError::Limit { path, limit, unit, help }
         }
         PackageError::Description { source, .. } => PackageError::Description { path, source },
-        error => {
-            return SspError::In { file: path, reason: Box::new(error.into()) };
-        }
+        error => return SspError::In { file: path, reason: Box::new(error.into()) },
     };
     error.into()
 }
