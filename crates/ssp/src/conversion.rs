@@ -26,11 +26,7 @@ impl Measure {
     pub(super) fn stated(kind: Option<&Type>, scopes: &[&Definitions]) -> Self {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
-            Some(Type::Enumeration(name)) => {
-                let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
-                let known = all.find(|enumeration| enumeration.name == *name);
-                Measure { unit: None, items: known.map(|enumeration| enumeration.items.clone()) }
-            }
+            Some(Type::Enumeration(name)) => Measure::enumeration(name, scopes),
             _ => Measure::default(),
         }
     }
@@ -40,6 +36,13 @@ impl Measure {
         let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), items: None }
+    }
+
+    /// Creates the measure of an enumeration, defined by the first of `scopes` that knows its name.
+    pub(super) fn enumeration(name: &str, scopes: &[&Definitions]) -> Self {
+        let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
+        let items = all.find(|known| known.name == name).map(|known| known.items.clone());
+        Measure { unit: None, items }
     }
 
     /// Creates the measure of a variable from the description of its FMU.

@@ -27,9 +27,13 @@ pub(super) fn settings(
     flow: &Flow,
     warnings: &mut Vec<String>,
 ) -> Result<Settings, SspError> {
+    let mut targets: HashMap<&Vertex, Vec<&Vertex>> = HashMap::new();
+    for edge in &flow.edges {
+        targets.entry(&edge.from).or_default().push(&edge.to);
+    }
     let mut binder = Binder {
         tree,
-        targets: targets_by_source(flow),
+        targets,
         flow,
         settings: Settings::new(),
         positions: HashMap::new(),
@@ -50,19 +54,11 @@ fn depth(tree: &Tree, node: usize) -> usize {
     std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
 }
 
-/// Returns the targets of all edges, by source.
-fn targets_by_source(flow: &Flow) -> HashMap<&Vertex, Vec<&Vertex>> {
-    let mut targets: HashMap<&Vertex, Vec<&Vertex>> = HashMap::new();
-    for edge in &flow.edges {
-        targets.entry(&edge.from).or_default().push(&edge.to);
-    }
-    targets
-}
-
 /// The state of the application of bindings.
 struct Binder<'a> {
     tree: &'a Tree,
     flow: &'a Flow,
+    /// The targets of all edges, by source.
     targets: HashMap<&'a Vertex, Vec<&'a Vertex>>,
     settings: Settings,
     /// Positions of the settings in the lists of their nodes.
@@ -210,7 +206,7 @@ impl Binder<'_> {
             let path = self.flow.upstream(self.tree, &end).map_err(|error| error.to_string())?;
             // The source may be upstream of the connector that is set.
             let start = path.iter().position(|edge| edge.from == *target).unwrap_or(0);
-            let measure = self.tree.measure(target).or(value.measure().clone());
+            let measure = self.tree.measure(target).or(value.measure.clone());
             let chain = Flow::convert_along(self.tree, &path[start..], measure);
             let chain = chain.map_err(|error| error.to_string())?;
             let number = value.number.transformed(&chain.transformation)?;
@@ -239,15 +235,10 @@ impl Binder<'_> {
             return Err(format!("the FMU has no variable {name}"));
         };
         if !settable(variable) {
+            let (causality, variability) =
+                (variable.causality.as_str(), variable.variability.as_str());
             let what = variable.never_set().map_or_else(
-                || {
-                    let (causality, variability) = (variable.causality, variable.variability);
-                    format!(
-                        "{} and {} without a start value",
-                        causality.as_str(),
-                        variability.as_str()
-                    )
-                },
+                || format!("{causality} and {variability} without a start value"),
                 str::to_owned,
             );
             self.warnings.push(format!("{name} is {what}: its setting is ignored"));

@@ -4,7 +4,7 @@ use fmu_description::Kind;
 
 use crate::conversion::{ConversionChain, Measure};
 use crate::structure::{
-    Conversion, Definitions, Parameter, ParameterValue, Transformation as Stated, Type,
+    Conversion, Definitions, Parameter, ParameterValue, Transformation as Stated,
 };
 use slave::Transformation;
 
@@ -12,7 +12,7 @@ use slave::Transformation;
 #[derive(Clone, Debug)]
 pub(super) struct Value {
     pub(super) number: Number,
-    measure: Measure,
+    pub(super) measure: Measure,
 }
 
 /// A value without its unit.
@@ -36,33 +36,28 @@ impl Value {
 
     /// Returns the value of a parameter; `scopes` may define its unit and its enumeration.
     pub(super) fn of(parameter: &Parameter, scopes: &[&Definitions]) -> Self {
-        let (number, measure) = match &parameter.value {
-            ParameterValue::Real(value, unit) => {
-                let unit = unit.as_ref().map(|unit| Measure::unit(unit, scopes));
-                (Number::Real(*value), unit.unwrap_or_default())
+        let measure = match &parameter.value {
+            ParameterValue::Real(_, Some(unit)) => Measure::unit(unit, scopes),
+            ParameterValue::Enumeration(_, Some(name)) => Measure::enumeration(name, scopes),
+            _ => Measure::default(),
+        };
+        let number = match &parameter.value {
+            ParameterValue::Real(value, _) => Number::Real(*value),
+            ParameterValue::Integer(value) => Number::Integer(*value),
+            ParameterValue::Boolean(value) => Number::Boolean(*value),
+            ParameterValue::String(text) => Number::Text(text.clone()),
+            ParameterValue::Enumeration(item, _) => {
+                Number::Item(item.clone(), number_of(item, measure.items.as_deref()))
             }
-            ParameterValue::Integer(value) => (Number::Integer(*value), Measure::default()),
-            ParameterValue::Boolean(value) => (Number::Boolean(*value), Measure::default()),
-            ParameterValue::String(text) => (Number::Text(text.clone()), Measure::default()),
-            ParameterValue::Enumeration(item, name) => {
-                let kind = name.as_ref().map(|name| Type::Enumeration(name.clone()));
-                let measure = Measure::stated(kind.as_ref(), scopes);
-                (Number::Item(item.clone(), number_of(item, measure.items.as_deref())), measure)
-            }
-            ParameterValue::Binary(_) => (Number::Binary, Measure::default()),
+            ParameterValue::Binary(_) => Number::Binary,
             ParameterValue::Long(value) => {
-                (Number::Unsupported(format!("{value}, of more than 32 bits")), Measure::default())
+                Number::Unsupported(format!("{value}, of more than 32 bits"))
             }
             ParameterValue::Array(_, values) => {
-                let words = format!("an array of {} elements", values.len());
-                (Number::Unsupported(words), Measure::default())
+                Number::Unsupported(format!("an array of {} elements", values.len()))
             }
         };
         Value { number, measure }
-    }
-
-    pub(super) fn measure(&self) -> &Measure {
-        &self.measure
     }
 
     /// Converts the unit, then applies the transformation of a mapping; also returns warnings.
@@ -111,10 +106,8 @@ impl Number {
                 Number::Boolean(if *value { *from_true } else { *from_false })
             }
             _ => {
-                return Err(format!(
-                    "the transformation is not for a value such as {}",
-                    self.to_text()
-                ));
+                let text = self.to_text();
+                return Err(format!("the transformation is not for a value such as {text}"));
             }
         })
     }
@@ -136,8 +129,6 @@ impl Number {
         kind: &Kind,
         items: Option<&[(String, i32)]>,
     ) -> Result<String, String> {
-        let wrong =
-            || format!("expected a value of type {}, found {}", kind.element(), self.to_text());
         match (kind, self) {
             (Kind::Real(_), Number::Real(_) | Number::Integer(_))
             | (Kind::Integer(_) | Kind::Enumeration(_), Number::Integer(_))
@@ -157,7 +148,10 @@ impl Number {
                     format!("expected an item of {}, found {item:?}", names.join(", "))
                 })
             }
-            _ => Err(wrong()),
+            _ => {
+                let (kind, text) = (kind.element(), self.to_text());
+                Err(format!("expected a value of type {kind}, found {text}"))
+            }
         }
     }
 
