@@ -27,11 +27,8 @@ impl Archive {
     /// not decode URIs.
     pub(super) fn add(&mut self, name: &str, bytes: Vec<u8>) -> String {
         let plain = |character: char| {
-            if character.is_ascii_alphanumeric() || "._-".contains(character) {
-                character
-            } else {
-                '_'
-            }
+            let is_plain = character.is_ascii_alphanumeric() || "._-".contains(character);
+            if is_plain { character } else { '_' }
         };
         let name: String = name.chars().map(plain).collect();
         let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
@@ -51,14 +48,7 @@ impl Archive {
         if path.is_dir() {
             let mut entries = BTreeMap::new();
             collect(fmu.folder(), "", &mut entries)?;
-            let bytes = zip(
-                path,
-                &entries
-                    .iter()
-                    .map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
-                    .collect::<Vec<_>>(),
-            )?;
-            return Ok(self.add(&format!("{name}.fmu"), bytes));
+            return Ok(self.add(&format!("{name}.fmu"), zip(path, slices(&entries))?));
         }
         let stem = path.file_stem().map_or(name.clone(), |stem| stem.to_string_lossy().into());
         Ok(self.add(&format!("{stem}.fmu"), fs::read(path).map_err(failed("read", path))?))
@@ -66,9 +56,8 @@ impl Archive {
 
     /// Writes the archive with `ssd` as its system structure, atomically.
     pub(super) fn write(&self, ssd: &str, target: &Path) -> Result<(), SspError> {
-        let mut entries = vec![("SystemStructure.ssd", ssd.as_bytes())];
-        entries.extend(self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())));
-        let bytes = zip(target, &entries)?;
+        let ssd = std::iter::once(("SystemStructure.ssd", ssd.as_bytes()));
+        let bytes = zip(target, ssd.chain(slices(&self.entries)))?;
         let folder = match target.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
@@ -114,10 +103,18 @@ fn collect(
     Ok(())
 }
 
+fn slices(entries: &BTreeMap<String, Vec<u8>>) -> impl Iterator<Item = (&str, &[u8])> + Clone {
+    entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
+}
+
 /// Packs the entries in the given order, dated 1980-01-01. FMUs are stored uncompressed, because
 /// they are compressed already.
-fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
-    let total = entries.iter().fold(0_usize, |sum, (_, bytes)| sum.saturating_add(bytes.len()));
+fn zip<'a>(
+    target: &Path,
+    entries: impl Iterator<Item = (&'a str, &'a [u8])> + Clone,
+) -> Result<Vec<u8>, SspError> {
+    let sizes = entries.clone().map(|(_, bytes)| bytes.len());
+    let total = sizes.fold(0, usize::saturating_add);
     if total > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive", help: "" });
     }
@@ -135,7 +132,7 @@ fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
             .system(System::Unix)
             .unix_permissions(mode)
             .large_file(false);
-        archive.start_file(*path, options).map_err(wrong)?;
+        archive.start_file(path, options).map_err(wrong)?;
         archive.write_all(bytes).map_err(|error| wrong(error.into()))?;
     }
     Ok(archive.finish().map_err(wrong)?.into_inner())
