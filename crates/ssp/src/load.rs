@@ -6,7 +6,6 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
-use fmu_description::Position;
 use fmu_description::limits::{HELP, exceeds};
 use fmu_description::package::Unpacked;
 
@@ -67,17 +66,12 @@ struct Loader {
 impl Loader {
     fn count(&mut self, parts: usize) -> Result<(), SspError> {
         self.parts = self.parts.saturating_add(parts).saturating_add(1);
-        if exceeds(self.tree.nodes.len(), ELEMENTS) {
-            return Err(SspError::Limit { limit: ELEMENTS, what: "elements", help: HELP });
+        let elements = (self.tree.nodes.len(), ELEMENTS, "elements");
+        let parts = (self.parts, PARTS, "connectors and parameters");
+        match [elements, parts].into_iter().find(|(count, limit, _)| exceeds(*count, *limit)) {
+            Some((_, limit, what)) => Err(SspError::Limit { limit, what, help: HELP }),
+            None => Ok(()),
         }
-        if exceeds(self.parts, PARTS) {
-            return Err(SspError::Limit {
-                limit: PARTS,
-                what: "connectors and parameters",
-                help: HELP,
-            });
-        }
-        Ok(())
     }
 
     fn add(
@@ -210,27 +204,22 @@ impl Loader {
             }
             Implementation::ScheduledExecution => Some("scheduled execution"),
         };
-        let implementation = if let Some(missing) = missing {
-            let other = if description.co_simulation.is_some() {
-                "its co-simulation is used"
-            } else {
-                "its model exchange is used"
-            };
+        if let Some(missing) = missing {
+            let has_steps = description.co_simulation.is_some();
+            let other = if has_steps { "co-simulation" } else { "model exchange" };
             let sentence = format!(
-                "the system structure asks for {missing}, which cannot be run with this FMU: {other}"
+                "the system structure asks for {missing}, which cannot be run with this FMU: its \
+                 {other} is used"
             );
             self.files.warnings.push(here(&sentence).to_string());
-            Implementation::Any
-        } else {
-            stated
-        };
+        }
         let inside = Base::archive(self.files.fmus[index].folder(), &target.shown);
         let node = self.add(&component.base, place, file)?;
         let bindings = self.bindings(&component.base.bindings, file, Some(&inside))?;
         let added = &mut self.tree.nodes[node];
         added.content = Content::Fmu(index);
         (added.bindings, added.step_size) = (bindings, component.step_size);
-        added.implementation = implementation;
+        added.implementation = if missing.is_some() { Implementation::Any } else { stated };
         Ok(node)
     }
 
@@ -309,7 +298,7 @@ impl Loader {
             let mapping = mapping.transpose().map_err(|error| error.or(here))?;
             self.count(values.parameters.len())?;
             self.count(mapping.as_ref().map_or(0, |mapping| mapping.entries.len()))?;
-            let (prefix, at): (_, Position) = (binding.prefix.clone(), binding.at.0);
+            let (prefix, at) = (binding.prefix.clone(), binding.at.0);
             loaded.push(Binding { prefix, values, mapping, file: file.clone(), at });
         }
         Ok(loaded)
@@ -332,10 +321,9 @@ fn check_library(fmu: &Unpacked) -> Result<(), String> {
 
 /// The name of the library that a system uses.
 fn identifier(fmu: &Unpacked) -> Option<&str> {
-    let description = &fmu.description;
-    let simulation =
-        description.co_simulation.as_ref().map(|flags| flags.model_identifier.as_str());
-    simulation.or(description.model_exchange.as_ref().map(|flags| flags.model_identifier.as_str()))
+    let (simulation, exchange) = (&fmu.description.co_simulation, &fmu.description.model_exchange);
+    let exchange = || exchange.as_ref().map(|flags| flags.model_identifier.as_str());
+    simulation.as_ref().map(|flags| flags.model_identifier.as_str()).or_else(exchange)
 }
 
 /// Returns the system with the identifier `id` at any depth.

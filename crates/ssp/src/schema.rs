@@ -82,30 +82,21 @@ fn visit(node: &Node, findings: &mut Findings) {
     let Some((children, attributes)) = content(name) else { return };
     for attribute in node.attribute_names() {
         if !attributes.contains(&attribute) && !ANYWHERE.contains(&attribute) {
-            add(
-                findings,
-                format!("<{name}> has the attribute {attribute:?}, which is skipped"),
-                node.at,
-            );
+            let sentence = format!("<{name}> has the attribute {attribute:?}, which is skipped");
+            add(findings, sentence, node.at);
         }
     }
     let mut lists: Vec<&str> = Vec::new();
     for child in node.own_children() {
         let known = child.name.as_str();
         if !children.iter().any(|list| list.contains(&known)) {
-            add(
-                findings,
-                format!("<{name}> has the element <{known}>, which is skipped"),
-                child.at,
-            );
+            let sentence = format!("<{name}> has the element <{known}>, which is skipped");
+            add(findings, sentence, child.at);
             continue;
         }
         if lists.contains(&known) {
-            add(
-                findings,
-                format!("<{name}> has a second element <{known}>: both are read"),
-                child.at,
-            );
+            let sentence = format!("<{name}> has a second element <{known}>: both are read");
+            add(findings, sentence, child.at);
         }
         lists.extend(LISTS.contains(&known).then_some(known));
         if known == "Signature" {
