@@ -128,10 +128,8 @@ fn variable(reference: usize, name: String, causality: Causality) -> ScalarVaria
     ScalarVariable {
         name,
         value_reference: number(reference),
-        description: None,
         causality,
         variability: Variability::Continuous,
-        initial: None,
         kind: Kind::Real(RealType { start, ..RealType::default() }),
         ..ScalarVariable::default()
     }
@@ -176,8 +174,11 @@ impl FunctionSlave {
 
 #[cold]
 fn unknown(function: &'static str, reference: u32) -> CallError {
-    let failure = Failure::InvalidAnswer(format!("got the unknown value reference {reference}"));
-    CallError { function, failure, messages: Vec::new() }
+    invalid(function, format!("got the unknown value reference {reference}"))
+}
+
+fn invalid(function: &'static str, sentence: String) -> CallError {
+    CallError { function, failure: Failure::InvalidAnswer(sentence), messages: Vec::new() }
 }
 
 impl Slave for FunctionSlave {
@@ -280,13 +281,8 @@ impl Slave for FunctionSlave {
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let (values, rest) = bytes.as_chunks::<8>();
         if values.len() != self.inputs.len() || !rest.is_empty() {
-            let failure = Failure::InvalidAnswer(format!(
-                "got {} bytes, expected {}",
-                bytes.len(),
-                8 * self.inputs.len()
-            ));
-            let (function, messages) = ("fmi2DeSerializeFMUstate", Vec::new());
-            return Err(CallError { function, failure, messages });
+            let sentence = format!("got {} bytes, expected {}", bytes.len(), 8 * self.inputs.len());
+            return Err(invalid("fmi2DeSerializeFMUstate", sentence));
         }
         for (input, bytes) in self.inputs.iter_mut().zip(values) {
             let value = f64::from_le_bytes(*bytes);

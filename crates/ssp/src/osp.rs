@@ -75,10 +75,9 @@ impl Loader {
         }
         for function in &document.functions {
             let name = function.name.clone();
-            match &function.kind {
-                Kind::Sum(sum) => self.assembly.functions.push((name, sum.clone())),
+            match function.kind.clone() {
+                Kind::Sum(sum) => self.assembly.functions.push((name, sum)),
                 Kind::Linear { factor, offset } => {
-                    let (factor, offset) = (*factor, *offset);
                     self.linear.push((name, Linear { factor, offset, ..Linear::default() }));
                 }
             }
@@ -88,8 +87,8 @@ impl Loader {
                 .map_err(|sentence| semantic_error(connection.at, sentence))?;
         }
         self.finish_functions();
-        let (start, stop) = (document.start, document.stop);
-        (self.assembly.start_time, self.assembly.stop_time) = (start, stop);
+        self.assembly.start_time = document.start;
+        self.assembly.stop_time = document.stop;
         Ok(())
     }
 

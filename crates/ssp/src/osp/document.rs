@@ -15,7 +15,7 @@ const STEP: f64 = 0.1;
 const COUNT: usize = 100_000;
 
 /// The content of the file.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Document {
     pub(super) start: Option<f64>,
     pub(super) stop: Option<f64>,
@@ -43,7 +43,7 @@ pub(super) struct Function {
 }
 
 /// The kind of a function.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Kind {
     /// `LinearTransformation`.
     Linear { factor: f64, offset: f64 },
@@ -84,14 +84,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
         return Err(wrong(&root, "the root element OspSystemStructure", actual));
     }
     let mut warnings = Vec::new();
-    let mut document = Document {
-        start: None,
-        stop: None,
-        step: STEP,
-        simulators: Vec::new(),
-        functions: Vec::new(),
-        connections: Vec::new(),
-    };
+    let mut document = Document { step: STEP, ..Document::default() };
     for child in &root.children {
         match local(child) {
             "StartTime" => document.start = Some(time(child)?),
@@ -121,11 +114,9 @@ fn algorithm(element: &Element, warnings: &mut Vec<String>) -> Result<(), SspErr
     match element.text.to_ascii_lowercase().as_str() {
         "" | "fixedstep" => Ok(()),
         "ecco" => {
-            warnings.push(format!(
-                "{}: the algorithm ecco is not available: all steps are BaseStepSize; \
-                 --step-control energy is similar",
-                element.at
-            ));
+            let sentence = "the algorithm ecco is not available: all steps are BaseStepSize; \
+                            --step-control energy is similar";
+            warnings.push(format!("{}: {sentence}", element.at));
             Ok(())
         }
         _ => Err(wrong(element, "the algorithm fixedStep or ecco", format!("{:?}", element.text))),
