@@ -238,12 +238,11 @@ impl Controller {
             }
         }
         let of_tests = self.detection.iter().flat_map(Detection::numbers);
-        if let Some(value) = of_tests.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
-            return Err(too_large("[detection]", value));
-        }
         let of_gains = self.reconfiguration.iter().flat_map(Reconfiguration::numbers);
-        if let Some(value) = of_gains.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
-            return Err(too_large("[reconfiguration]", value));
+        let of_tests = of_tests.map(|value| ("[detection]", value));
+        let mut all = of_tests.chain(of_gains.map(|value| ("[reconfiguration]", value)));
+        if let Some((name, value)) = all.find(|(_, value)| value.abs() > LARGEST_SINGLE) {
+            return Err(too_large(name, value));
         }
         if let Some(schedule) = &self.schedule {
             schedule.check_range(precision, LARGEST_SINGLE)?;
@@ -308,50 +307,11 @@ fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
     faults.iter().enumerate().filter_map(loss).collect()
 }
 
-impl Matrix {
-    /// The matrix of a controller, if it has it.
-    pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
-        Some(match self {
-            Self::A => &controller.a,
-            Self::B => &controller.b,
-            Self::C => &controller.c,
-            Self::D => return controller.d.as_ref(),
-            Self::FA => &controller.f_a,
-            Self::AF => &controller.a_f,
-            Self::KX => &controller.k_x,
-            Self::KF => &controller.k_f,
-            Self::LX => &controller.l_x,
-            Self::LF => &controller.l_f,
-            Self::PF => return controller.p_f.as_ref(),
-            Self::H => return controller.h.as_ref(),
-            Self::KI => return controller.k_i.as_ref(),
-            Self::FI => return controller.f_i.as_ref(),
-            Self::LW => return controller.l_w.as_ref(),
-            Self::NR => return controller.n_r.as_ref(),
-            Self::ResidualA
-            | Self::ResidualBu
-            | Self::ResidualBy
-            | Self::ResidualC
-            | Self::ResidualDu
-            | Self::ResidualDy => {
-                let detection = controller.detection.as_ref()?;
-                match self {
-                    Self::ResidualA => &detection.a,
-                    Self::ResidualBu => &detection.b_u,
-                    Self::ResidualBy => &detection.b_y,
-                    Self::ResidualC => &detection.c,
-                    Self::ResidualDu => &detection.d_u,
-                    _ => &detection.d_y,
-                }
-            }
-        })
-    }
-}
-
 impl Kind {
     /// The number of these of a controller.
     pub(super) fn count(self, controller: &Controller) -> usize {
         let detection = controller.detection.as_ref();
+        let reconfiguration = controller.reconfiguration.as_ref();
         match self {
             Self::State => controller.states.len(),
             Self::Fault => controller.faults.len(),
@@ -360,14 +320,10 @@ impl Kind {
             Self::Reference => controller.references.len(),
             Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
             Self::Point => controller.schedule.as_ref().map_or(0, |schedule| schedule.points.len()),
-            Self::GainSet => controller
-                .reconfiguration
-                .as_ref()
-                .map_or(0, |reconfiguration| reconfiguration.sets.len()),
-            Self::Case => controller
-                .reconfiguration
-                .as_ref()
-                .map_or(0, |reconfiguration| reconfiguration.cases.len()),
+            Self::GainSet => {
+                reconfiguration.map_or(0, |reconfiguration| reconfiguration.sets.len())
+            }
+            Self::Case => reconfiguration.map_or(0, |reconfiguration| reconfiguration.cases.len()),
             Self::ResidualState => detection.map_or(0, |detection| detection.a.nrows()),
             Self::Residual => detection.map_or(0, |detection| detection.c.nrows()),
             Self::Test => detection.map_or(0, |detection| detection.tests.len()),

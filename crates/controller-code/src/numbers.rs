@@ -129,26 +129,39 @@ impl<N: Number> Numbers<N> {
     }
 }
 
-/// The vectors of `sample::Signals` in their order.
-pub(super) const SIGNALS: [Vector; 17] = [
-    Vector::Y,
-    Vector::YF,
-    Vector::R,
-    Vector::E,
-    Vector::XHat,
-    Vector::FHatI,
-    Vector::FHat,
-    Vector::U,
-    Vector::Excess,
-    Vector::Command,
-    Vector::XValue,
-    Vector::FValue,
-    Vector::NextXHat,
-    Vector::NextFHat,
-    Vector::NextYF,
-    Vector::NextXI,
-    Vector::NextUT,
-];
+macro_rules! signals {
+    ($($name:ident $vector:ident,)*) => {
+        /// The vectors of `sample::Signals` in their order.
+        pub(super) const SIGNALS: [Vector; 17] = [$(Vector::$vector),*];
+
+        impl<N: Number> Vectors<N> {
+            pub(super) fn signals(&mut self) -> Signals<'_, N> {
+                let [$($name),*] = &mut self.0;
+                Signals { $($name),* }
+            }
+        }
+    };
+}
+
+signals! {
+    y Y,
+    y_f YF,
+    r R,
+    e E,
+    x_hat XHat,
+    f_hat_i FHatI,
+    f_hat FHat,
+    u U,
+    excess Excess,
+    command Command,
+    x_value XValue,
+    f_value FValue,
+    next_x_hat NextXHat,
+    next_f_hat NextFHat,
+    next_y_f NextYF,
+    next_x_i NextXI,
+    next_u_t NextUT,
+}
 
 /// The vectors of a sample.
 pub(super) struct Vectors<N>([Vec<N>; 17]);
@@ -157,47 +170,6 @@ impl<N: Number> Vectors<N> {
     /// All of them zero.
     pub(super) fn zero(controller: &Controller) -> Self {
         Self(SIGNALS.map(|vector| vec![N::zero(); vector.length(controller)]))
-    }
-
-    pub(super) fn signals(&mut self) -> Signals<'_, N> {
-        let [
-            y,
-            y_f,
-            r,
-            e,
-            x_hat,
-            f_hat_i,
-            f_hat,
-            u,
-            excess,
-            command,
-            x_value,
-            f_value,
-            next_x_hat,
-            next_f_hat,
-            next_y_f,
-            next_x_i,
-            next_u_t,
-        ] = &mut self.0;
-        Signals {
-            y,
-            y_f,
-            r,
-            e,
-            x_hat,
-            f_hat_i,
-            f_hat,
-            u,
-            excess,
-            command,
-            x_value,
-            f_value,
-            next_x_hat,
-            next_f_hat,
-            next_y_f,
-            next_x_i,
-            next_u_t,
-        }
     }
 
     /// One of them; empty for a vector that is none of `sample::Signals`.
@@ -268,35 +240,5 @@ impl Matrix {
         let is_of_filter =
             |matrix: &Self| matches!(matrix.kinds()[0], Kind::ResidualState | Kind::Residual);
         Self::ALL.into_iter().filter(move |matrix| !is_of_filter(matrix))
-    }
-
-    /// What its rows and columns belong to.
-    pub(super) fn kinds(self) -> [Kind; 2] {
-        use Kind::{
-            Actuator, Fault, Integral, Measurement, Reference, Residual, ResidualState, State,
-        };
-        match self {
-            Self::A => [State, State],
-            Self::B => [State, Actuator],
-            Self::C => [Measurement, State],
-            Self::D => [Measurement, Actuator],
-            Self::FA => [State, Fault],
-            Self::AF => [Fault, Fault],
-            Self::KX => [Actuator, State],
-            Self::KF => [Actuator, Fault],
-            Self::LX => [State, Measurement],
-            Self::LF | Self::PF => [Fault, Measurement],
-            Self::H => [Integral, Measurement],
-            Self::KI => [Actuator, Integral],
-            Self::FI => [Integral, Fault],
-            Self::LW => [Integral, Actuator],
-            Self::NR => [Actuator, Reference],
-            Self::ResidualA => [ResidualState, ResidualState],
-            Self::ResidualBu => [ResidualState, Actuator],
-            Self::ResidualBy => [ResidualState, Measurement],
-            Self::ResidualC => [Residual, ResidualState],
-            Self::ResidualDu => [Residual, Actuator],
-            Self::ResidualDy => [Residual, Measurement],
-        }
     }
 }

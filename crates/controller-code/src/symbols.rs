@@ -1,210 +1,149 @@
 //! The vectors and matrices of a sample.
 
-/// A vector of a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Vector {
-    /// The estimate for this sample from the measurements before it, as values.
-    StoredXHat,
-    StoredFHat,
-    StoredYF,
-    /// The measurements as values; the last finite ones.
-    Measured,
-    /// The references as values; the last finite ones.
-    Referred,
-    /// The integrals of the distances from the references.
-    StoredXI,
-    /// The state of the filter of the residuals, and the residuals of the last sample.
-    StoredXR,
-    StoredResidual,
-    /// The commands of the sample before as deviations, for measurements that contain them.
-    StoredU,
-    /// What is left in the commands since their law changed.
-    StoredUT,
-    /// The operating point.
-    XOp,
-    UOp,
-    YOp,
-    ROp,
-    /// Deviations from the operating point.
-    Y,
-    E,
-    XHat,
-    FHat,
-    /// The integral part of `f_hat` in a law with a direct term.
-    FHatI,
-    /// `L_f` e of a sliding-mode law.
-    S,
-    YF,
-    U,
-    R,
-    /// How far the limits are from the command without limits.
-    Excess,
-    /// The commands and estimates as values.
-    Command,
-    XValue,
-    FValue,
-    /// The estimate for the next sample, as values.
-    NextXHat,
-    NextFHat,
-    NextYF,
-    NextXI,
-    NextUT,
-    /// The residuals of this sample, and the state of their filter for the next one.
-    Residual,
-    NextXR,
-}
+use nalgebra::DMatrix;
 
-/// A matrix of the controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Matrix {
-    A,
-    B,
-    C,
-    D,
-    FA,
-    AF,
-    KX,
-    KF,
-    LX,
-    LF,
-    PF,
-    H,
-    KI,
-    FI,
-    LW,
-    NR,
-    /// A, `B_u`, `B_y`, C, `D_u`, `D_y` of the detection.
-    ResidualA,
-    ResidualBu,
-    ResidualBy,
-    ResidualC,
-    ResidualDu,
-    ResidualDy,
-}
+use super::controller::Controller;
 
-impl Matrix {
-    pub(super) const ALL: [Self; 22] = [
-        Self::A,
-        Self::B,
-        Self::C,
-        Self::D,
-        Self::FA,
-        Self::AF,
-        Self::KX,
-        Self::KF,
-        Self::LX,
-        Self::LF,
-        Self::PF,
-        Self::H,
-        Self::KI,
-        Self::FI,
-        Self::LW,
-        Self::NR,
-        Self::ResidualA,
-        Self::ResidualBu,
-        Self::ResidualBy,
-        Self::ResidualC,
-        Self::ResidualDu,
-        Self::ResidualDy,
-    ];
-
-    /// The name in the design file.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::C => "C",
-            Self::D => "D",
-            Self::FA => "F_a",
-            Self::AF => "A_f",
-            Self::KX => "K_x",
-            Self::KF => "K_f",
-            Self::LX => "L_x",
-            Self::LF => "L_f",
-            Self::PF => "P_f",
-            Self::H => "H",
-            Self::KI => "K_i",
-            Self::FI => "F_i",
-            Self::LW => "L_w",
-            Self::NR => "N_r",
-            Self::ResidualA => "A_r",
-            Self::ResidualBu => "B_ru",
-            Self::ResidualBy => "B_ry",
-            Self::ResidualC => "C_r",
-            Self::ResidualDu => "D_ru",
-            Self::ResidualDy => "D_ry",
+macro_rules! vectors {
+    ($($(#[$text:meta])* $vector:ident $name:literal $kind:ident,)*) => {
+        /// A vector of a sample.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Vector {
+            $($(#[$text])* $vector,)*
         }
-    }
-}
 
-impl Vector {
-    /// The name without its owner.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::StoredXHat | Self::XHat => "x_hat",
-            Self::StoredFHat | Self::FHat => "f_hat",
-            Self::FHatI => "f_hat_i",
-            Self::S => "s",
-            Self::StoredYF | Self::YF => "y_f",
-            Self::Measured | Self::Y => "y",
-            Self::StoredU => "u_before",
-            Self::StoredUT => "u_t",
-            Self::XOp => "x_op",
-            Self::UOp => "u_op",
-            Self::YOp => "y_op",
-            Self::E => "e",
-            Self::U => "u",
-            Self::Command => "command",
-            Self::XValue => "x_value",
-            Self::FValue => "f_value",
-            Self::NextXHat => "next_x_hat",
-            Self::NextFHat => "next_f_hat",
-            Self::NextYF => "next_y_f",
-            Self::Referred | Self::R => "r",
-            Self::StoredXI => "x_i",
-            Self::ROp => "r_op",
-            Self::Excess => "excess",
-            Self::NextXI => "next_x_i",
-            Self::NextUT => "next_u_t",
-            Self::StoredXR => "x_r",
-            Self::StoredResidual => "residual",
-            Self::Residual => "next_residual",
-            Self::NextXR => "next_x_r",
-        }
-    }
-
-    /// The signals that its elements belong to.
-    pub(super) fn kind(self) -> Kind {
-        match self {
-            Self::StoredXHat | Self::XHat | Self::XOp | Self::XValue | Self::NextXHat => {
-                Kind::State
+        impl Vector {
+            /// The name without its owner.
+            pub(super) fn name(self) -> &'static str {
+                match self {
+                    $(Self::$vector => $name,)*
+                }
             }
-            Self::StoredFHat
-            | Self::FHat
-            | Self::FHatI
-            | Self::S
-            | Self::FValue
-            | Self::NextFHat => Kind::Fault,
-            Self::StoredU
-            | Self::StoredUT
-            | Self::UOp
-            | Self::U
-            | Self::Excess
-            | Self::Command
-            | Self::NextUT => Kind::Actuator,
-            Self::Referred | Self::ROp | Self::R => Kind::Reference,
-            Self::StoredXI | Self::NextXI => Kind::Integral,
-            Self::StoredXR | Self::NextXR => Kind::ResidualState,
-            Self::StoredResidual | Self::Residual => Kind::Residual,
-            Self::StoredYF
-            | Self::Measured
-            | Self::YOp
-            | Self::Y
-            | Self::E
-            | Self::YF
-            | Self::NextYF => Kind::Measurement,
+
+            /// The signals that its elements belong to.
+            pub(super) fn kind(self) -> Kind {
+                match self {
+                    $(Self::$vector => Kind::$kind,)*
+                }
+            }
         }
-    }
+    };
+}
+
+// Each vector with its name and the signals that its elements belong to.
+vectors! {
+    /// The estimate for this sample from the measurements before it, as values.
+    StoredXHat "x_hat" State,
+    StoredFHat "f_hat" Fault,
+    StoredYF "y_f" Measurement,
+    /// The measurements as values; the last finite ones.
+    Measured "y" Measurement,
+    /// The references as values; the last finite ones.
+    Referred "r" Reference,
+    /// The integrals of the distances from the references.
+    StoredXI "x_i" Integral,
+    /// The state of the filter of the residuals, and the residuals of the last sample.
+    StoredXR "x_r" ResidualState,
+    StoredResidual "residual" Residual,
+    /// The commands of the sample before as deviations, for measurements that contain them.
+    StoredU "u_before" Actuator,
+    /// What is left in the commands since their law changed.
+    StoredUT "u_t" Actuator,
+    /// The operating point.
+    XOp "x_op" State,
+    UOp "u_op" Actuator,
+    YOp "y_op" Measurement,
+    ROp "r_op" Reference,
+    /// Deviations from the operating point.
+    Y "y" Measurement,
+    E "e" Measurement,
+    XHat "x_hat" State,
+    FHat "f_hat" Fault,
+    /// The integral part of `f_hat` in a law with a direct term.
+    FHatI "f_hat_i" Fault,
+    /// `L_f` e of a sliding-mode law.
+    S "s" Fault,
+    YF "y_f" Measurement,
+    U "u" Actuator,
+    R "r" Reference,
+    /// How far the limits are from the command without limits.
+    Excess "excess" Actuator,
+    /// The commands and estimates as values.
+    Command "command" Actuator,
+    XValue "x_value" State,
+    FValue "f_value" Fault,
+    /// The estimate for the next sample, as values.
+    NextXHat "next_x_hat" State,
+    NextFHat "next_f_hat" Fault,
+    NextYF "next_y_f" Measurement,
+    NextXI "next_x_i" Integral,
+    NextUT "next_u_t" Actuator,
+    /// The residuals of this sample, and the state of their filter for the next one.
+    Residual "next_residual" Residual,
+    NextXR "next_x_r" ResidualState,
+}
+
+macro_rules! matrices {
+    ($controller:ident: $($(#[$text:meta])* $matrix:ident $name:literal [$($kind:ident),*] $value:expr,)*) => {
+        /// A matrix of the controller.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Matrix {
+            $($(#[$text])* $matrix,)*
+        }
+
+        impl Matrix {
+            pub(super) const ALL: [Self; 22] = [$(Self::$matrix),*];
+
+            /// The name in the design file.
+            pub(super) fn name(self) -> &'static str {
+                match self {
+                    $(Self::$matrix => $name,)*
+                }
+            }
+
+            /// What its rows and columns belong to.
+            pub(super) fn kinds(self) -> [Kind; 2] {
+                match self {
+                    $(Self::$matrix => [$(Kind::$kind),*],)*
+                }
+            }
+
+            /// The matrix of a controller, if it has it.
+            pub(super) fn of(self, $controller: &Controller) -> Option<&DMatrix<f64>> {
+                match self {
+                    $(Self::$matrix => $value,)*
+                }
+            }
+        }
+    };
+}
+
+// Each matrix with its name, what its rows and columns belong to, and its value.
+matrices! {
+    controller:
+    A "A" [State, State] Some(&controller.a),
+    B "B" [State, Actuator] Some(&controller.b),
+    C "C" [Measurement, State] Some(&controller.c),
+    D "D" [Measurement, Actuator] controller.d.as_ref(),
+    FA "F_a" [State, Fault] Some(&controller.f_a),
+    AF "A_f" [Fault, Fault] Some(&controller.a_f),
+    KX "K_x" [Actuator, State] Some(&controller.k_x),
+    KF "K_f" [Actuator, Fault] Some(&controller.k_f),
+    LX "L_x" [State, Measurement] Some(&controller.l_x),
+    LF "L_f" [Fault, Measurement] Some(&controller.l_f),
+    PF "P_f" [Fault, Measurement] controller.p_f.as_ref(),
+    H "H" [Integral, Measurement] controller.h.as_ref(),
+    KI "K_i" [Actuator, Integral] controller.k_i.as_ref(),
+    FI "F_i" [Integral, Fault] controller.f_i.as_ref(),
+    LW "L_w" [Integral, Actuator] controller.l_w.as_ref(),
+    NR "N_r" [Actuator, Reference] controller.n_r.as_ref(),
+    /// A, `B_u`, `B_y`, C, `D_u`, `D_y` of the detection.
+    ResidualA "A_r" [ResidualState, ResidualState] Some(&controller.detection.as_ref()?.a),
+    ResidualBu "B_ru" [ResidualState, Actuator] Some(&controller.detection.as_ref()?.b_u),
+    ResidualBy "B_ry" [ResidualState, Measurement] Some(&controller.detection.as_ref()?.b_y),
+    ResidualC "C_r" [Residual, ResidualState] Some(&controller.detection.as_ref()?.c),
+    ResidualDu "D_ru" [Residual, Actuator] Some(&controller.detection.as_ref()?.d_u),
+    ResidualDy "D_ry" [Residual, Measurement] Some(&controller.detection.as_ref()?.d_y),
 }
 
 /// The signals of a controller.
