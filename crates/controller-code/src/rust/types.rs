@@ -34,21 +34,7 @@ impl Source<'_> {
                 lines.push(format!("    /// {text}.\n    pub {field}: {real},"));
             }
             lines.push("}".to_owned());
-            let values: Vec<_> = (1..=fields.len()).map(|k| format!("v{k}")).collect();
-            let pairs =
-                fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}"));
-            lines.push(format!("\nimpl From<[{real}; {count}]> for {name} {{"));
-            lines.push(format!(
-                "    fn from([{}]: [{real}; {count}]) -> Self {{",
-                values.join(", ")
-            ));
-            lines.push(format!("        Self {{ {} }}", pairs.collect::<Vec<_>>().join(", ")));
-            lines.push("    }\n}".to_owned());
-            let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
-            lines.push(format!("\nimpl From<{name}> for [{real}; {count}] {{"));
-            lines.push(format!("    fn from(own: {name}) -> Self {{"));
-            lines.push(format!("        [{}]", reads.join(", ")));
-            lines.push("    }\n}".to_owned());
+            lines.push(conversions(name, fields, &format!("[{real}; {count}]")));
         }
         self.actuators_structure(lines);
         self.detection_structure(lines);
@@ -276,27 +262,32 @@ pub struct Actuators {{"
             };
             lines.push(format!("    /// {text}.\n    pub {field}: bool,"));
         }
-        let values: Vec<_> = (1..=count).map(|k| format!("v{k}")).collect();
-        let pairs: Vec<_> =
-            fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}")).collect();
-        let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
-        lines.push(format!(
-            "}}
+        lines.push("}".to_owned());
+        lines.push(conversions("Actuators", &fields, "[bool; SWITCHES]"));
+    }
+}
 
-impl From<[bool; SWITCHES]> for Actuators {{
-    fn from([{}]: [bool; SWITCHES]) -> Self {{
+/// The conversions between a structure and the array of its fields.
+fn conversions(name: &str, fields: &[String], array: &str) -> String {
+    let values: Vec<_> = (1..=fields.len()).map(|k| format!("v{k}")).collect();
+    let pairs: Vec<_> =
+        fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}")).collect();
+    let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
+    format!(
+        "
+impl From<{array}> for {name} {{
+    fn from([{}]: {array}) -> Self {{
         Self {{ {} }}
     }}
 }}
 
-impl From<Actuators> for [bool; SWITCHES] {{
-    fn from(own: Actuators) -> Self {{
+impl From<{name}> for {array} {{
+    fn from(own: {name}) -> Self {{
         [{}]
     }}
 }}",
-            values.join(", "),
-            pairs.join(", "),
-            reads.join(", ")
-        ));
-    }
+        values.join(", "),
+        pairs.join(", "),
+        reads.join(", ")
+    )
 }
