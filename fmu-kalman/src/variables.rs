@@ -3,11 +3,11 @@
 use aso_controller::design::Signal;
 use aso_controller::kalman::KalmanDesign;
 use aso_controller::{channel, channels};
-use fmu::{Enumeration, Variable as V};
+use fmu::Enumeration;
 
 use crate::{EXTENDED, KalmanFilter, UNSCENTED};
 
-type Variable = V<KalmanFilter>;
+type Variable = fmu::Variable<KalmanFilter>;
 
 /// All variables for `design`, in the order of the description.
 pub(crate) fn list(design: &KalmanDesign) -> Vec<Variable> {
@@ -34,19 +34,16 @@ fn inputs(design: &KalmanDesign) -> Vec<Variable> {
     };
     let measurements = design.measurements.iter().enumerate().map(|(k, signal)| {
         let variable =
-            V::real(&signal.name, text("Measurement", signal), move |m: &mut KalmanFilter| {
-                &mut m.y[k]
-            });
+            Variable::real(&signal.name, text("Measurement", signal), move |model| &mut model.y[k]);
         with_unit(variable, signal.unit.as_ref())
             .input()
-            .derivative(move |m: &mut KalmanFilter| &mut m.y_slopes[k])
+            .derivative(move |model| &mut model.y_slopes[k])
     });
     let commands = design.commands.iter().enumerate().map(|(j, signal)| {
-        let variable = V::real(
-            &signal.name,
-            text("Command that acts", signal),
-            move |m: &mut KalmanFilter| &mut m.u[j],
-        );
+        let variable =
+            Variable::real(&signal.name, text("Command that acts", signal), move |model| {
+                &mut model.u[j]
+            });
         with_unit(variable, signal.unit.as_ref()).input()
     });
     measurements.chain(commands).collect()
@@ -93,18 +90,17 @@ fn estimates(design: &KalmanDesign) -> Vec<Variable> {
     let mut all = Vec::new();
     for (k, ([name, ..], text, unit)) in elements(design).into_iter().enumerate() {
         let text = format!("Estimate of {text}");
-        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.estimate.mean[k]);
+        let variable = Variable::real(name, text, move |model| &mut model.estimate.mean[k]);
         all.push(output(with_unit(variable, unit.as_ref())));
     }
     for (k, ([_, name, _], text, unit)) in elements(design).into_iter().enumerate() {
         let text = format!("Standard deviation of the estimate of {text}");
-        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.deviations[k]);
+        let variable = Variable::real(name, text, move |model| &mut model.deviations[k]);
         all.push(output(with_unit(variable, unit.as_ref())));
     }
     let text = "Square of the innovation relative to its covariance; on average the number of measurements";
     all.push(output(
-        V::real("innovation_squared", text, |m: &mut KalmanFilter| &mut m.innovation_squared)
-            .unit("1"),
+        Variable::real("innovation_squared", text, |model| &mut model.innovation_squared).unit("1"),
     ));
     all
 }
@@ -113,11 +109,11 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
     let methods = Enumeration::new("Method", [("extended", EXTENDED), ("unscented", UNSCENTED)]);
     let text = "How the estimate passes the equations of the plant: by tangents or by points";
     let mut all = vec![
-        V::enumeration("method", text, methods, |m: &mut KalmanFilter| &mut m.method).parameter(),
-        V::integer(
+        Variable::enumeration("method", text, methods, |model| &mut model.method).parameter(),
+        Variable::integer(
             "integration_steps",
             "Number of integration steps in a sample",
-            |m: &mut KalmanFilter| &mut m.integration_steps,
+            |model| &mut model.integration_steps,
         )
         .range(1.0, 1e6)
         .parameter(),
@@ -129,12 +125,12 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
             meaning(&signal.name, &signal.description)
         );
         let every =
-            V::integer(channel("every", k, p), text, move |m: &mut KalmanFilter| &mut m.every[k]);
+            Variable::integer(channel("every", k, p), text, move |model| &mut model.every[k]);
         all.push(every.range(1.0, 1e6).parameter());
     }
     for (k, ([.., name], text, unit)) in elements(design).into_iter().enumerate() {
         let text = format!("Estimate of {text} before the first sample");
-        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.initial[k]);
+        let variable = Variable::real(name, text, move |model| &mut model.initial[k]);
         all.push(with_unit(variable, unit.as_ref()).parameter());
     }
     all

@@ -3,7 +3,6 @@
 mod detection;
 mod parameters;
 
-use fmu::Variable;
 use fmu::description::unit::Unit;
 
 use crate::controller::AsoController;
@@ -12,8 +11,10 @@ use crate::{dependencies, names};
 use aso_controller::channel;
 use aso_controller::design::{Design, Label, Measurement};
 
+type Variable = fmu::Variable<AsoController>;
+
 /// All variables of `controller`, in the order of the description.
-pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
+pub(crate) fn list(controller: &AsoController) -> Vec<Variable> {
     let design = &controller.design;
     let mut all = inputs(design);
     all.extend(commands(design));
@@ -33,17 +34,15 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
 }
 
 /// The clock of a sampled controller, which FMI 2.0 does not have.
-fn sample_clock(design: &Design) -> Option<Variable<AsoController>> {
+fn sample_clock(design: &Design) -> Option<Variable> {
     let text = "Clock of the samples";
     let clock = |period| {
-        Variable::periodic_clock("sample_clock", text, period, |model: &mut AsoController| {
-            &mut model.sample_clock
-        })
+        Variable::periodic_clock("sample_clock", text, period, |model| &mut model.sample_clock)
     };
     design.sample_time.map(clock)
 }
 
-fn with_unit(variable: Variable<AsoController>, unit: Option<&String>) -> Variable<AsoController> {
+fn with_unit(variable: Variable, unit: Option<&String>) -> Variable {
     match unit {
         Some(unit) => variable.unit(unit.clone()),
         None => variable,
@@ -64,26 +63,19 @@ fn times_second(unit: Option<&String>) -> Option<String> {
 }
 
 /// Adds dependencies to a variable.
-fn with_dependencies(
-    variable: Variable<AsoController>,
-    groups: Vec<Group>,
-) -> Variable<AsoController> {
+fn with_dependencies(variable: Variable, groups: Vec<Group>) -> Variable {
     groups.into_iter().fold(variable, |variable, (kind, names)| variable.depends(kind, names))
 }
 
 /// An output with its dependencies; an output of a sampled controller is discrete and has none.
-fn output(
-    design: &Design,
-    variable: Variable<AsoController>,
-    groups: Vec<Group>,
-) -> Variable<AsoController> {
+fn output(design: &Design, variable: Variable, groups: Vec<Group>) -> Variable {
     match design.sample_time {
         None => with_dependencies(variable.output(&[]), groups),
         Some(_) => variable.output(&[]).discrete(),
     }
 }
 
-fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
+fn inputs(design: &Design) -> Vec<Variable> {
     let mut inputs: Vec<_> = design
         .measurements
         .iter()
@@ -92,14 +84,14 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
             let Label { unit, meaning } = signal.label();
             let text = format!("Measurement: {meaning}{}", validity(signal));
             let is_checked = design.checks_measurements();
-            let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
+            let variable = Variable::real(&signal.name, text, move |model| {
                 if is_checked {
                     &mut model.measurement_check_mut().y[k]
                 } else {
                     &mut model.values.y[k]
                 }
             });
-            with_unit(variable, unit).input().derivative(move |model: &mut AsoController| {
+            with_unit(variable, unit).input().derivative(move |model| {
                 if is_checked {
                     &mut model.measurement_check_mut().y_slopes[k]
                 } else {
@@ -111,53 +103,41 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
     inputs.extend(design.references.iter().enumerate().map(|(k, signal)| {
         let Label { unit, meaning } = signal.label();
         let text = format!("Reference: {meaning}");
-        let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
-            &mut model.values.r[k]
-        });
+        let variable = Variable::real(&signal.name, text, move |model| &mut model.values.r[k]);
         with_unit(variable, unit).input().derivative(move |model| &mut model.values.r_slopes[k])
     }));
     let text = "Whether the estimated fault is compensated from t_on on";
-    inputs.push(
-        Variable::boolean("compensate", text, |model: &mut AsoController| &mut model.compensate)
-            .input(),
-    );
+    inputs.push(Variable::boolean("compensate", text, |model| &mut model.compensate).input());
     inputs.extend(design.reconfigurations.iter().map(|case| {
         let j = case.actuator;
         let text = format!("Whether this actuator is gone: {}", case.gone);
-        Variable::boolean(
-            channel("actuator_gone", j, design.actuators.len()),
-            text,
-            move |model: &mut AsoController| &mut model.reconfigurator.reported[j],
-        )
+        Variable::boolean(channel("actuator_gone", j, design.actuators.len()), text, move |model| {
+            &mut model.reconfigurator.reported[j]
+        })
         .input()
     }));
     let text = "Whether an unknown actuator has failed: the gains are those of the fall-back";
     inputs.extend(design.fallback.as_ref().map(|_| {
-        Variable::boolean("fall_back", text, |model: &mut AsoController| {
-            &mut model.reconfigurator.fall_back
-        })
-        .input()
+        Variable::boolean("fall_back", text, |model| &mut model.reconfigurator.fall_back).input()
     }));
     inputs.extend(schedule_input(design));
     inputs
 }
 
 /// The scheduling variable, if it is no measurement.
-fn schedule_input(design: &Design) -> Option<Variable<AsoController>> {
+fn schedule_input(design: &Design) -> Option<Variable> {
     let schedule =
         design.schedule.as_ref().filter(|schedule| schedule.measurement(design).is_none())?;
     let meaning = &schedule.description;
     let meaning = if meaning.is_empty() { &schedule.variable } else { meaning };
     let text = format!("Scheduling variable: {meaning}");
-    let variable = Variable::real(&schedule.variable, text, |model: &mut AsoController| {
-        &mut model.schedule_input
-    });
+    let variable = Variable::real(&schedule.variable, text, |model| &mut model.schedule_input);
     let variable = with_unit(variable, schedule.unit.as_ref()).input();
-    Some(variable.derivative(|model: &mut AsoController| &mut model.schedule_slope))
+    Some(variable.derivative(|model| &mut model.schedule_slope))
 }
 
 /// The value of the scheduling variable that the last sample used, or that a continuous controller uses.
-fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
+fn schedule_at(design: &Design) -> Option<Variable> {
     let schedule = design.schedule.as_ref()?;
     let unit = match schedule.measurement(design) {
         Some(k) => design.measurements[k].unit.as_ref(),
@@ -165,23 +145,21 @@ fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
     };
     let of = if design.sample_time.is_some() { " of the last sample" } else { "" };
     let text = format!("{}{of}, held within the schedule", schedule.variable);
-    let variable =
-        Variable::real("schedule_at", text, |model: &mut AsoController| &mut model.schedule_at);
+    let variable = Variable::real("schedule_at", text, |model| &mut model.schedule_at);
     let initial = vec![schedule.variable.clone()];
     let groups = dependencies::groups_by_schedule(design, Vec::new());
     Some(output(design, with_unit(variable, unit), groups).initially(initial))
 }
 
 /// The actuator that the controller does without.
-fn reconfiguration(design: &Design) -> Option<Variable<AsoController>> {
+fn reconfiguration(design: &Design) -> Option<Variable> {
     let mut text =
         "Number of the actuator that the controller does without; 0 if there is none".to_owned();
     if design.fallback.is_some() {
         text += "; -1 in the fall-back";
     }
-    let variable = Variable::integer("reconfiguration", text, |model: &mut AsoController| {
-        &mut model.reconfigurator.output
-    });
+    let variable =
+        Variable::integer("reconfiguration", text, |model| &mut model.reconfigurator.output);
     design.is_reconfigurable().then(|| variable.output(&[]))
 }
 
@@ -193,28 +171,27 @@ fn validity(signal: &Measurement) -> String {
 }
 
 /// Whether measurements are held, and whether they are held for too long.
-fn measurement_flags(design: &Design) -> Vec<Variable<AsoController>> {
+fn measurement_flags(design: &Design) -> Vec<Variable> {
     if !design.checks_measurements() {
         return Vec::new();
     }
     let names = || design.measurements.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>();
-    let output =
-        |variable: Variable<AsoController>| variable.output(&[]).discrete().initially(names());
+    let output = |variable: Variable| variable.output(&[]).discrete().initially(names());
     vec![
         output(Variable::boolean(
             "measurement_held",
             "Whether a measurement is outside of its range: its last value is used",
-            |model: &mut AsoController| &mut model.measurement_check_mut().is_held,
+            |model| &mut model.measurement_check_mut().is_held,
         )),
         output(Variable::boolean(
             "measurement_lost",
             "Whether a last value is used for too long: commands and estimates are those of the operating point",
-            |model: &mut AsoController| &mut model.measurement_check_mut().is_lost,
+            |model| &mut model.measurement_check_mut().is_lost,
         )),
     ]
 }
 
-fn commands(design: &Design) -> Vec<Variable<AsoController>> {
+fn commands(design: &Design) -> Vec<Variable> {
     let actuators = &design.actuators;
     actuators
         .iter()
@@ -223,9 +200,7 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
             let Label { unit, meaning } = actuator.label();
             let text = format!("Command: {meaning}");
             let variable =
-                Variable::real(&actuator.name, text, move |model: &mut AsoController| {
-                    &mut model.values.u[j]
-                });
+                Variable::real(&actuator.name, text, move |model| &mut model.values.u[j]);
             output(design, with_unit(variable, unit), dependencies::of_command(design, j))
                 .initially(dependencies::of_initial_command(design, j))
                 .derivative(move |model| &mut model.with_slopes().u_slopes[j])
@@ -274,15 +249,13 @@ fn states(design: &Design) -> Vec<State> {
 }
 
 /// The estimates of the faults in a design with a direct term, where they are no states.
-fn faults(design: &Design) -> Vec<Variable<AsoController>> {
+fn faults(design: &Design) -> Vec<Variable> {
     let count = design.p_f.as_ref().map_or(0, |p_f| p_f.rows);
     (0..count)
         .map(|i| {
             let Label { unit, meaning } = design.faults[i].label();
             let (name, text) = (channel("f_hat", i, count), format!("Estimate of {meaning}"));
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
-                &mut model.deviations.f_hat[i]
-            });
+            let variable = Variable::real(name, text, move |model| &mut model.deviations.f_hat[i]);
             output(design, with_unit(variable, unit), dependencies::of_fault(design, i))
                 .initially(dependencies::of_initial_fault(design, i))
                 .derivative(move |model| &mut model.with_slopes().f_slopes[i])
@@ -290,15 +263,14 @@ fn faults(design: &Design) -> Vec<Variable<AsoController>> {
         .collect()
 }
 
-fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
+fn estimates(design: &Design) -> Vec<Variable> {
     let mut states = states(design);
     let faults = states.split_off(design.states.len());
     faults
         .into_iter()
         .chain(states)
         .map(|State { position: k, name, texts: [text, _], units: [unit, _] }| {
-            let variable =
-                Variable::real(name, text, move |model: &mut AsoController| &mut model.values.z[k]);
+            let variable = Variable::real(name, text, move |model| &mut model.values.z[k]);
             output(design, with_unit(variable, unit.as_ref()), Vec::new())
                 .initially(dependencies::of_initial_estimate(design, k))
                 .derivative(move |model| &mut model.with_slopes().z_slopes[k])
@@ -307,7 +279,7 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
 }
 
 /// The estimates of lost effectiveness.
-fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
+fn losses(controller: &AsoController) -> Vec<Variable> {
     let design = &controller.design;
     let losses = controller.losses.iter().enumerate();
     losses
@@ -315,9 +287,8 @@ fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
             let name = channel("E_hat", loss.fault, design.faults.len());
             let meaning = design.actuators[loss.actuator].label().meaning;
             let text = format!("Estimated loss of effectiveness: {meaning}");
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
-                &mut model.losses[position].estimate
-            });
+            let variable =
+                Variable::real(name, text, move |model| &mut model.losses[position].estimate);
             output(design, variable.unit("1"), dependencies::of_loss(design, loss))
                 .initially(dependencies::of_initial_loss(design, loss))
                 .derivative(move |model| &mut model.with_slopes().losses[position].slope)
@@ -326,14 +297,13 @@ fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
 }
 
 /// The derivatives of z, the continuous states.
-fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
+fn slopes(design: &Design) -> Vec<Variable> {
     states(design)
         .into_iter()
         .map(|State { position: k, name: state, texts: [_, text], units: [_, unit] }| {
-            let variable =
-                Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
-                    &mut model.with_slopes().z_slopes[k]
-                });
+            let variable = Variable::real(format!("der({state})"), text, move |model| {
+                &mut model.with_slopes().z_slopes[k]
+            });
             let variable = with_unit(variable, unit.as_ref()).derivative_of(state);
             with_dependencies(variable, dependencies::of_slope(design, k))
                 .initially(dependencies::of_initial_slope(design, k))

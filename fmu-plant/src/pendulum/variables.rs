@@ -1,10 +1,11 @@
 //! The variables of the friction pendulum.
 
-use fmu::Variable;
 use fmu::description::DependencyKind;
 
 use super::FrictionPendulum;
 use crate::motion::exchange::NOMINAL_VELOCITY;
+
+type Variable = fmu::Variable<FrictionPendulum>;
 
 /// A Real parameter: its name, meaning, unit and place.
 pub(super) type Place =
@@ -83,7 +84,7 @@ pub(super) const ACCELERATION_INITIALLY: [&str; 17] = [
 ];
 
 /// All variables, in the order of the description.
-pub(super) fn all() -> Vec<Variable<FrictionPendulum>> {
+pub(super) fn all() -> Vec<Variable> {
     let mut all = Vec::from(inputs());
     all.extend(outputs());
     all.extend(derivatives());
@@ -91,68 +92,58 @@ pub(super) fn all() -> Vec<Variable<FrictionPendulum>> {
     all
 }
 
-fn inputs() -> [Variable<FrictionPendulum>; 2] {
+fn inputs() -> [Variable; 2] {
     [
-        Variable::real("u", "Actuator force on the cart", |model: &mut FrictionPendulum| {
-            &mut model.u
-        })
-        .input()
-        .unit("N")
-        .derivative(|model| &mut model.u_derivatives[0])
-        .derivative(|model| &mut model.u_derivatives[1]),
-        Variable::real("f_a", "Additive actuator fault", |model: &mut FrictionPendulum| {
-            &mut model.f_a
-        })
-        .input()
-        .unit("N")
-        .derivative(|model| &mut model.f_a_derivatives[0])
-        .derivative(|model| &mut model.f_a_derivatives[1]),
+        Variable::real("u", "Actuator force on the cart", |model| &mut model.u)
+            .input()
+            .unit("N")
+            .derivative(|model| &mut model.u_derivatives[0])
+            .derivative(|model| &mut model.u_derivatives[1]),
+        Variable::real("f_a", "Additive actuator fault", |model| &mut model.f_a)
+            .input()
+            .unit("N")
+            .derivative(|model| &mut model.f_a_derivatives[0])
+            .derivative(|model| &mut model.f_a_derivatives[1]),
     ]
 }
 
 /// States, friction and regime.
-fn outputs() -> Vec<Variable<FrictionPendulum>> {
+fn outputs() -> Vec<Variable> {
     let mut all = Vec::new();
     for (k, (name, text, unit, nominal)) in STATES.into_iter().enumerate() {
-        let state = Variable::real(name, text, move |model: &mut FrictionPendulum| {
-            &mut model.motion.state_mut()[k]
-        })
-        .output(&[])
-        .unit(unit)
-        .nominal(nominal)
-        .initially([format!("{name}_0")])
-        .derivative(move |model| &mut model.slope[k]);
+        let state = Variable::real(name, text, move |model| &mut model.motion.state_mut()[k])
+            .output(&[])
+            .unit(unit)
+            .nominal(nominal)
+            .initially([format!("{name}_0")])
+            .derivative(move |model| &mut model.slope[k]);
         all.push(if name == "v_p" { state.reinit() } else { state });
     }
     all.push(
-        Variable::real("f_fric", "Friction force on the cart", |model: &mut FrictionPendulum| {
-            &mut model.f_fric
-        })
-        .output(&DEPENDS)
-        .unit("N")
-        .initially(FRICTION_INITIALLY)
-        .derivative(FrictionPendulum::friction_rate),
+        Variable::real("f_fric", "Friction force on the cart", |model| &mut model.f_fric)
+            .output(&DEPENDS)
+            .unit("N")
+            .initially(FRICTION_INITIALLY)
+            .derivative(FrictionPendulum::friction_rate),
     );
     let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
-    all.push(Variable::integer("regime", text, |model: &mut FrictionPendulum| &mut model.regime));
+    all.push(Variable::integer("regime", text, |model| &mut model.regime));
     all
 }
 
 /// The derivatives of the states.
-fn derivatives() -> [Variable<FrictionPendulum>; 4] {
+fn derivatives() -> [Variable; 4] {
     let rate = |text: &str, state: &str, of: &str| {
         Variable::alias(format!("der({state})"), text, of)
             .derivative_of(state)
             .initially([format!("{of}_0")])
     };
     let acceleration = |text: &str, state: &str, unit: &str, k: usize| {
-        Variable::real(format!("der({state})"), text, move |model: &mut FrictionPendulum| {
-            &mut model.slope[k]
-        })
-        .unit(unit)
-        .derivative_of(state)
-        .depends(DependencyKind::Dependent, DEPENDS)
-        .initially(ACCELERATION_INITIALLY)
+        Variable::real(format!("der({state})"), text, move |model| &mut model.slope[k])
+            .unit(unit)
+            .derivative_of(state)
+            .depends(DependencyKind::Dependent, DEPENDS)
+            .initially(ACCELERATION_INITIALLY)
     };
     [
         rate("Derivative of x_p: v_p", "x_p", "v_p"),
@@ -162,7 +153,7 @@ fn derivatives() -> [Variable<FrictionPendulum>; 4] {
     ]
 }
 
-fn parameters() -> Vec<Variable<FrictionPendulum>> {
+fn parameters() -> Vec<Variable> {
     let mut all = Vec::new();
     for (name, text, unit, place) in FIXED {
         all.push(Variable::real(name, text, place).unit(unit).parameter());
@@ -173,19 +164,14 @@ fn parameters() -> Vec<Variable<FrictionPendulum>> {
     for (k, (name, text, unit, _)) in STATES.into_iter().enumerate() {
         let text = format!("Initial value: {text}");
         all.push(
-            Variable::real(format!("{name}_0"), text, move |model: &mut FrictionPendulum| {
-                &mut model.initial[k]
-            })
-            .unit(unit)
-            .parameter(),
+            Variable::real(format!("{name}_0"), text, move |model| &mut model.initial[k])
+                .unit(unit)
+                .parameter(),
         );
     }
     let text = "Rigid body linearised about the upright position, friction as it is";
     all.push(
-        Variable::boolean("linearised", text, |model: &mut FrictionPendulum| {
-            &mut model.parameters.linearised
-        })
-        .parameter(),
+        Variable::boolean("linearised", text, |model| &mut model.parameters.linearised).parameter(),
     );
     all
 }

@@ -1,9 +1,6 @@
 //! The parameters: activation, initial estimates, filter, operating point, limits, matrices.
 
-use fmu::Variable;
-
-use super::{times_second, with_unit};
-use crate::controller::AsoController;
+use super::{Variable, times_second, with_unit};
 use crate::names;
 use aso_controller::Matrix;
 use aso_controller::channel;
@@ -40,7 +37,7 @@ fn described(name: &str) -> (&'static str, Accessor) {
     }
 }
 
-pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
+pub(super) fn of(design: &Design) -> Vec<Variable> {
     let mut all = switches(design);
     all.extend(starts(design));
     all.extend(filter(design));
@@ -55,7 +52,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     for (name, matrix) in design.matrices() {
         let (meaning, place) = described(name);
         all.extend((0..matrix.values.len()).map(|k| {
-            Variable::real(matrix.element(name, k), meaning, move |model: &mut AsoController| {
+            Variable::real(matrix.element(name, k), meaning, move |model| {
                 &mut place(&mut model.design).values[k]
             })
             .parameter()
@@ -65,16 +62,14 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
 }
 
 /// The parameters of the activation and the sample time of a sampled controller.
-fn switches(design: &Design) -> Vec<Variable<AsoController>> {
+fn switches(design: &Design) -> Vec<Variable> {
     let text = "Compensation starts at this time";
     let mut all = vec![
-        Variable::real("t_on", text, |model: &mut AsoController| &mut model.design.t_on)
-            .unit("s")
-            .parameter(),
+        Variable::real("t_on", text, |model| &mut model.design.t_on).unit("s").parameter(),
         Variable::boolean(
             "monitor",
             "Whether the fault is estimated while it is not compensated",
-            |model: &mut AsoController| &mut model.design.monitor,
+            |model| &mut model.design.monitor,
         )
         .parameter(),
     ];
@@ -83,17 +78,15 @@ fn switches(design: &Design) -> Vec<Variable<AsoController>> {
             Estimator::Current => "Sample time; the command follows the measurements of its sample",
             Estimator::Prediction => "Sample time; the command follows those of the sample before",
         };
-        Variable::real("T_s", text, |model: &mut AsoController| {
-            model.design.sample_time.get_or_insert_default()
-        })
-        .unit("s")
-        .constant()
+        Variable::real("T_s", text, |model| model.design.sample_time.get_or_insert_default())
+            .unit("s")
+            .constant()
     }));
     all
 }
 
 /// Initial estimates.
-fn starts(design: &Design) -> Vec<Variable<AsoController>> {
+fn starts(design: &Design) -> Vec<Variable> {
     let (n, q) = (design.states.len(), design.faults.len());
     let labels = design.states.iter().map(Signal::label);
     let labels = labels.chain(design.faults.iter().map(Fault::label));
@@ -106,7 +99,7 @@ fn starts(design: &Design) -> Vec<Variable<AsoController>> {
         .zip(labels.chain(integrals))
         .enumerate()
         .map(|(k, (name, (text, unit)))| {
-            let variable = Variable::real(name, text, move |model: &mut AsoController| match k {
+            let variable = Variable::real(name, text, move |model| match k {
                 k if k < n => &mut model.x_hat_0[k],
                 k if k < n + q => &mut model.f_hat_0[k - n],
                 k => &mut model.x_i_0[k - n - q],
@@ -116,13 +109,13 @@ fn starts(design: &Design) -> Vec<Variable<AsoController>> {
         .collect()
 }
 
-fn filter(design: &Design) -> Vec<Variable<AsoController>> {
+fn filter(design: &Design) -> Vec<Variable> {
     let count = design.filter.as_ref().map_or(0, Vec::len);
     (0..count)
         .map(|k| {
             let name = channel("filter", k, count);
             let text = format!("Filter W: {}", design.measurements[k].label().meaning);
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+            let variable = Variable::real(name, text, move |model| {
                 &mut model.design.filter.get_or_insert_default()[k]
             });
             let unit = if design.sample_time.is_some() { "1" } else { "1/s" };
@@ -132,7 +125,7 @@ fn filter(design: &Design) -> Vec<Variable<AsoController>> {
 }
 
 /// The bounds of a sliding-mode law.
-fn sliding_mode(design: &Design) -> Vec<Variable<AsoController>> {
+fn sliding_mode(design: &Design) -> Vec<Variable> {
     let Some(SlidingMode { rho, delta }) = &design.sliding_mode else {
         return Vec::new();
     };
@@ -141,7 +134,7 @@ fn sliding_mode(design: &Design) -> Vec<Variable<AsoController>> {
         (0..count).map(move |k| {
             let Label { unit, meaning } = design.faults[k].label();
             let (name, text) = (channel(name, k, count), format!("{text}: {meaning}"));
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+            let variable = Variable::real(name, text, move |model| {
                 &mut place(model.design.sliding_mode.get_or_insert_default())[k]
             });
             with_unit(variable, unit).parameter()
@@ -152,7 +145,7 @@ fn sliding_mode(design: &Design) -> Vec<Variable<AsoController>> {
         .collect()
 }
 
-fn operating_point(design: &Design) -> Vec<Variable<AsoController>> {
+fn operating_point(design: &Design) -> Vec<Variable> {
     let mut all = Vec::new();
     let states = names::operating(design, "x_op", design.states.len());
     for (k, (name, signal)) in states.zip(&design.states).enumerate() {
@@ -183,20 +176,19 @@ fn operating(
     name: String,
     Label { unit, meaning }: Label<'_>,
     place: impl Fn(&mut Design) -> &mut Option<f64> + Send + Sync + 'static,
-) -> Variable<AsoController> {
+) -> Variable {
     let text = format!("Operating point: {meaning}");
-    let variable = Variable::real(name, text, move |model: &mut AsoController| {
-        place(&mut model.design).get_or_insert_default()
-    });
+    let variable =
+        Variable::real(name, text, move |model| place(&mut model.design).get_or_insert_default());
     with_unit(variable, unit).parameter()
 }
 
 /// The commands at which actuators are stuck when they are gone.
-fn stuck(design: &Design) -> Vec<Variable<AsoController>> {
+fn stuck(design: &Design) -> Vec<Variable> {
     let one = |(at, case): (usize, &Reconfiguration)| {
         let name = channel("u_stuck", case.actuator, design.actuators.len());
         let text = format!("Command at which the actuator is stuck when it is gone: {}", case.gone);
-        let variable = Variable::real(name, text, move |model: &mut AsoController| {
+        let variable = Variable::real(name, text, move |model| {
             &mut model.design.reconfigurations[at].stuck_at
         });
         with_unit(variable, design.actuators[case.actuator].unit.as_ref()).tunable()
@@ -204,7 +196,7 @@ fn stuck(design: &Design) -> Vec<Variable<AsoController>> {
     design.reconfigurations.iter().enumerate().map(one).collect()
 }
 
-fn limits(design: &Design) -> Vec<Variable<AsoController>> {
+fn limits(design: &Design) -> Vec<Variable> {
     let mut all = Vec::new();
     for (side, text) in ["Smallest command", "Largest command"].into_iter().enumerate() {
         for (j, actuator) in design.actuators.iter().enumerate() {
@@ -212,7 +204,7 @@ fn limits(design: &Design) -> Vec<Variable<AsoController>> {
                 continue;
             }
             let name = names::limit(design, side, j);
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+            let variable = Variable::real(name, text, move |model| {
                 &mut model.design.actuators[j].limits.get_or_insert([0.0; 2])[side]
             });
             all.push(with_unit(variable, actuator.unit.as_ref()).tunable());
