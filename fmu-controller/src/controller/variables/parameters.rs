@@ -5,7 +5,7 @@ use crate::names;
 use aso_controller::Matrix;
 use aso_controller::channel;
 use aso_controller::design::{
-    Design, Estimator, Fault, Label, Reconfiguration, Signal, SlidingMode,
+    Actuator, Design, Estimator, Fault, Label, Measurement, Reconfiguration, Signal, SlidingMode,
 };
 
 /// Returns one matrix of a design.
@@ -145,42 +145,37 @@ fn sliding_mode(design: &Design) -> Vec<Variable> {
         .collect()
 }
 
+/// Returns the value of one signal at the operating point.
+type Operating = fn(&mut Design, usize) -> &mut Option<f64>;
+
 fn operating_point(design: &Design) -> Vec<Variable> {
-    let mut all = Vec::new();
-    let states = names::operating(design, "x_op", design.states.len());
-    for (k, (name, signal)) in states.zip(&design.states).enumerate() {
-        all.push(operating(name, signal.label(), move |design| &mut design.states[k].operating));
-    }
-    let commands = names::operating(design, "u_op", design.actuators.len());
-    for (k, (name, actuator)) in commands.zip(&design.actuators).enumerate() {
-        all.push(operating(name, actuator.label(), move |design| {
+    let Design { states, actuators, measurements, references, .. } = design;
+    let signals: [(_, Vec<_>, Operating); 4] = [
+        ("x_op", states.iter().map(Signal::label).collect(), |design, k| {
+            &mut design.states[k].operating
+        }),
+        ("u_op", actuators.iter().map(Actuator::label).collect(), |design, k| {
             &mut design.actuators[k].operating
-        }));
-    }
-    let measured = names::operating(design, "y_op", design.measurements.len());
-    for (k, (name, signal)) in measured.zip(&design.measurements).enumerate() {
-        all.push(operating(name, signal.label(), move |design| {
+        }),
+        ("y_op", measurements.iter().map(Measurement::label).collect(), |design, k| {
             &mut design.measurements[k].operating
-        }));
-    }
-    let referred = names::operating(design, "r_op", design.references.len());
-    for (k, (name, signal)) in referred.zip(&design.references).enumerate() {
-        all.push(operating(name, signal.label(), move |design| {
+        }),
+        ("r_op", references.iter().map(Signal::label).collect(), |design, k| {
             &mut design.references[k].operating
-        }));
+        }),
+    ];
+    let mut all = Vec::new();
+    for (start, labels, place) in signals {
+        let names = names::operating(design, start, labels.len());
+        for (k, (name, Label { unit, meaning })) in names.zip(labels).enumerate() {
+            let text = format!("Operating point: {meaning}");
+            let variable = Variable::real(name, text, move |model| {
+                place(&mut model.design, k).get_or_insert_default()
+            });
+            all.push(with_unit(variable, unit).parameter());
+        }
     }
     all
-}
-
-fn operating(
-    name: String,
-    Label { unit, meaning }: Label<'_>,
-    place: impl Fn(&mut Design) -> &mut Option<f64> + Send + Sync + 'static,
-) -> Variable {
-    let text = format!("Operating point: {meaning}");
-    let variable =
-        Variable::real(name, text, move |model| place(&mut model.design).get_or_insert_default());
-    with_unit(variable, unit).parameter()
 }
 
 /// The commands at which actuators are stuck when they are gone.
