@@ -95,25 +95,9 @@ impl Parameters {
         require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
     }
 
-    /// All parameters zero: the direction in which none changes.
-    pub(crate) const ZERO: Self = Self {
-        cart_mass: 0.0,
-        pendulum_mass: 0.0,
-        inertia: 0.0,
-        length: 0.0,
-        cart_damping: 0.0,
-        pendulum_damping: 0.0,
-        gravity: 0.0,
-        coulomb: 0.0,
-        static_friction: 0.0,
-        stribeck_velocity: 0.0,
-        stribeck_exponent: 0.0,
-        linearised: false,
-    };
-
-    /// The parameters as dual numbers with the components of a direction.
-    pub(crate) fn along(&self, direction: &Self) -> Parameters<Dual64> {
-        let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), part(direction));
+    /// The parameters as dual numbers with the components of a direction; without one none changes.
+    pub(crate) fn along(&self, direction: Option<&Self>) -> Parameters<Dual64> {
+        let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), direction.map_or(0.0, part));
         Parameters {
             cart_mass: dual(|p| p.cart_mass),
             pendulum_mass: dual(|p| p.pendulum_mass),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::Force;
 use crate::functions::Direct;
 use crate::motion::exchange::INDICATORS;
-use crate::motion::{Motion, Tolerance};
+use crate::motion::{self, Motion, Tolerance};
 use crate::parameters::{Parameters, Refusal};
 use crate::response::Response;
 
@@ -61,6 +61,26 @@ impl FrictionPendulum {
         self.regime = self.motion.regime().number();
     }
 
+    /// Computes outputs and derivatives where a step has ended: at an event, at a failure, or at its end.
+    fn end_step(
+        &mut self,
+        step: &Step,
+        force: &Force,
+        done: Result<Option<f64>, motion::Failure>,
+    ) -> Result<Option<f64>, Failure> {
+        let reached = match &done {
+            Ok(event) => event.unwrap_or(step.end()).min(step.end()),
+            Err(failure) => failure.time(),
+        };
+        self.update_outputs(force, reached);
+        match done {
+            Ok(event) => Ok(event.map(|_| reached)),
+            Err(failure) => {
+                Err(Failure::Incomplete { time: reached, message: failure.to_string() })
+            }
+        }
+    }
+
     /// The derivative of the friction with respect to time in N/s, along the motion in the present
     /// regime.
     ///
@@ -69,7 +89,7 @@ impl FrictionPendulum {
         let state = self.motion.state();
         let response = Response::new(
             &Direct,
-            &self.parameters.along(&Parameters::ZERO),
+            &self.parameters.along(None),
             self.motion.regime(),
             &std::array::from_fn(|k| Dual64::new(state[k], self.slope[k])),
             Dual64::new(self.force, self.force_rate),
@@ -142,26 +162,14 @@ impl Model for FrictionPendulum {
         let force = force(self, step.start);
         let Self { motion, parameters, tolerance, .. } = self;
         let done = motion.advance(parameters, &force, step.start, step.size, tolerance);
-        let reached = done.as_ref().map_or_else(crate::motion::Failure::time, |()| step.end());
-        self.update_outputs(&force, reached);
-        done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
+        self.end_step(step, &force, done.map(|()| None)).map(|_| ())
     }
 
     fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
         let force = force(self, step.start);
         let Self { motion, parameters, tolerance, .. } = self;
         let done = motion.advance_to_event(parameters, &force, step.start, step.size, tolerance);
-        let event = done.map_err(|failure| {
-            let (time, message) = (failure.time(), failure.to_string());
-            Failure::Incomplete { time, message }
-        });
-        let reached = match &event {
-            Ok(event) => event.unwrap_or(step.end()).min(step.end()),
-            Err(Failure::Incomplete { time, .. }) => *time,
-            Err(_) => step.start,
-        };
-        self.update_outputs(&force, reached);
-        Ok(event?.map(|_| reached))
+        self.end_step(step, &force, done)
     }
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {
@@ -176,7 +184,7 @@ impl Model for FrictionPendulum {
         let (state, change) = (self.motion.state(), direction.motion.state());
         let response = Response::new(
             &Direct,
-            &self.parameters.along(&direction.parameters),
+            &self.parameters.along(Some(&direction.parameters)),
             self.motion.regime(),
             &std::array::from_fn(|k| Dual64::new(state[k], change[k])),
             Dual64::new(self.force, direction.u + direction.f_a),
