@@ -19,6 +19,27 @@ pub use reconfiguration::{Combination, Fallback, GainSet, Reconfiguration};
 use schedule::Schedule;
 pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Measurement, Signal};
 
+/// The matrices of a design or of a point of its schedule, by name: those that it always has, then those of the named
+/// fields that it states.
+macro_rules! named_matrices {
+    ($owner:ident: $($name:literal $field:ident),*) => {{
+        let always = [
+            ("A", &$owner.a),
+            ("B", &$owner.b),
+            ("C", &$owner.c),
+            ("F_a", &$owner.f_a),
+            ("K_x", &$owner.k_x),
+            ("K_f", &$owner.k_f),
+            ("L_x", &$owner.l_x),
+            ("L_f", &$owner.l_f),
+        ];
+        let stated = [$(($name, &$owner.$field)),*];
+        let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
+        always.into_iter().chain(stated)
+    }};
+}
+use named_matrices;
+
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model, t references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -163,15 +184,11 @@ impl Design {
     ///
     /// [`DesignError`] for the first entry that is missing, unknown, out of its range, or does not fit the others.
     pub fn parse(text: &str, path: String) -> Result<Self, DesignError> {
-        let mut design: Self = match toml::from_str(text) {
-            Ok(design) => design,
-            Err(error) => {
-                return Err(DesignError::Malformed {
-                    path,
-                    message: error.to_string().trim_end().to_owned(),
-                });
-            }
+        let malformed = |error: toml::de::Error| {
+            let message = error.to_string().trim_end().to_owned();
+            DesignError::Malformed { path: path.clone(), message }
         };
+        let mut design: Self = toml::from_str(text).map_err(malformed)?;
         design.complete_the_operating_point();
         design.check(&path)?;
         design.locate_reconfigurations();
@@ -229,20 +246,15 @@ impl Design {
     /// in the space of the variables.
     pub fn clear_reconfigurations(&mut self) {
         for case in &mut self.reconfigurations {
-            let matrices =
-                case.k_x.iter_mut().chain(&mut case.k_f).flat_map(|matrix| &mut matrix.values);
-            matrices.chain(case.k_s.iter_mut().flatten()).for_each(|value| *value = 0.0);
+            case.k_x.iter_mut().chain(&mut case.k_f).for_each(Matrix::clear);
+            case.k_s.iter_mut().flatten().for_each(|value| *value = 0.0);
         }
         for combination in &mut self.combinations {
             let matrices = [&mut combination.k_x, &mut combination.k_f, &mut combination.k_s];
-            matrices
-                .into_iter()
-                .flat_map(|matrix| &mut matrix.values)
-                .for_each(|value| *value = 0.0);
+            matrices.into_iter().for_each(Matrix::clear);
         }
         if let Some(fallback) = &mut self.fallback {
-            let matrices = fallback.k_f.iter_mut().chain([&mut fallback.k_x]);
-            matrices.flat_map(|matrix| &mut matrix.values).for_each(|value| *value = 0.0);
+            fallback.k_f.iter_mut().chain([&mut fallback.k_x]).for_each(Matrix::clear);
         }
     }
 
@@ -281,8 +293,7 @@ impl Design {
     /// Sets the matrices that do not depend on the scheduling variable to zero: a direction in the space of
     /// this variable.
     pub fn clear_constant(&mut self) {
-        let matrices = [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten();
-        matrices.flat_map(|matrix| &mut matrix.values).for_each(|value| *value = 0.0);
+        [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten().for_each(Matrix::clear);
     }
 
     /// Takes what the importer can change: the limits of the actuators and the filter.
@@ -348,27 +359,8 @@ impl Design {
     /// The matrices by the name that the file and the variables have; those from A_f on only where they
     /// are stated.
     pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
-        let always = [
-            ("A", &self.a),
-            ("B", &self.b),
-            ("C", &self.c),
-            ("F_a", &self.f_a),
-            ("K_x", &self.k_x),
-            ("K_f", &self.k_f),
-            ("L_x", &self.l_x),
-            ("L_f", &self.l_f),
-        ];
-        let stated = [
-            ("A_f", &self.a_f),
-            ("D", &self.d),
-            ("P_f", &self.p_f),
-            ("H", &self.h),
-            ("K_i", &self.k_i),
-            ("F_i", &self.f_i),
-            ("L_w", &self.l_w),
-            ("N_r", &self.n_r),
-        ];
-        let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
-        always.into_iter().chain(stated)
+        named_matrices! {
+            self: "A_f" a_f, "D" d, "P_f" p_f, "H" h, "K_i" k_i, "F_i" f_i, "L_w" l_w, "N_r" n_r
+        }
     }
 }

@@ -27,6 +27,11 @@ impl Matrix {
         &self.values[i * self.columns..][..self.columns]
     }
 
+    /// Sets all elements to zero.
+    pub(crate) fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
     /// Adds each row times `vector` to an element of `sums`: the sum of the products if `WHOLE`, else
     /// one product after the other.
     ///

@@ -76,19 +76,6 @@ pub struct Point {
 impl Point {
     /// The matrices, in the order of [`super::Design::scheduled_mut`].
     pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
-        let always = [
-            ("A", &self.a),
-            ("B", &self.b),
-            ("C", &self.c),
-            ("F_a", &self.f_a),
-            ("K_x", &self.k_x),
-            ("K_f", &self.k_f),
-            ("L_x", &self.l_x),
-            ("L_f", &self.l_f),
-        ];
-        let stated =
-            [("P_f", &self.p_f), ("K_i", &self.k_i), ("L_w", &self.l_w), ("N_r", &self.n_r)];
-        let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
-        always.into_iter().chain(stated)
+        super::named_matrices! { self: "P_f" p_f, "K_i" k_i, "L_w" l_w, "N_r" n_r }
     }
 }
