@@ -255,26 +255,6 @@ pub enum ResultsError {
     },
 }
 
-/// The format of a result file, by its extension.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Csv,
-    Parquet,
-}
-
-impl Format {
-    fn of(path: &Path) -> Result<Self, ResultsError> {
-        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if ending == "csv" {
-            Ok(Self::Csv)
-        } else if ending == "parquet" {
-            Ok(Self::Parquet)
-        } else {
-            Err(ResultsError::Format { path: path.to_owned() })
-        }
-    }
-}
-
 /// Creates a result file, and its folder if that is missing. The extension `.csv` or `.parquet` selects
 /// the format. A pipe or a device takes CSV only, and needs no extension.
 ///
@@ -284,19 +264,16 @@ impl Format {
 /// name, [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the
 /// file cannot be created.
 pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsError> {
-    let is_stream = is_stream(path);
-    let format = match Format::of(path) {
-        Err(_) if is_stream => Format::Csv,
-        Ok(Format::Parquet) if is_stream => {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match (ending.to_str(), is_stream(path)) {
+        (Some("parquet"), true) => {
             let source = io::Error::other("a pipe or a device takes CSV only");
-            return Err(ResultsError::Write { path: path.to_owned(), source });
+            Err(ResultsError::Write { path: path.to_owned(), source })
         }
-        other => other?,
-    };
-    Ok(match format {
-        Format::Csv => Box::new(CsvSink::create(path, columns)?),
-        Format::Parquet => Box::new(ParquetSink::create(path, columns)?),
-    })
+        (Some("parquet"), false) => Ok(Box::new(ParquetSink::create(path, columns)?)),
+        (Some("csv"), _) | (_, true) => Ok(Box::new(CsvSink::create(path, columns)?)),
+        _ => Err(ResultsError::Format { path: path.to_owned() }),
+    }
 }
 
 /// Checks that the names of the columns differ from each other and from [`TIME`].
