@@ -149,7 +149,7 @@ impl Columns {
 }
 
 /// Returns `value`, limited to 32 bits.
-fn limited(value: i64) -> i32 {
+pub(super) fn limited(value: i64) -> i32 {
     i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 

@@ -144,23 +144,15 @@ impl ParquetSink {
                 clocked.next().copied().flatten().map(|number| self.block.levels(number, rows));
             let levels = levels.as_deref();
             match column.untyped() {
-                ColumnWriter::DoubleColumnWriter(writer) => {
-                    write(writer, reader.reals(), levels)?;
-                }
-                ColumnWriter::Int32ColumnWriter(writer) => {
-                    write(writer, reader.integers(), levels)?;
-                }
-                ColumnWriter::Int64ColumnWriter(writer) => {
-                    write(writer, reader.longs(), levels)?;
-                }
-                ColumnWriter::BoolColumnWriter(writer) => {
-                    write(writer, reader.booleans(), levels)?;
-                }
+                ColumnWriter::DoubleColumnWriter(writer) => write(writer, reader.reals(), levels),
+                ColumnWriter::Int32ColumnWriter(writer) => write(writer, reader.integers(), levels),
+                ColumnWriter::Int64ColumnWriter(writer) => write(writer, reader.longs(), levels),
+                ColumnWriter::BoolColumnWriter(writer) => write(writer, reader.booleans(), levels),
                 ColumnWriter::ByteArrayColumnWriter(writer) => {
-                    write(writer, &reader.strings(), levels)?;
+                    write(writer, &reader.strings(), levels)
                 }
-                _ => return Err(ParquetError::General("a column of another type".to_owned())),
-            }
+                _ => Err(ParquetError::General("a column of another type".to_owned())),
+            }?;
             column.close()?;
         }
         let metadata = group.close()?;
@@ -211,12 +203,14 @@ fn write<T: DataType>(
     values: &[T::T],
     levels: Option<&[i16]>,
 ) -> Result<(), ParquetError> {
-    let Some(levels) = levels else {
-        return writer.write_batch(values, None, None).map(|_| ());
+    let written = if let Some(levels) = levels {
+        let there = values.iter().zip(levels).filter(|(_, level)| **level > 0);
+        let there: Vec<T::T> = there.map(|(value, _)| value.clone()).collect();
+        writer.write_batch(&there, Some(levels), None)
+    } else {
+        writer.write_batch(values, None, None)
     };
-    let there = values.iter().zip(levels).filter(|(_, level)| **level > 0);
-    let there: Vec<T::T> = there.map(|(value, _)| value.clone()).collect();
-    writer.write_batch(&there, Some(levels), None).map(|_| ())
+    written.map(|_| ())
 }
 
 /// Returns the encodings: plain for numbers, which copies the memory; a dictionary for texts, which

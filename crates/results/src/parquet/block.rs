@@ -3,6 +3,7 @@
 use ::parquet::data_type::ByteArray;
 
 use super::{Column, ColumnKind, Row};
+use crate::memory::limited;
 
 /// Approximate size of the values of a block in bytes.
 const BYTES: usize = 16 << 20;
@@ -167,11 +168,6 @@ impl Reader<'_> {
             })
             .collect()
     }
-}
-
-/// Limits a value to 32 bits.
-fn limited(value: i64) -> i32 {
-    i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
 fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block, rows: usize) -> &'a [T] {
