@@ -85,37 +85,26 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     base.scenario.signal.extend(changes.scenario.signal);
     base.scenario.table.extend(changes.scenario.table);
     base.scenario.fault.extend(changes.scenario.fault);
-    replace(&mut base.results.record, changes.results.record);
-    replace(&mut base.results.exclude, changes.results.exclude);
-    set(&mut base.results.every, changes.results.every);
-    set(&mut base.results.file, changes.results.file);
-    set(&mut base.results.bus_trace, changes.results.bus_trace);
-    set(&mut base.experiment.start_time, changes.experiment.start_time);
-    set(&mut base.experiment.stop_time, changes.experiment.stop_time);
-    set(&mut base.experiment.tolerance, changes.experiment.tolerance);
-    set(&mut base.isolation.isolate, changes.isolation.isolate);
-    set(&mut base.isolation.time_limit, changes.isolation.time_limit);
-    set(&mut base.isolation.memory_limit, changes.isolation.memory_limit);
-    let (algorithm, new) = (&mut base.algorithm, changes.algorithm);
-    set(&mut algorithm.method, new.method);
-    set(&mut algorithm.extrapolation, new.extrapolation);
-    set(&mut algorithm.coupling, new.coupling);
-    set(&mut algorithm.step_control, new.step_control);
-    set(&mut algorithm.step, new.step);
-    set(&mut algorithm.relative_tolerance, new.relative_tolerance);
-    set(&mut algorithm.absolute_tolerance, new.absolute_tolerance);
-    set(&mut algorithm.smallest_step, new.smallest_step);
-    set(&mut algorithm.largest_step, new.largest_step);
-    set(&mut algorithm.iterations, new.iterations);
-    set(&mut algorithm.fallback, new.fallback);
-    algorithm.every.extend(new.every);
-    replace(&mut algorithm.next_event, new.next_event);
-    replace(&mut algorithm.crossing, new.crossing);
-    replace(&mut algorithm.discrete, new.discrete);
-    replace(&mut algorithm.power_bonds, new.power_bonds);
-    set(&mut algorithm.jobs, new.jobs);
-    set(&mut algorithm.rollback, new.rollback);
-    set(&mut algorithm.allow_nan, new.allow_nan);
+    base.algorithm.every.extend(changes.algorithm.every);
+    // Calls the function for each entry of the tables.
+    macro_rules! each {
+        ($function:ident: $($table:ident [$($entry:ident)*])*) => {
+            $($($function(&mut base.$table.$entry, changes.$table.$entry);)*)*
+        };
+    }
+    each! { replace:
+        results [record exclude]
+        algorithm [next_event crossing discrete power_bonds]
+    }
+    each! { set:
+        results [every file bus_trace]
+        experiment [start_time stop_time tolerance]
+        isolation [isolate time_limit memory_limit]
+        algorithm [
+            method extrapolation coupling step_control step relative_tolerance absolute_tolerance
+            smallest_step largest_step iterations fallback jobs rollback allow_nan
+        ]
+    }
 }
 
 fn set<T>(value: &mut Option<T>, new: Option<T>) {
