@@ -20,11 +20,18 @@ pub(crate) struct Designed {
     design: Mutex<design::Design>,
 }
 
+/// Calls `work` without the interpreter; raises its error.
+fn designing<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, design::Error> + Send,
+) -> PyResult<T> {
+    guarded(py, work)?.map_err(|error| error::design(&error).raise(py))
+}
+
 /// Designs the controller of the plant file at `path`.
 #[pyfunction]
 pub(crate) fn design_file(py: Python<'_>, path: PathBuf) -> PyResult<Designed> {
-    let result = guarded(py, || design::design(&path))?;
-    let design = result.map_err(|error| error::design(&error).raise(py))?;
+    let design = designing(py, || design::design(&path))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
@@ -37,8 +44,7 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
         Ok(text) => text,
         Err(_) => Node::from_python(plant)?.render()?,
     };
-    let result = guarded(py, || design::design_text(&path, text))?;
-    let design = result.map_err(|error| error::design(&error).raise(py))?;
+    let design = designing(py, || design::design_text(&path, text))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
@@ -56,8 +62,8 @@ pub(crate) fn identify(
 ) -> PyResult<Identified> {
     let options = LogOptions { inputs, outputs, order };
     let limits = TimeLimits::default();
-    let new = guarded(py, || new_plant_file(&paths, &options, Path::new("plant.toml"), &limits))?;
-    let new = new.map_err(|error| error::design(&error).raise(py))?;
+    let path = Path::new("plant.toml");
+    let new = designing(py, || new_plant_file(&paths, &options, path, &limits))?;
     Ok((new.text, new.refusal, new.warnings))
 }
 
@@ -136,27 +142,17 @@ impl Designed {
     fn code(&self, py: Python<'_>, rust: bool, single: bool) -> PyResult<SourceFiles> {
         let language = if rust { design::Language::Rust } else { design::Language::C };
         let precision = if single { design::Precision::Single } else { design::Precision::Double };
-        let result = guarded(py, || self.with(|design| design.code(language, precision)))?;
-        let code = result.map_err(|error| error::design(&error).raise(py))?;
+        let code = designing(py, || self.with(|design| design.code(language, precision)))?;
         Ok((code.files, code.warnings))
     }
 
     /// Makes the Kalman filter with the plant's FMU from the packed filter at `base`.
     fn kalman_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        let result = guarded(py, || {
-            self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page()))
-        })?;
-        result.map_err(|error| error::design(&error).raise(py))
+        designing(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
     }
 
     /// Makes the controller FMU from the packed controller at `base`.
     fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        let result = guarded(py, || {
-            self.with(|design| {
-                let fmu = design.fmu(&base)?;
-                fmu.write(&path, &design.page())
-            })
-        })?;
-        result.map_err(|error| error::design(&error).raise(py))
+        designing(py, || self.with(|design| design.fmu(&base)?.write(&path, &design.page())))
     }
 }

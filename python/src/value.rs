@@ -5,6 +5,7 @@ use master::{Port, System, SystemError, Value, ValueType};
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use slave::CallError;
 
 use crate::error::{self, Exception};
 
@@ -49,10 +50,12 @@ pub(crate) fn set(
         error.set_cause(py, Some(cause));
         error
     })?;
-    system.set_value(port, &converted).map_err(|source| {
-        let slave = system.slaves[port.slave].0.clone();
-        error::system(&SystemError::Call { slave, time, source }).raise(py)
-    })
+    system.set_value(port, &converted).map_err(|source| failed(py, system, port, time, source))
+}
+
+fn failed(py: Python<'_>, system: &System, port: Port, time: f64, source: CallError) -> PyErr {
+    let slave = system.slaves[port.slave].0.clone();
+    error::system(&SystemError::Call { slave, time, source }).raise(py)
 }
 
 /// Reads a variable. `time` in s appears in the error.
@@ -62,11 +65,8 @@ pub(crate) fn get<'py>(
     port: Port,
     time: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let value = system.get_value(port).map_err(|source| {
-        let slave = system.slaves[port.slave].0.clone();
-        error::system(&SystemError::Call { slave, time, source }).raise(py)
-    })?;
-    match value {
+    let value = system.get_value(port);
+    match value.map_err(|source| failed(py, system, port, time, source))? {
         Value::Real(value) => value.into_bound_py_any(py),
         Value::Integer(value) => value.into_bound_py_any(py),
         Value::Boolean(value) => value.into_bound_py_any(py),
