@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::types::{Float64Type, Int32Type, Int64Type};
 use arrow_array::{
     Array as _, ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, LargeBinaryArray,
     LargeStringArray, RecordBatch, RecordBatchIterator, cast::AsArray as _,
@@ -90,12 +91,7 @@ impl Table {
         let there = |array: &ArrayRef| (0..array.len()).map(|row| array.is_valid(row)).collect();
         let present = clocked.map(|(_, array)| there(array)).collect();
         Columns {
-            time: self
-                .batch
-                .column(0)
-                .as_primitive::<arrow_array::types::Float64Type>()
-                .values()
-                .to_vec(),
+            time: self.batch.column(0).as_primitive::<Float64Type>().values().to_vec(),
             columns: columns.zip(arrays.map(values)).collect(),
             present,
         }
@@ -146,7 +142,6 @@ fn bytes(texts: &results::Texts, nulls: Option<&NullBuffer>) -> ArrayRef {
 
 /// Returns the values of an array that [`array`] or [`bytes`] has made.
 fn values(array: &ArrayRef) -> Values {
-    use arrow_array::types::{Float64Type, Int32Type, Int64Type};
     match array.data_type() {
         DataType::Int32 => Values::Integer(array.as_primitive::<Int32Type>().values().to_vec()),
         DataType::Int64 => Values::Long(array.as_primitive::<Int64Type>().values().to_vec()),
@@ -319,16 +314,12 @@ impl Numbers {
     /// Address, length and type of the numbers. `NumPy` keeps this object as long as its array.
     #[getter]
     fn __array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        use arrow_array::types::{Float64Type, Int32Type, Int64Type};
         let endian = if cfg!(target_endian = "little") { '<' } else { '>' };
-        let (kind, address) = match self.array.data_type() {
-            DataType::Int32 => {
-                ("i4", self.array.as_primitive::<Int32Type>().values().as_ptr().addr())
-            }
-            DataType::Int64 => {
-                ("i8", self.array.as_primitive::<Int64Type>().values().as_ptr().addr())
-            }
-            _ => ("f8", self.array.as_primitive::<Float64Type>().values().as_ptr().addr()),
+        let array = &self.array;
+        let (kind, address) = match array.data_type() {
+            DataType::Int32 => ("i4", array.as_primitive::<Int32Type>().values().as_ptr().addr()),
+            DataType::Int64 => ("i8", array.as_primitive::<Int64Type>().values().as_ptr().addr()),
+            _ => ("f8", array.as_primitive::<Float64Type>().values().as_ptr().addr()),
         };
         let interface = PyDict::new(py);
         interface.set_item("version", 3)?;
