@@ -186,11 +186,24 @@ fn folded(count: usize, summary: &str, table: &Markup) -> Markup {
     html! { details open[count <= OPEN] { summary { (summary) } (table) } }
 }
 
+/// The titles of a table: of columns of texts, then of numbers, then of texts.
+fn titles(texts: &[&str], numbers: &[&str], last: &[&str]) -> Markup {
+    html! {
+        thead {
+            tr {
+                @for title in texts { th scope="col" { (title) } }
+                @for title in numbers { th.number scope="col" { (title) } }
+                @for title in last { th scope="col" { (title) } }
+            }
+        }
+    }
+}
+
 fn happened(marks: &[Mark], events: &Events) -> Markup {
     let table = html! {
         div.scroll tabindex="0" role="region" aria-labelledby="happened" {
             table {
-                thead { tr { th.number scope="col" { "t in s" } th scope="col" { "kind" } th scope="col" { "what" } } }
+                (titles(&[], &["t in s"], &["kind", "what"]))
                 tbody {
                     @for mark in marks.iter().take(LISTED) {
                         tr {
@@ -231,7 +244,7 @@ fn unchanged(content: &Content<'_>) -> Markup {
                 summary { (count) @if count == 1 { " signal does" } @else { " signals do" } " not change" }
                 div.scroll tabindex="0" role="region" aria-label="Signals that do not change" {
                     table {
-                        thead { tr { th scope="col" { "variable" } th.number scope="col" { "value" } th scope="col" { "unit" } } }
+                        (titles(&["variable"], &["value"], &["unit"]))
                         tbody {
                             @for at in &content.flat {
                                 tr {
@@ -316,16 +329,11 @@ fn statistics(content: &Content<'_>) -> Markup {
     let table = html! {
             div.scroll tabindex="0" role="region" aria-labelledby="statistics" {
                 table {
-                    thead {
-                        tr {
-                            th scope="col" { "variable" }
-                            th scope="col" { "unit" }
-                            @for title in ["first", "last", "smallest", "at t in s", "largest", "at t in s", "mean", "rms"] {
-                                th.number scope="col" { (title) }
-                            }
-                            th scope="col" { "mean and rms over" }
-                        }
-                    }
+                    (titles(
+                        &["variable", "unit"],
+                        &["first", "last", "smallest", "at t in s", "largest", "at t in s", "mean", "rms"],
+                        &["mean and rms over"],
+                    ))
                     tbody {
                         @for (column, statistics) in rows {
                             tr {
@@ -361,14 +369,11 @@ fn bus_frames(messages: &[frames::Message], file: &Path) -> Markup {
             @if messages.is_empty() { p { (file.display()) " has no frame at the times of this page." } }
             div.scroll tabindex="0" role="region" aria-labelledby="frames" {
                 table {
-                    thead {
-                        tr {
-                            th scope="col" { "bus and identifier" }
-                            @for title in ["frames", "first at t in s", "last at t in s", "shortest interval in ms", "mean in ms", "longest in ms"] {
-                                th.number scope="col" { (title) }
-                            }
-                        }
-                    }
+                    (titles(
+                        &["bus and identifier"],
+                        &["frames", "first at t in s", "last at t in s", "shortest interval in ms", "mean in ms", "longest in ms"],
+                        &[],
+                    ))
                     tbody {
                         @for message in messages.iter().take(LISTED) {
                             tr {
@@ -427,14 +432,11 @@ fn difference_table(name: &str, differences: &[Difference]) -> Markup {
     html! {
             div.scroll tabindex="0" role="region" aria-label=(name) {
                 table {
-                    thead {
-                        tr {
-                            th scope="col" { "variable" }
-                            @for title in ["largest difference", "at t in s", "rms", "largest, relative to the range", "rows"] {
-                                th.number scope="col" { (title) }
-                            }
-                        }
-                    }
+                    (titles(
+                        &["variable"],
+                        &["largest difference", "at t in s", "rms", "largest, relative to the range", "rows"],
+                        &[],
+                    ))
                     tbody {
                         @for difference in differences {
                             tr {

@@ -41,7 +41,7 @@ fn panel<'a>(group: &'a Group, samples: &'a Samples, columns: &'a [Column]) -> P
     });
     Panel {
         x_label: "time in s",
-        y_label: group.unit(),
+        y_label: &group.unit,
         series: series.collect(),
         ..Panel::default()
     }

@@ -26,7 +26,7 @@ pub(crate) struct Group {
     key: (Rank, usize),
     /// Whether no variable changes.
     pub(crate) is_flat: bool,
-    unit: String,
+    pub(crate) unit: String,
     /// Their positions among the columns.
     pub(crate) members: Vec<usize>,
     /// The largest absolute value of the first one.
@@ -36,10 +36,6 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    pub(crate) fn unit(&self) -> &str {
-        &self.unit
-    }
-
     /// Whether it is one of those that are shown first.
     fn is_first(&self) -> bool {
         self.key.0 < Rank::Other
