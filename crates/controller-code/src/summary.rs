@@ -160,6 +160,9 @@ fn modes(controller: &Controller) -> Vec<String> {
              its value."
         }
     };
+    let list = |values: &[f64]| {
+        values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
+    };
     let mut all = vec![format!(
         "Faults are compensated from {start} on while `compensate` is true. {estimated}"
     )];
@@ -170,9 +173,6 @@ fn modes(controller: &Controller) -> Vec<String> {
         all.push(text.to_owned());
     }
     if let Some(SlidingMode { rho, delta }) = &controller.sliding_mode {
-        let list = |values: &[f64]| {
-            values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
-        };
         all.push(format!(
             "The law that estimates the faults is a sliding mode: f_hat = rho s / (|s| + delta), s = L_f e, for \
              each fault; rho = {}, delta = {}. So no estimate exceeds rho.",
@@ -181,10 +181,9 @@ fn modes(controller: &Controller) -> Vec<String> {
         ));
     }
     if let Some(filter) = &controller.filter {
-        let list: Vec<_> = filter.iter().map(|gain| format!("{gain:?}")).collect();
         all.push(format!(
             "Measurements are filtered: y_f := y_f + filter (y - y_f), filter = {}.",
-            list.join(", ")
+            list(filter)
         ));
     }
     if controller.is_limited() {
@@ -254,19 +253,14 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
         ]);
     }
     let mut lines = aligned(&rows);
-    for (actuator, field) in controller.actuators.iter().zip(&fields.actuators) {
-        lines.extend(
-            actuator
-                .limits
-                .map(|[low, high]| format!("Limits of Commands.{field}: {low:?} to {high:?}")),
-        );
-    }
-    for (measurement, field) in controller.measurements.iter().zip(&fields.measurements) {
-        lines.extend(
-            measurement
-                .limits
-                .map(|[low, high]| format!("Range of Measurements.{field}: {low:?} to {high:?}")),
-        );
+    for (what, signals, fields) in [
+        ("Limits of Commands", &controller.actuators, &fields.actuators),
+        ("Range of Measurements", &controller.measurements, &fields.measurements),
+    ] {
+        for (signal, field) in signals.iter().zip(fields) {
+            let range = signal.limits;
+            lines.extend(range.map(|[low, high]| format!("{what}.{field}: {low:?} to {high:?}")));
+        }
     }
     for loss in &controller.losses {
         let [fault, actuator] = [&fields.faults[loss.fault], &fields.actuators[loss.actuator]];
