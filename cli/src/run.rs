@@ -131,7 +131,7 @@ fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()>
     let outputs =
         [("--log-calls", options.watching.log_calls.as_deref()), ("the report", page.as_deref())];
     let outputs = outputs.iter().filter_map(|(role, path)| Some((*role, (*path)?)));
-    let source = loaded.source.as_ref().map(|source| ("the configuration", source.path()));
+    let source = loaded.source.as_ref().map(|source| ("the configuration", &*source.path));
     config.check_outputs(source.as_slice(), &outputs.collect::<Vec<_>>())?;
     let Some(results) = results.filter(|file| is_stream(file)) else { return Ok(()) };
     for (option, is_stated) in

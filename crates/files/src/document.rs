@@ -93,12 +93,6 @@ impl Source {
         Ok(Self::new(path, std::fs::read_to_string(path)?))
     }
 
-    /// Returns the path of the file.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Returns the whole text.
     #[must_use]
     pub fn text(&self) -> &str {

@@ -66,7 +66,7 @@ impl PreparedRun {
         slaves: Vec<(String, Box<dyn Slave>)>,
     ) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
-        let source = loaded.source.as_ref().map(|source| ("the configuration", source.path()));
+        let source = loaded.source.as_ref().map(|source| ("the configuration", &*source.path));
         loaded.config.check_outputs(source.as_slice(), &[])?;
         if options.log_calls.is_some() {
             // With threads, the order of the logged calls would be random.
