@@ -127,9 +127,8 @@ fn fmu_kind(error: &fmu_import::FmuError) -> &'static str {
 /// Returns the exception of an error of the master.
 pub(crate) fn system(error: &SystemError) -> Exception {
     use SystemError as E;
-    let named = |kind, name: &str| {
-        Exception::new(CONFIGURATION, kind, error.to_string()).text("name", name)
-    };
+    let refused = |kind| Exception::new(CONFIGURATION, kind, error.to_string());
+    let named = |kind, name: &str| refused(kind).text("name", name);
     let failed = |kind| Exception::new(RUN, kind, error.to_string());
     match error {
         E::Syntax { text, .. } => named("Syntax", text),
@@ -166,16 +165,11 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             named("LostSetting", name).text("value", value).text("found", actual)
         }
         E::Capability { slave, lacks, required_by } => {
-            Exception::new(CONFIGURATION, "Capability", error.to_string())
-                .text("fmu", slave)
-                .text("lacks", *lacks)
-                .text("required_by", required_by)
+            let exception = refused("Capability").text("fmu", slave);
+            exception.text("lacks", *lacks).text("required_by", required_by)
         }
-        E::Algorithm { .. } => Exception::new(CONFIGURATION, "Algorithm", error.to_string()),
-        E::Time { what, value, .. } => {
-            let exception = Exception::new(CONFIGURATION, "Time", error.to_string());
-            exception.text("what", *what).number("value", *value)
-        }
+        E::Algorithm { .. } => refused("Algorithm"),
+        E::Time { what, value, .. } => refused("Time").text("what", *what).number("value", *value),
         E::Resume { name, saved, requested } => {
             named("Resume", name).text("taken", saved).text("given", requested)
         }
