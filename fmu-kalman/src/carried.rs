@@ -432,15 +432,6 @@ impl CarriedPlant {
         }
         Ok(())
     }
-
-    /// Adds the faults of sensors in `z` to `y`.
-    fn add_sensor_faults(&self, z: &[f64], y: &mut [f64]) {
-        for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
-            if let Position::Measurement(at) = fault.enters {
-                y[at] += value;
-            }
-        }
-    }
 }
 
 impl SampledPlant for CarriedPlant {
@@ -464,7 +455,11 @@ impl SampledPlant for CarriedPlant {
         let x = &mut self.point[..self.n];
         self.equations.begin(self.time, x, &self.inputs)?;
         self.equations.outputs(self.time, x, &self.inputs, y)?;
-        self.add_sensor_faults(z, y);
+        for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
+            if let Position::Measurement(at) = fault.enters {
+                y[at] += value;
+            }
+        }
         Ok(())
     }
 

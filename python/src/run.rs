@@ -251,7 +251,7 @@ fn run(
         let second = file.map(|file| results::create(&file, columns)).transpose()?;
         Ok(Box::new(MemorySink::new(columns, recorded.clone(), second)?) as Box<dyn Sink>)
     })?;
-    watch.set_span(run.simulation.time(), run.plan.stop);
+    watch.span = (run.simulation.time(), run.plan.stop);
     let ended = run.advance(|simulation| {
         if let Some(input) = &mut input
             && let Err(error) = input.set(simulation)

@@ -103,7 +103,7 @@ impl Drop for Progress {
 /// Looks beside the steps of a run.
 pub(crate) struct Watch {
     /// Start and stop time of the run in s.
-    span: (f64, f64),
+    pub(crate) span: (f64, f64),
     deadline: Option<(Instant, f64)>,
     cancel: Option<Arc<AtomicBool>>,
     progress: Progress,
@@ -145,11 +145,6 @@ impl Watch {
             looked: now,
             stop: None,
         })
-    }
-
-    /// Sets start and stop time of the run in s.
-    pub(crate) fn set_span(&mut self, start: f64, stop: f64) {
-        self.span = (start, stop);
     }
 
     /// Called after every step, at the time reached in s.

@@ -8,21 +8,18 @@ use super::axis::Axis;
 /// is lost, and the width of the page bounds the length of the path. Takes one pass.
 #[must_use]
 pub(crate) fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
+    let place = |value: f64| if value.is_finite() { vertical.place(value) } else { f64::NAN };
     let points: Vec<(f64, f64)> = time
         .iter()
         .zip(values)
         .filter(|(time, _)| horizontal.contains(**time))
-        .map(|(time, value)| (horizontal.place(*time), finite_place(vertical, *value)))
+        .map(|(time, value)| (horizontal.place(*time), place(*value)))
         .collect();
     points
         .split(|point| point.1.is_nan())
         .filter(|run| !run.is_empty())
         .map(|run| piece(&outline(run)))
         .collect()
-}
-
-fn finite_place(axis: &Axis, value: f64) -> f64 {
-    if value.is_finite() { axis.place(value) } else { f64::NAN }
 }
 
 /// Reduces a run of points without gaps.
