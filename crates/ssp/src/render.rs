@@ -108,30 +108,27 @@ fn connector(connector: &Connector) -> Tag {
 
 /// Adds the elements that state the type.
 fn of_type(tag: Tag, kind: &Type) -> Tag {
-    match kind {
-        Type::Array(sizes) => sizes.iter().fold(tag, |tag, size| {
-            let dimension = Tag::new("ssc:Dimension").newer(true);
-            tag.add(match size {
-                Dimension::Size(size) => dimension.with("size", size.to_string()),
-                Dimension::Connector(name) => dimension.with("sizeConnector", name),
-                Dimension::Open => dimension,
-            })
-        }),
-        Type::Clocked(clock) => tag.add(Tag::new("ssd:Clock").with("name", clock).newer(true)),
-        kind => tag.add(value_type(kind)),
-    }
-}
-
-fn value_type(kind: &Type) -> Tag {
-    match kind {
+    let element = match kind {
         Type::Real(unit) => Tag::new("ssc:Real").maybe("unit", unit.as_deref()),
         Type::Integer => Tag::new("ssc:Integer"),
         Type::Boolean => Tag::new("ssc:Boolean"),
         Type::String => Tag::new("ssc:String"),
         Type::Enumeration(name) => Tag::new("ssc:Enumeration").with("name", name),
         Type::Binary => Tag::new("ssc:Binary"),
-        Type::Clock | Type::Array(_) | Type::Clocked(_) => Tag::new("ssc:Clock").newer(true),
-    }
+        Type::Clock => Tag::new("ssc:Clock").newer(true),
+        Type::Clocked(clock) => Tag::new("ssd:Clock").with("name", clock).newer(true),
+        Type::Array(sizes) => {
+            return sizes.iter().fold(tag, |tag, size| {
+                let dimension = Tag::new("ssc:Dimension").newer(true);
+                tag.add(match size {
+                    Dimension::Size(size) => dimension.with("size", size.to_string()),
+                    Dimension::Connector(name) => dimension.with("sizeConnector", name),
+                    Dimension::Open => dimension,
+                })
+            });
+        }
+    };
+    tag.add(element)
 }
 
 fn connection(connection: &Connection) -> Tag {
@@ -152,7 +149,8 @@ fn conversion(tag: Tag, conversion: &Conversion) -> Tag {
 
 /// Writes both attributes of a linear transformation, because Ecos reads a missing factor as zero.
 fn transformation(transformation: &Transformation) -> Tag {
-    fn entries<T: ToString>(tag: Tag, pairs: &[(T, T)]) -> Tag {
+    fn entries<T: ToString>(kind: &str, pairs: &[(T, T)]) -> Tag {
+        let tag = Tag::new(&format!("ssc:{kind}MappingTransformation"));
         pairs.iter().fold(tag, |tag, (source, target)| {
             let entry = Tag::new("ssc:MapEntry").with("source", source.to_string());
             tag.add(entry.with("target", target.to_string()))
@@ -162,15 +160,9 @@ fn transformation(transformation: &Transformation) -> Tag {
         Transformation::Linear { factor, offset } => Tag::new("ssc:LinearTransformation")
             .with("factor", number(*factor))
             .with("offset", number(*offset)),
-        Transformation::Boolean(pairs) => {
-            entries(Tag::new("ssc:BooleanMappingTransformation"), pairs)
-        }
-        Transformation::Integer(pairs) => {
-            entries(Tag::new("ssc:IntegerMappingTransformation"), pairs)
-        }
-        Transformation::Enumeration(pairs) => {
-            entries(Tag::new("ssc:EnumerationMappingTransformation"), pairs)
-        }
+        Transformation::Boolean(pairs) => entries("Boolean", pairs),
+        Transformation::Integer(pairs) => entries("Integer", pairs),
+        Transformation::Enumeration(pairs) => entries("Enumeration", pairs),
     }
 }
 
@@ -224,20 +216,19 @@ fn parameter_set(tag: Tag, set: &ParameterSet) -> Tag {
 }
 
 fn parameter(parameter: &Parameter) -> Tag {
+    let of_kind = |kind: &str, value: &str| Tag::new(kind).with("value", value);
     let value = match &parameter.value {
         ParameterValue::Real(value, unit) => {
-            Tag::new("ssv:Real").with("value", number(*value)).maybe("unit", unit.as_deref())
+            of_kind("ssv:Real", &number(*value)).maybe("unit", unit.as_deref())
         }
-        ParameterValue::Integer(value) => Tag::new("ssv:Integer").with("value", value.to_string()),
-        ParameterValue::Boolean(value) => Tag::new("ssv:Boolean").with("value", value.to_string()),
-        ParameterValue::String(text) => Tag::new("ssv:String").with("value", text),
+        ParameterValue::Integer(value) => of_kind("ssv:Integer", &value.to_string()),
+        ParameterValue::Boolean(value) => of_kind("ssv:Boolean", &value.to_string()),
+        ParameterValue::String(text) => of_kind("ssv:String", text),
         ParameterValue::Enumeration(item, name) => {
-            Tag::new("ssv:Enumeration").with("value", item).maybe("name", name.as_deref())
+            of_kind("ssv:Enumeration", item).maybe("name", name.as_deref())
         }
-        ParameterValue::Binary(digits) => Tag::new("ssv:Binary").with("value", digits),
-        ParameterValue::Long(value) => {
-            Tag::new("ssv:Int64").with("value", value.to_string()).newer(true)
-        }
+        ParameterValue::Binary(digits) => of_kind("ssv:Binary", digits),
+        ParameterValue::Long(value) => of_kind("ssv:Int64", &value.to_string()).newer(true),
         ParameterValue::Array(kind, values) => array(kind, values),
     };
     Tag::new("ssv:Parameter").with("name", &parameter.name).add(value)

@@ -106,24 +106,20 @@ pub(super) fn conversion(node: &Node) -> Result<Conversion, SspError> {
 
 fn read_transformation(node: &Node) -> Result<Transformation, SspError> {
     let text = |entry: &Node, name: &str| Ok(entry.text(name));
-    match node.name.as_str() {
-        "LinearTransformation" => Ok(Transformation::Linear {
+    Ok(match node.name.as_str() {
+        "LinearTransformation" => Transformation::Linear {
             factor: node.number("factor")?.unwrap_or(1.0),
             offset: node.number("offset")?.unwrap_or(0.0),
-        }),
-        "BooleanMappingTransformation" => {
-            Ok(Transformation::Boolean(entries(node, Node::boolean)?))
-        }
-        "IntegerMappingTransformation" => {
-            Ok(Transformation::Integer(entries(node, Node::integer)?))
-        }
-        "EnumerationMappingTransformation" => Ok(Transformation::Enumeration(entries(node, text)?)),
+        },
+        "BooleanMappingTransformation" => Transformation::Boolean(entries(node, Node::boolean)?),
+        "IntegerMappingTransformation" => Transformation::Integer(entries(node, Node::integer)?),
+        "EnumerationMappingTransformation" => Transformation::Enumeration(entries(node, text)?),
         other => {
             let expected = "LinearTransformation or BooleanMappingTransformation, \
                  IntegerMappingTransformation or EnumerationMappingTransformation";
-            Err(node.wrong(expected, other))
+            return Err(node.wrong(expected, other));
         }
-    }
+    })
 }
 
 /// Reads source and target of each `MapEntry`; a repeated source is an error.
