@@ -116,7 +116,7 @@ pub(crate) fn compare(
     let positions_there: Vec<usize> = partners.iter().flatten().copied().collect();
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(BATCHES);
-        let reader = scope.spawn(move || Batches::read(other, &positions_there, sender));
+        let reader = scope.spawn(move || pass_on(other, &positions_there, &sender));
         let mut series = Series::new(receiver);
         let mut sums: Vec<_> = positions.iter().map(|at| Sum::new(&table.columns()[*at])).collect();
         let collector = |group: &Group| Collector::new(2 * group.members.len(), group.block, true);
@@ -180,33 +180,23 @@ const BATCHES: usize = 8;
 /// A row: its time and its values.
 type Row = (f64, Vec<f64>);
 
-/// Passes on the rows of a file.
-struct Batches {
-    rows: VecDeque<Row>,
-    sender: SyncSender<VecDeque<Row>>,
-}
-
-impl Batches {
-    fn read(
-        table: &Table,
-        positions: &[usize],
-        sender: SyncSender<VecDeque<Row>>,
-    ) -> Result<(), ResultsError> {
-        let mut batches = Self { rows: VecDeque::new(), sender };
-        table.visit(positions, &mut |time, row| {
-            batches.rows.push_back((time, row.to_vec()));
-            if batches.rows.len() == BATCH {
-                batches.send();
-            }
-        })?;
-        batches.send();
-        Ok(())
-    }
-
-    /// Without a receiver, the comparison has ended by an error.
-    fn send(&mut self) {
-        let _ = self.sender.send(std::mem::take(&mut self.rows));
-    }
+/// Passes on the rows of a file in batches.
+fn pass_on(
+    table: &Table,
+    positions: &[usize],
+    sender: &SyncSender<VecDeque<Row>>,
+) -> Result<(), ResultsError> {
+    let mut rows = VecDeque::new();
+    // Without a receiver, the comparison has ended by an error.
+    let send = |rows: &mut VecDeque<Row>| drop(sender.send(std::mem::take(rows)));
+    table.visit(positions, &mut |time, row| {
+        rows.push_back((time, row.to_vec()));
+        if rows.len() == BATCH {
+            send(&mut rows);
+        }
+    })?;
+    send(&mut rows);
+    Ok(())
 }
 
 /// The rows of the other run: the last one up to a time, and the next one.

@@ -61,35 +61,22 @@ pub(crate) fn graph(run: &Run) -> Markup {
 type Corner = (usize, usize);
 
 fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
-    let start = (from.0 + WIDTH, from.1 + HEIGHT / 2);
     let (path, label) = if to.0 > from.0 {
-        let end = (to.0, to.1 + HEIGHT / 2);
-        let bend = ACROSS / 2;
+        let (x, y) = (from.0 + WIDTH, from.1 + HEIGHT / 2);
+        let (end_x, end_y) = (to.0, to.1 + HEIGHT / 2);
+        let (leaving, arriving) = (x + ACROSS / 2, end_x - ACROSS / 2);
         (
-            format!(
-                "M{} {} C{} {} {} {} {} {}",
-                start.0,
-                start.1,
-                start.0 + bend,
-                start.1,
-                end.0 - bend,
-                end.1,
-                end.0,
-                end.1
-            ),
-            (usize::midpoint(start.0, end.0), usize::midpoint(start.1, end.1)),
+            format!("M{x} {y} C{leaving} {y} {arriving} {end_y} {end_x} {end_y}"),
+            (usize::midpoint(x, end_x), usize::midpoint(y, end_y)),
         )
     } else {
         // Back to the left: from the lower edge to the lower edge, below the boxes.
-        let (start, end) =
-            ((from.0 + WIDTH * 2 / 3, from.1 + HEIGHT), (to.0 + WIDTH / 3, to.1 + HEIGHT));
-        let below = start.1.max(end.1) + DOWN * 3 / 4;
+        let (x, y) = (from.0 + WIDTH * 2 / 3, from.1 + HEIGHT);
+        let (end_x, end_y) = (to.0 + WIDTH / 3, to.1 + HEIGHT);
+        let below = y.max(end_y) + DOWN * 3 / 4;
         (
-            format!(
-                "M{} {} C{} {below} {} {below} {} {}",
-                start.0, start.1, start.0, end.0, end.0, end.1
-            ),
-            (usize::midpoint(start.0, end.0), below - DOWN / 5),
+            format!("M{x} {y} C{x} {below} {end_x} {below} {end_x} {end_y}"),
+            (usize::midpoint(x, end_x), below - DOWN / 5),
         )
     };
     html! {
