@@ -2,86 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A state or a reference.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Signal {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Value at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-}
-
-/// A measurement, and when its value is not used; see [`crate::sample::measurements`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Measurement {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Value at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-    /// The smallest and the largest value that is used; the last one of them replaces any other value.
-    #[serde(default)]
-    pub range: Option<[f64; 2]>,
-    /// The longest time in s for which it does; then the controller rests at its operating point.
-    #[serde(default)]
-    pub longest_hold: Option<f64>,
-}
-
-/// An actuator, with its limits if it has any.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Actuator {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Command at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-    /// The smallest and the largest command.
-    #[serde(default)]
-    pub limits: Option<[f64; 2]>,
-}
-
-/// A state of the fault model: a fault, or the rate of one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fault {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// The actuator whose loss of effectiveness this fault is.
-    #[serde(default)]
-    pub loss_of: Option<String>,
-    /// The smallest command from which the loss can be estimated.
-    #[serde(default)]
-    pub least_command: Option<f64>,
-}
-
 /// Unit and meaning of a signal.
 #[derive(Clone, Copy)]
 pub struct Label<'a> {
@@ -91,19 +11,67 @@ pub struct Label<'a> {
     pub meaning: &'a str,
 }
 
-macro_rules! labelled {
-    ($($signal:ty),*) => {
-        $(impl $signal {
+/// Signals: all have a name, a unit and a description, and then their own entries.
+macro_rules! signals {
+    ($($(#[$about:meta])* $signal:ident { $($(#[$text:meta])* $entry:ident: $kind:ty,)* })*) => {$(
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $signal {
+            /// Its name, that of its variables.
+            pub name: String,
+            /// Its unit, as FMI writes it.
+            #[serde(default)]
+            pub unit: Option<String>,
+            /// What it is, for a reader.
+            #[serde(default)]
+            pub description: String,
+            $($(#[$text])* #[serde(default)] pub $entry: $kind,)*
+        }
+
+        impl $signal {
             /// Unit and meaning.
             pub fn label(&self) -> Label<'_> {
                 let text = if self.description.is_empty() { &self.name } else { &self.description };
                 Label { unit: self.unit.as_ref(), meaning: text }
             }
-        })*
-    };
+        }
+    )*};
 }
 
-labelled!(Signal, Measurement, Actuator, Fault);
+signals! {
+    /// A state or a reference.
+    Signal {
+        /// Value at the operating point.
+        operating: Option<f64>,
+    }
+
+    /// A measurement, and when its value is not used; see [`crate::sample::measurements`].
+    Measurement {
+        /// Value at the operating point.
+        operating: Option<f64>,
+        /// The smallest and the largest value that is used; the last one of them replaces any other value.
+        range: Option<[f64; 2]>,
+        /// The longest time in s for which it does; then the controller rests at its operating point.
+        longest_hold: Option<f64>,
+    }
+
+    /// An actuator, with its limits if it has any.
+    Actuator {
+        /// Command at the operating point.
+        operating: Option<f64>,
+        /// The smallest and the largest command.
+        limits: Option<[f64; 2]>,
+    }
+
+    /// A state of the fault model: a fault, or the rate of one.
+    Fault {
+        /// The actuator whose loss of effectiveness this fault is.
+        loss_of: Option<String>,
+        /// The smallest command from which the loss can be estimated.
+        least_command: Option<f64>,
+    }
+}
 
 impl Measurement {
     /// The smallest and the largest value that is used: the largest numbers without a range.
