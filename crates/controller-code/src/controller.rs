@@ -9,7 +9,7 @@ use super::detection::Detection;
 use super::parts::{Loss, Signal, dense, first_at};
 use super::reconfiguration::{Plant, Reconfiguration};
 use super::schedule::Schedule;
-use super::symbols::{Kind, Matrix};
+use super::symbols::Matrix;
 use crate::Error;
 
 /// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
@@ -305,29 +305,4 @@ fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
         Some(Loss { fault, actuator, least_command: entry.least_command? })
     };
     faults.iter().enumerate().filter_map(loss).collect()
-}
-
-impl Kind {
-    /// The number of these of a controller.
-    pub(super) fn count(self, controller: &Controller) -> usize {
-        let detection = controller.detection.as_ref();
-        let reconfiguration = controller.reconfiguration.as_ref();
-        match self {
-            Self::State => controller.states.len(),
-            Self::Fault => controller.faults.len(),
-            Self::Actuator => controller.actuators.len(),
-            Self::Measurement => controller.measurements.len(),
-            Self::Reference => controller.references.len(),
-            Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
-            Self::Point => controller.schedule.as_ref().map_or(0, |schedule| schedule.points.len()),
-            Self::GainSet => {
-                reconfiguration.map_or(0, |reconfiguration| reconfiguration.sets.len())
-            }
-            Self::Case => reconfiguration.map_or(0, |reconfiguration| reconfiguration.cases.len()),
-            Self::ResidualState => detection.map_or(0, |detection| detection.a.nrows()),
-            Self::Residual => detection.map_or(0, |detection| detection.c.nrows()),
-            Self::Test => detection.map_or(0, |detection| detection.tests.len()),
-            Self::Suspect => detection.map_or(0, |detection| detection.faults.len()),
-        }
-    }
 }

@@ -146,26 +146,52 @@ matrices! {
     ResidualDy "D_ry" [Residual, Measurement] Some(&controller.detection.as_ref()?.d_y),
 }
 
-/// The signals of a controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    State,
-    Fault,
-    Actuator,
-    Measurement,
-    Reference,
+macro_rules! kinds {
+    ($controller:ident: $($(#[$text:meta])* $kind:ident $plural:literal $count:expr,)*) => {
+        /// The signals of a controller.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Kind {
+            $($(#[$text])* $kind,)*
+        }
+
+        impl Kind {
+            /// The name of their number.
+            pub(super) fn plural(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $plural,)*
+                }
+            }
+
+            /// The number of these of a controller.
+            pub(super) fn count(self, $controller: &Controller) -> usize {
+                match self {
+                    $(Self::$kind => $count,)*
+                }
+            }
+        }
+    };
+}
+
+// Each kind with the name of its number and this number.
+kinds! {
+    controller:
+    State "STATES" controller.states.len(),
+    Fault "FAULTS" controller.faults.len(),
+    Actuator "ACTUATORS" controller.actuators.len(),
+    Measurement "MEASUREMENTS" controller.measurements.len(),
+    Reference "REFERENCES" controller.references.len(),
     /// The integral of the distance from a reference.
-    Integral,
+    Integral "REFERENCES" controller.h.as_ref().map_or(0, DMatrix::nrows),
     /// No signals: a point of the schedule; of the detection a state of its filter, a residual, a test, a fault
     /// that it can isolate.
-    Point,
-    ResidualState,
-    Residual,
-    Test,
-    Suspect,
+    Point "POINTS" controller.schedule.as_ref().map_or(0, |schedule| schedule.points.len()),
+    ResidualState "RESIDUAL_STATES" controller.detection.as_ref().map_or(0, |all| all.a.nrows()),
+    Residual "RESIDUALS" controller.detection.as_ref().map_or(0, |all| all.c.nrows()),
+    Test "TESTS" controller.detection.as_ref().map_or(0, |all| all.tests.len()),
+    Suspect "SUSPECTS" controller.detection.as_ref().map_or(0, |all| all.faults.len()),
     /// Of a reconfiguration: a set of gains, an actuator that may be gone.
-    GainSet,
-    Case,
+    GainSet "GAIN_SETS" controller.reconfiguration.as_ref().map_or(0, |all| all.sets.len()),
+    Case "CASES" controller.reconfiguration.as_ref().map_or(0, |all| all.cases.len()),
 }
 
 impl Kind {
@@ -189,22 +215,4 @@ impl Kind {
         Self::GainSet,
         Self::Case,
     ];
-
-    /// The name of their number.
-    pub(super) fn plural(self) -> &'static str {
-        match self {
-            Self::State => "STATES",
-            Self::Fault => "FAULTS",
-            Self::Actuator => "ACTUATORS",
-            Self::Measurement => "MEASUREMENTS",
-            Self::Reference | Self::Integral => "REFERENCES",
-            Self::Point => "POINTS",
-            Self::ResidualState => "RESIDUAL_STATES",
-            Self::Residual => "RESIDUALS",
-            Self::Test => "TESTS",
-            Self::Suspect => "SUSPECTS",
-            Self::GainSet => "GAIN_SETS",
-            Self::Case => "CASES",
-        }
-    }
 }
