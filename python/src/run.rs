@@ -308,28 +308,21 @@ impl Input {
 }
 
 /// The outcome of a run.
-#[pyclass(frozen, module = "aso_ftc._core")]
+#[pyclass(frozen, get_all, module = "aso_ftc._core")]
 pub(crate) struct Outcome {
     /// The recorded columns.
-    #[pyo3(get)]
     table: Py<Table>,
     /// `stop time`, `time limit`, `cancelled`, `failed`, or the FMU that requested the end.
-    #[pyo3(get)]
     end: String,
     /// Time reached in s.
-    #[pyo3(get)]
     time: f64,
     /// Number of communication steps.
-    #[pyo3(get)]
     steps: u64,
     /// Wall-clock time of the steps in s.
-    #[pyo3(get)]
     seconds: f64,
     /// The complete configuration as a `system.toml`.
-    #[pyo3(get)]
     settings: String,
     /// One sentence for each setting that was chosen.
-    #[pyo3(get)]
     reasons: Vec<String>,
 }
 
