@@ -24,6 +24,12 @@ impl Refusal {
     pub(super) fn new(name: String, value: f64, rule: &'static str) -> Self {
         Self { name, value, rule }
     }
+
+    /// The first element of a matrix that is not finite.
+    pub(super) fn of_matrix(name: &str, matrix: &Matrix) -> Option<Self> {
+        let k = matrix.values.iter().position(|value| !value.is_finite())?;
+        Some(Self::new(matrix.element(name, k), matrix.values[k], "a finite number"))
+    }
 }
 
 impl Design {
@@ -357,18 +363,13 @@ impl Design {
     }
 
     fn refused_number(&self) -> Option<Refusal> {
-        for (name, matrix) in self.matrices() {
-            if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
-                return Some(Refusal::new(
-                    matrix.element(name, k),
-                    matrix.values[k],
-                    "a finite number",
-                ));
-            }
-        }
-        let of_laws = self.refused_filter().or_else(|| self.refused_sliding_mode());
-        let of_laws = of_laws.or_else(|| self.refused_transfer());
-        of_laws.or_else(|| self.detection.as_ref()?.refused_number(self))
+        let mut matrices = self.matrices();
+        let of_matrices = matrices.find_map(|(name, matrix)| Refusal::of_matrix(name, matrix));
+        of_matrices
+            .or_else(|| self.refused_filter())
+            .or_else(|| self.refused_sliding_mode())
+            .or_else(|| self.refused_transfer())
+            .or_else(|| self.detection.as_ref()?.refused_number(self))
     }
 
     /// The first of rho and delta that is not a number above 0.
@@ -413,17 +414,12 @@ impl Design {
         let values = signals.map(|signal| (&signal.name, signal.operating));
         let measured = self.measurements.iter().map(|signal| (&signal.name, signal.operating));
         let commands = self.actuators.iter().map(|actuator| (&actuator.name, actuator.operating));
-        for (name, value) in values.chain(measured).chain(commands) {
-            if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Some(Refusal::new(
-                    format!("operating of {name}"),
-                    value,
-                    "a finite number",
-                ));
-            }
-        }
-        if let Some(refusal) = self.measurements.iter().find_map(|signal| self.refused_hold(signal))
-        {
+        let refused = values.chain(measured).chain(commands).find_map(|(name, value)| {
+            let value = value.filter(|value| !value.is_finite())?;
+            Some(Refusal::new(format!("operating of {name}"), value, "a finite number"))
+        });
+        let of_hold = || self.measurements.iter().find_map(|signal| self.refused_hold(signal));
+        if let Some(refusal) = refused.or_else(of_hold) {
             return Some(refusal);
         }
         for actuator in &self.actuators {
@@ -437,14 +433,11 @@ impl Design {
                 return Some(Refusal::new(what, value, "a command within its limits"));
             }
         }
-        let least =
-            self.faults.iter().filter_map(|fault| Some((&fault.name, fault.least_command?)));
-        least
-            .filter(|(_, value)| !COMMANDS.contains(value))
-            .map(|(name, value)| {
-                Refusal::new(format!("least_command of {name}"), value, "1e-100 to 1e100")
-            })
-            .next()
+        self.faults.iter().find_map(|fault| {
+            let value = fault.least_command.filter(|value| !COMMANDS.contains(value))?;
+            let what = format!("least_command of {}", fault.name);
+            Some(Refusal::new(what, value, "1e-100 to 1e100"))
+        })
     }
 
     /// The first of range and longest time of a hold that breaks its rule.

@@ -88,10 +88,10 @@ impl DetectionDesign {
     /// Describes the first entry with a wrong shape, or without its counterpart.
     pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
         for (name, matrix, (rows, columns)) in self.shapes(design) {
-            if (matrix.rows, matrix.columns) != (rows, columns) {
-                let (found_rows, found_columns) = (matrix.rows, matrix.columns);
+            let Matrix { rows: actual_rows, columns: actual_columns, .. } = matrix;
+            if (*actual_rows, *actual_columns) != (rows, columns) {
                 return Some(format!(
-                    "{name} is {found_rows} x {found_columns}, expected {rows} x {columns}"
+                    "{name} is {actual_rows} x {actual_columns}, expected {rows} x {columns}"
                 ));
             }
         }
@@ -136,24 +136,17 @@ impl DetectionDesign {
     /// The first number that is out of its range.
     #[must_use]
     pub fn refused_number(&self, design: &Design) -> Option<Refusal> {
-        for (name, matrix, _) in self.shapes(design) {
-            if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
-                return Some(Refusal::new(
-                    matrix.element(name, k),
-                    matrix.values[k],
-                    "a finite number",
-                ));
-            }
+        let mut shapes = self.shapes(design).into_iter();
+        let refused = shapes.find_map(|(name, matrix, _)| Refusal::of_matrix(name, matrix));
+        if refused.is_some() {
+            return refused;
         }
         let positive = |value: &f64| *value > 0.0 && value.is_finite();
         for test in &self.tests {
             for (what, value) in [("threshold", Some(test.threshold)), ("drift", test.drift)] {
                 if let Some(value) = value.filter(|value| !positive(value)) {
-                    return Some(Refusal::new(
-                        format!("detection test {}: {what}", test.name),
-                        value,
-                        "above 0",
-                    ));
+                    let what = format!("detection test {}: {what}", test.name);
+                    return Some(Refusal::new(what, value, "above 0"));
                 }
             }
         }
