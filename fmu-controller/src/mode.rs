@@ -37,15 +37,11 @@ impl Mode {
         Law { compensating: compensating && (compensates || !fallen_back), gone, fallen_back }
     }
 
-    /// The mode with no channel at a limit.
-    pub(crate) fn free(compensating: bool, estimating: bool) -> Self {
-        Self { compensating, estimating, lower: 0, upper: 0, gone: 0, fallen_back: false }
-    }
-
-    /// The same mode without the actuators whose bits are set in `gone`. In the fall-back the faults are
-    /// always estimated.
-    pub(crate) fn without(self, gone: u64, fallen_back: bool) -> Self {
-        Self { gone, fallen_back, estimating: self.estimating || fallen_back, ..self }
+    /// The mode with no channel at a limit, without the actuators whose bits are set in `gone`. In the fall-back the
+    /// faults are always estimated.
+    pub(crate) fn free(compensating: bool, estimating: bool, gone: u64, fallen_back: bool) -> Self {
+        let estimating = estimating || fallen_back;
+        Self { compensating, estimating, lower: 0, upper: 0, gone, fallen_back }
     }
 
     /// Whether the actuator of channel `j` is gone.

@@ -8,6 +8,7 @@ use crate::detection::{Detector, Stretch};
 use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer, Part};
+use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::signals::{Signals, Values};
 use crate::validity::MeasurementCheck;
@@ -21,8 +22,8 @@ impl AsoController {
 
     /// The mode with no channel at a limit.
     pub(super) fn free_mode(&self, compensating: bool) -> Mode {
-        let mode = Mode::free(compensating, compensating || self.design.monitor);
-        mode.without(self.reconfigurator.gone, self.reconfigurator.fallen_back)
+        let Reconfigurator { gone, fallen_back, .. } = self.reconfigurator;
+        Mode::free(compensating, compensating || self.design.monitor, gone, fallen_back)
     }
 
     /// Decides at `time` which actuators are gone; the estimates of the faults of those that are gone or
