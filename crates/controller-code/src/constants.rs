@@ -1,5 +1,7 @@
 //! A constant of the code.
 
+use nalgebra::DMatrix;
+
 use super::symbols::Kind;
 
 /// A constant: its name in the design file and its rows; one row for a vector.
@@ -17,6 +19,19 @@ pub(super) struct Constants {
 impl Constants {
     pub(super) fn count(&self) -> usize {
         self.values.iter().map(Vec::len).sum()
+    }
+
+    /// Matrices below each other, one for each of the `layers`; one matrix without them.
+    pub(super) fn matrices<'a>(
+        name: &'static str,
+        meaning: &'static str,
+        [rows, columns]: [Kind; 2],
+        layers: Option<Kind>,
+        matrices: impl IntoIterator<Item = &'a DMatrix<f64>>,
+    ) -> Self {
+        let values = matrices.into_iter().flat_map(DMatrix::row_iter);
+        let values = values.map(|row| row.iter().copied().collect()).collect();
+        Self { name, meaning, rows, columns: Some(columns), layers, values }
     }
 
     pub(super) fn vector(

@@ -103,15 +103,9 @@ impl Detection {
         let of_tests = |name, meaning, value: fn(&Test) -> f64| {
             Constants::vector(name, meaning, Kind::Test, self.tests.iter().map(value).collect())
         };
-        let start = Constants {
-            name: "start_r",
-            meaning: "start of x_r, times the deviations of the states",
-            rows: Kind::ResidualState,
-            columns: Some(Kind::State),
-            layers: None,
-            values: self.start.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        };
-        let mut all = vec![start];
+        let meaning = "start of x_r, times the deviations of the states";
+        let kinds = [Kind::ResidualState, Kind::State];
+        let mut all = vec![Constants::matrices("start_r", meaning, kinds, None, [&self.start])];
         if self.method == Method::Cusum {
             all.push(of_tests("drift", "tests", |test| test.drift));
         }

@@ -166,7 +166,8 @@ impl Reconfiguration {
 
     /// The constants in real numbers: the gains from stuck actuators, their commands, the fractions.
     pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
-        let rows = self.sets.iter().flat_map(|set| set.k_s.row_iter());
+        let k_s = self.sets.iter().map(|set| &set.k_s);
+        let meaning = "gains from the commands of stuck actuators";
         let case = |j: usize| self.cases.iter().find(|case| case.actuator == j);
         let stuck = |j: usize| case(j).map_or(0.0, |case| case.stuck_at);
         let vector = |name, meaning, value: &dyn Fn(usize) -> f64| {
@@ -174,14 +175,7 @@ impl Reconfiguration {
             Constants::vector(name, meaning, Kind::Actuator, values)
         };
         let mut all = vec![
-            Constants {
-                name: "K_s",
-                meaning: "gains from the commands of stuck actuators",
-                rows: Kind::Actuator,
-                columns: Some(Kind::Actuator),
-                layers: Some(Kind::GainSet),
-                values: rows.map(|row| row.iter().copied().collect()).collect(),
-            },
+            Constants::matrices("K_s", meaning, [Kind::Actuator; 2], Some(Kind::GainSet), k_s),
             vector("stuck_at", "commands of stuck actuators, and their deviations", &stuck),
             vector("u_stuck", "", &|j| stuck(j) - actuators[j].operating),
         ];

@@ -1,7 +1,5 @@
 //! The constants and the variables of a controller.
 
-use nalgebra::DMatrix;
-
 use super::constants::Constants;
 use super::controller::Controller;
 use super::detection::{self, Detection};
@@ -40,20 +38,11 @@ pub(super) fn has_constant_matrix(controller: &Controller) -> bool {
 pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     let mut all = Vec::new();
     for matrix in Matrix::all_stated(controller) {
-        let [rows, columns] = matrix.kinds();
         let points = controller.scheduled(matrix).map(|matrices| (Some(Kind::Point), matrices));
         let sets = controller.chosen(matrix).map(|matrices| (Some(Kind::GainSet), matrices));
         let one = || (None, matrix.of(controller).into_iter().collect());
         let (layers, all_of_it): (_, Vec<_>) = points.or(sets).unwrap_or_else(one);
-        let values = all_of_it.into_iter().flat_map(DMatrix::row_iter);
-        all.push(Constants {
-            name: matrix.name(),
-            meaning: "",
-            rows,
-            columns: Some(columns),
-            layers,
-            values: values.map(|row| row.iter().copied().collect()).collect(),
-        });
+        all.push(Constants::matrices(matrix.name(), "", matrix.kinds(), layers, all_of_it));
     }
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
