@@ -1,6 +1,5 @@
 //! The controller as a model: fields, initialisation, steps, events, derivatives.
 
-mod linked;
 mod scheduled;
 mod steps;
 mod variables;
@@ -9,9 +8,11 @@ use std::path::Path;
 
 use fmu::description::DefaultExperiment;
 use fmu::{About, At, Event, Experiment, Failure, Log, Model, ModelExchange, Step, Variable};
+use nalgebra::DMatrix;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
+use crate::dense::dense;
 use crate::detection::Detector;
 use crate::equations::Equations;
 use crate::loss::Loss;
@@ -96,7 +97,9 @@ pub struct AsoController {
 }
 
 impl AsoController {
-    fn with(design: Design) -> Self {
+    /// The controller of a design that [`Design::parse`] has accepted.
+    #[must_use]
+    pub fn of_design(design: Design) -> Self {
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
         let (mut values, deviations) = (Values::zero(&design), Signals::zero(&design));
         let operating_point = OperatingPoint::of(&design);
@@ -135,6 +138,11 @@ impl AsoController {
             design: Shared::from(design),
         }
     }
+
+    /// A, B, C and `F_a` of the design: the plant and the columns by which faults enter it.
+    pub fn plant(&self) -> [DMatrix<f64>; 4] {
+        [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(dense)
+    }
 }
 
 impl Model for AsoController {
@@ -163,7 +171,7 @@ impl Model for AsoController {
         let text = std::fs::read_to_string(&file);
         let text = text.map_err(|error| Failure::Error(format!("{path}: {error}")))?;
         let design = Design::parse(&text, path);
-        Ok(Self::with(design.map_err(|error| Failure::Error(error.to_string()))?))
+        Ok(Self::of_design(design.map_err(|error| Failure::Error(error.to_string()))?))
     }
 
     fn variables(&self) -> Vec<Variable<Self>> {
