@@ -306,16 +306,12 @@ impl Model for AsoController {
         }
         values.set_estimate(&deviations.z, operating_point);
         values.set_commands(&deviations.u, design, self.mode, operating_point);
+        let n = design.states.len();
         for loss in &mut direction.losses {
-            let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
-            let lost = loss.effectiveness_lost(
-                Dual64::new(self.values.u[u], values.u[u]),
-                Dual64::new(
-                    *self.deviations.f_hat.get(loss.fault).unwrap_or(&self.values.z[f_hat]),
-                    *deviations.f_hat.get(loss.fault).unwrap_or(&values.z[f_hat]),
-                ),
-            );
-            loss.estimate = lost.eps;
+            let u = Dual64::new(self.values.u[loss.actuator], values.u[loss.actuator]);
+            let f_hat = loss.fault_of(&self.deviations.f_hat, &self.values.z, n);
+            let f_hat = Dual64::new(f_hat, loss.fault_of(&deviations.f_hat, &values.z, n));
+            loss.estimate = loss.effectiveness_lost(u, f_hat).eps;
         }
         Ok(())
     }

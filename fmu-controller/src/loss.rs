@@ -49,6 +49,11 @@ impl Loss {
         all
     }
 
+    /// The estimate of its fault: an element of `f_hat` in a design with a direct term, else of z behind `n` states.
+    pub(crate) fn fault_of(&self, f_hat: &[f64], z: &[f64], n: usize) -> f64 {
+        *f_hat.get(self.fault).unwrap_or(&z[n + self.fault])
+    }
+
     /// `E_hat = -u f_hat / (u^2 + u_e^2)` of a command and an estimated fault.
     pub(crate) fn effectiveness_lost<D: Number>(&self, u: D, f_hat: D) -> D {
         let scale = (u * u + self.least_command * self.least_command).recip();

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mode::{Law, Mode};
-use aso_controller::design::{Design, Signal};
+use aso_controller::design::Design;
 
 /// The signals as the importer sees them.
 #[derive(Clone, Serialize, Deserialize)]
@@ -49,14 +49,17 @@ pub(crate) struct Signals {
     pub(crate) u: Vec<f64>,
 }
 
-/// The operating point of signals.
-fn operating(signals: &[Signal]) -> impl Iterator<Item = f64> {
-    signals.iter().map(|signal| signal.operating.unwrap_or_default())
-}
-
-/// The operating point of the measurements.
-fn measured(design: &Design) -> impl Iterator<Item = f64> {
-    design.measurements.iter().map(|signal| signal.operating.unwrap_or_default())
+/// Changes x_hat and y_f of z, y and r element by element by the operating point of `design`.
+fn change([z, y, r]: [&mut [f64]; 3], design: &Design, change_one: impl Fn(&mut f64, f64)) {
+    let [x_hat, _, y_f, ..] = design.parts_mut(z);
+    let states = design.states.iter().map(|signal| signal.operating);
+    let measured = || design.measurements.iter().map(|signal| signal.operating);
+    let referred = design.references.iter().map(|signal| signal.operating);
+    let of_z = x_hat.iter_mut().zip(states).chain(y_f.iter_mut().zip(measured()));
+    let of_inputs = y.iter_mut().zip(measured()).chain(r.iter_mut().zip(referred));
+    for (element, operating) in of_z.chain(of_inputs) {
+        change_one(element, operating.unwrap_or_default());
+    }
 }
 
 impl OperatingPoint {
@@ -70,16 +73,8 @@ impl OperatingPoint {
 
     /// Takes the operating point from `design`, without allocation.
     pub(crate) fn read(&mut self, design: &Design) {
-        let read = |to: &mut [f64], values: &mut dyn Iterator<Item = f64>| {
-            for (to, value) in to.iter_mut().zip(values) {
-                *to = value;
-            }
-        };
-        let [x, _, y_f, ..] = design.parts_mut(&mut self.z);
-        read(x, &mut operating(&design.states));
-        read(y_f, &mut measured(design));
-        read(&mut self.y, &mut measured(design));
-        read(&mut self.r, &mut operating(&design.references));
+        let Self { z, y, r, .. } = self;
+        change([z, y, r], design, |element, operating| *element = operating);
         for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
             *to = actuator.operating.unwrap_or_default();
         }
@@ -119,16 +114,8 @@ impl Signals {
         self.z.copy_from_slice(z);
         self.y.copy_from_slice(&values.y_slopes);
         self.r.copy_from_slice(&values.r_slopes);
-        let less = |slopes: &mut [f64], values: &mut dyn Iterator<Item = f64>| {
-            for (slope, value) in slopes.iter_mut().zip(values) {
-                *slope -= value;
-            }
-        };
-        let [x, _, y_f, ..] = design.parts_mut(&mut self.z);
-        less(x, &mut operating(&design.states));
-        less(y_f, &mut measured(design));
-        less(&mut self.y, &mut measured(design));
-        less(&mut self.r, &mut operating(&design.references));
+        let Self { z, y, r, .. } = self;
+        change([z, y, r], design, |slope, operating| *slope -= operating);
     }
 
     /// Sets y and r only, `offset` s after the inputs in `values` were given.

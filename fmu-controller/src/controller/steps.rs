@@ -267,25 +267,21 @@ impl AsoController {
         }
         self.set_scheduled_slopes();
         let Self { design, values, deviations, z_slopes, f_slopes, u_slopes, .. } = self;
+        let n = design.states.len();
         for loss in &mut self.losses {
-            let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
-            let lost = loss.effectiveness_lost(
-                Dual64::new(values.u[u], u_slopes[u]),
-                Dual64::new(
-                    *deviations.f_hat.get(loss.fault).unwrap_or(&values.z[f_hat]),
-                    *f_slopes.get(loss.fault).unwrap_or(&z_slopes[f_hat]),
-                ),
-            );
-            loss.slope = lost.eps;
+            let u = Dual64::new(values.u[loss.actuator], u_slopes[loss.actuator]);
+            let f_hat = loss.fault_of(&deviations.f_hat, &values.z, n);
+            let f_hat = Dual64::new(f_hat, loss.fault_of(f_slopes, z_slopes, n));
+            loss.slope = loss.effectiveness_lost(u, f_hat).eps;
         }
     }
 
     /// Computes E_hat.
     fn set_losses(&mut self) {
+        let n = self.design.states.len();
         for loss in &mut self.losses {
-            let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
-            let f_hat = *self.deviations.f_hat.get(loss.fault).unwrap_or(&self.values.z[f_hat]);
-            loss.estimate = loss.effectiveness_lost(self.values.u[u], f_hat);
+            let f_hat = loss.fault_of(&self.deviations.f_hat, &self.values.z, n);
+            loss.estimate = loss.effectiveness_lost(self.values.u[loss.actuator], f_hat);
         }
     }
 
