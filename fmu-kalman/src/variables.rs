@@ -1,7 +1,7 @@
 //! The variables of the filter, by the dimensions and names of its design.
 
 use aso_controller::design::Signal;
-use aso_controller::kalman::KalmanDesign;
+use aso_controller::kalman::{CarriedFault, KalmanDesign};
 use aso_controller::{channel, channels};
 use fmu::Enumeration;
 
@@ -24,14 +24,12 @@ fn with_unit(variable: Variable, unit: Option<&String>) -> Variable {
     }
 }
 
-fn meaning(name: &str, description: &str) -> String {
-    if description.is_empty() { name.to_owned() } else { description.to_owned() }
+fn meaning(fault: &CarriedFault) -> &String {
+    if fault.description.is_empty() { &fault.name } else { &fault.description }
 }
 
 fn inputs(design: &KalmanDesign) -> Vec<Variable> {
-    let text = |kind: &str, signal: &Signal| {
-        format!("{kind}: {}", meaning(&signal.name, &signal.description))
-    };
+    let text = |kind: &str, signal: &Signal| format!("{kind}: {}", signal.label().meaning);
     let measurements = design.measurements.iter().enumerate().map(|(k, signal)| {
         let variable =
             Variable::real(&signal.name, text("Measurement", signal), move |model| &mut model.y[k]);
@@ -52,21 +50,16 @@ fn inputs(design: &KalmanDesign) -> Vec<Variable> {
 /// Of each element of z: name of its estimate, of its deviation and of its start, meaning, unit.
 fn elements(design: &KalmanDesign) -> Vec<([String; 3], String, Option<String>)> {
     let (n, q) = (design.states.len(), design.fault_states());
-    let states = design
-        .states
-        .iter()
-        .map(|state| (meaning(&state.name, &state.description), state.unit.clone()));
-    let mut faults: Vec<_> = design
-        .faults
-        .iter()
-        .map(|fault| (meaning(&fault.name, &fault.description), fault.unit.clone()))
-        .collect();
+    let states = design.states.iter().map(Signal::label);
+    let states = states.map(|label| (label.meaning.to_owned(), label.unit.cloned()));
+    let faults = design.faults.iter().map(|fault| (meaning(fault).clone(), fault.unit.clone()));
+    let mut faults: Vec<_> = faults.collect();
     faults.resize(q, (String::new(), None));
     for fault in &design.faults {
         if let Some(rate) = fault.rate {
             let unit = fault.unit.as_ref().map(|unit| format!("{unit}/s"));
             let unit = unit.filter(|unit| fmu::description::unit::Unit::parse(unit).is_ok());
-            faults[rate] = (format!("rate of {}", meaning(&fault.name, &fault.description)), unit);
+            faults[rate] = (format!("rate of {}", meaning(fault)), unit);
         }
     }
     let names = ["x", "f"].into_iter().zip([n, q]).flat_map(|(letter, count)| {
@@ -122,7 +115,7 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
     for (k, signal) in design.measurements.iter().enumerate() {
         let text = format!(
             "Number of samples between two in which the measurement {} is used",
-            meaning(&signal.name, &signal.description)
+            signal.label().meaning
         );
         let every =
             Variable::integer(channel("every", k, p), text, move |model| &mut model.every[k]);
