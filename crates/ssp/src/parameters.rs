@@ -71,20 +71,17 @@ impl Binder<'_> {
         let mut unmatched = Vec::new();
         let values = &binding.values;
         self.warn_repeated(values);
+        let name = |parameter: &Parameter| format!("{}{}", binding.prefix, parameter.name);
+        let parameters = values.parameters.iter().map(|parameter| (name(parameter), parameter));
         match &binding.mapping {
             None => {
-                for parameter in &values.parameters {
-                    let name = format!("{}{}", binding.prefix, parameter.name);
-                    let entry = MappingEntry { target: name, ..MappingEntry::default() };
+                for (target, parameter) in parameters {
+                    let entry = MappingEntry { target, ..MappingEntry::default() };
                     self.apply(node, binding, parameter, &entry, &mut unmatched)?;
                 }
             }
             Some(mapping) => {
-                let sources: HashMap<String, &Parameter> = values
-                    .parameters
-                    .iter()
-                    .map(|parameter| (format!("{}{}", binding.prefix, parameter.name), parameter))
-                    .collect();
+                let sources: HashMap<String, &Parameter> = parameters.collect();
                 for entry in &mapping.entries {
                     match sources.get(&entry.source) {
                         Some(parameter) => {
