@@ -24,38 +24,27 @@ const STEPS: f64 = 1e5;
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct AlgorithmRequest {
     /// `jacobi` or `gauss-seidel`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
     /// Extrapolation of the inputs.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub extrapolation: Option<Extrapolation>,
     /// Iteration of a step.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub coupling: Option<Coupling>,
     /// Choice of the step size.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub step_control: Option<StepControl>,
     /// Communication step in s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<f64>,
     /// Relative tolerance.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_tolerance: Option<f64>,
     /// Absolute tolerance, in nominal values.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub absolute_tolerance: Option<f64>,
     /// Smallest step of the step control in s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub smallest_step: Option<f64>,
     /// Largest step of the step control in s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_step: Option<f64>,
     /// Largest number of iterations of a step.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
     /// Whether a step whose iteration fails is made once without iteration; default: true if
     /// `coupling` is not stated.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub fallback: Option<bool>,
     /// FMUs by name, each with the number of communication steps between two of its own steps.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty", default)]
@@ -74,14 +63,11 @@ pub struct AlgorithmRequest {
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub power_bonds: Vec<(String, String)>,
     /// Number of threads; 0: number of processors.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub jobs: Option<usize>,
     /// Save FMU states before every step, so that all FMUs repeat a step that one FMU completed
     /// only in part.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub rollback: Option<bool>,
     /// Allow NaN and infinity on connections.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub allow_nan: Option<bool>,
 }
 

@@ -27,12 +27,12 @@ use fmu_description::limits::{HELP, in_force};
 /// Largest size of a file in bytes. Reading takes 40 times as much memory.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// The content of a `system.toml`. Settings that are not stated are chosen for the system.
+/// The content of a `system.toml`. Settings that are not stated are chosen for the system; TOML leaves out what is
+/// `None`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Config {
     /// An SSP, an SSD or a folder with one, on which the configuration builds.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<PathBuf>,
     /// Shared libraries loaded first, whose symbols are visible to the FMUs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -51,7 +51,6 @@ pub struct Config {
     pub solver: Ordered<Solver>,
     /// Connections. If neither they nor `system` are stated, variables of equal names are
     /// connected.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub connections: Option<Vec<Spanned<ConnectionEntry>>>,
     /// Values of variables, set before the initialization.
     #[serde(skip_serializing_if = "Settings::is_empty")]

@@ -51,7 +51,6 @@ pub struct SetEntry {
     /// The value.
     pub value: Spanned<Literal>,
     /// Unit of the value; default: the unit of the variable.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
 }
 
@@ -65,25 +64,18 @@ pub struct SignalEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
     /// Unit of the values; default: the unit of the variable.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
     /// A constant.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub constant: Option<Spanned<Literal>>,
     /// Times and values; each value is held until the next one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<Spanned<Steps>>,
     /// Times and values with linear interpolation; a time that occurs twice is a jump.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<Spanned<Vec<(f64, f64)>>>,
     /// A ramp between two constants.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub ramp: Option<Spanned<Ramp>>,
     /// A sine.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sine: Option<Spanned<Sine>>,
     /// A column of a CSV file.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub csv: Option<Spanned<Csv>>,
 }
 
@@ -95,7 +87,6 @@ pub struct TableEntry {
     pub csv: Spanned<String>,
     /// The slave whose variables the columns name; if not stated, columns are named
     /// `slave.variable`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub element: Option<Spanned<String>>,
 }
 
@@ -107,36 +98,25 @@ pub struct FaultEntry {
     /// The input, `slave.variable`, or the connection, `slave.output=slave.input`.
     pub connection: Spanned<String>,
     /// Unit of the values; default: the unit of the input.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
     /// A constant is added.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<Spanned<Bias>>,
     /// The value is multiplied by a factor.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<Spanned<Gain>>,
     /// The added value grows linearly with time.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<Spanned<Drift>>,
     /// The value sticks.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stuck: Option<Spanned<Stuck>>,
     /// Values are lost.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub dropout: Option<Spanned<Dropout>>,
     /// Values arrive late.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub delay: Option<Spanned<Delay>>,
     /// Values are rounded to levels.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub quantisation: Option<Spanned<Quantisation>>,
     /// Values are limited to a range.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub saturation: Option<Spanned<Saturation>>,
     /// Random noise is added.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Spanned<Noise>>,
     /// True becomes false.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub inversion: Option<Spanned<Inversion>>,
 }

@@ -20,10 +20,8 @@ pub struct ConnectionEntry {
     /// The input, `slave.variable`.
     pub to: Spanned<String>,
     /// Factor of the transformation. If factor or offset is stated, units are not converted.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
     /// Offset of the transformation, in the unit of the input.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
 }
 
@@ -49,13 +47,10 @@ impl ConnectionEntry {
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Experiment {
     /// Start time in s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub start_time: Option<Spanned<f64>>,
     /// Stop time in s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stop_time: Option<Spanned<f64>>,
     /// Relative tolerance for solvers inside the FMUs.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Spanned<f64>>,
 }
 
@@ -73,7 +68,6 @@ impl Experiment {
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Results {
     /// The file, `.csv` or `.parquet`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Variables to record, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -82,16 +76,13 @@ pub struct Results {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<String>,
     /// Interval between rows.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Every>,
     /// Variables to plot, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub plot: Vec<String>,
     /// File of the plot, `.svg` or `.png`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub plot_file: Option<PathBuf>,
     /// File of the frames of the CAN buses, `.log` (candump), `.asc` or `.pcapng`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bus_trace: Option<PathBuf>,
 }
 
@@ -100,13 +91,10 @@ pub struct Results {
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Isolation {
     /// Whether each FMU runs in a separate process.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub isolate: Option<bool>,
     /// Time limit of a call, in s of wall-clock time.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub time_limit: Option<Spanned<f64>>,
     /// Memory limit of each process.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_limit: Option<Memory>,
 }
 
@@ -121,10 +109,8 @@ impl Isolation {
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CheckpointSettings {
     /// The file.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Simulated time in s between two checkpoints; default: a single checkpoint at the end.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Spanned<f64>>,
 }
 

@@ -25,10 +25,8 @@ macro_rules! fault {
             $name {
                 $($(#[$doc])* $field: $kind,)*
                 /// Start time in s; default: the start of the simulation.
-                #[serde(skip_serializing_if = "Option::is_none")]
                 from: Option<f64>,
                 /// End time in s; default: the fault stays.
-                #[serde(skip_serializing_if = "Option::is_none")]
                 until: Option<f64>,
             }
         }
@@ -70,7 +68,6 @@ body! {
         #[serde(default)]
         offset: f64,
         /// Time in s; default: the start of the simulation.
-        #[serde(skip_serializing_if = "Option::is_none")]
         from: Option<f64>,
     }
 }
@@ -81,7 +78,6 @@ body! {
         /// The file, relative to the folder of the `system.toml`.
         file: Spanned<String>,
         /// Name of the column; default: the name of the variable, with or without its slave.
-        #[serde(skip_serializing_if = "Option::is_none")]
         column: Option<Spanned<String>>,
         /// Whether each value is held until the next one, also for a continuous Real.
         #[serde(default)]
@@ -117,7 +113,6 @@ fault! {
     /// `stuck`: the value at the start of the fault, or a given value.
     Stuck {
         /// The value; default: the value at the start of the fault.
-        #[serde(skip_serializing_if = "Option::is_none")]
         value: Option<Literal>,
     }
 }
@@ -127,22 +122,16 @@ fault! {
     /// value with a `probability`.
     Dropout {
         /// Replacement for a lost value; default: the last value that was not lost.
-        #[serde(skip_serializing_if = "Option::is_none")]
         value: Option<Literal>,
         /// The period in s; the first one starts with the fault.
-        #[serde(skip_serializing_if = "Option::is_none")]
         period: Option<f64>,
         /// Length in s of the lost part at the start of each period.
-        #[serde(skip_serializing_if = "Option::is_none")]
         lost: Option<f64>,
         /// Probability of losing a sample.
-        #[serde(skip_serializing_if = "Option::is_none")]
         probability: Option<f64>,
         /// Time in s between samples; default: one sample at each communication point.
-        #[serde(skip_serializing_if = "Option::is_none")]
         every: Option<f64>,
         /// Seed of the random series.
-        #[serde(skip_serializing_if = "Option::is_none")]
         seed: Option<u64>,
     }
 }
@@ -157,7 +146,6 @@ fault! {
         #[serde(default)]
         hold: bool,
         /// Value before the first delayed value arrives; default: the first value.
-        #[serde(skip_serializing_if = "Option::is_none")]
         initial: Option<Literal>,
     }
 }
@@ -177,10 +165,8 @@ fault! {
     /// `saturation`: `v`, limited to bounds.
     Saturation {
         /// Lowest value.
-        #[serde(skip_serializing_if = "Option::is_none")]
         min: Option<f64>,
         /// Highest value.
-        #[serde(skip_serializing_if = "Option::is_none")]
         max: Option<f64>,
     }
 }
@@ -189,13 +175,10 @@ fault! {
     /// `noise`: `v + e` with random `e`, normal or uniform.
     Noise {
         /// Standard deviation, for the normal distribution.
-        #[serde(skip_serializing_if = "Option::is_none")]
         deviation: Option<f64>,
         /// Largest size, for the uniform distribution.
-        #[serde(skip_serializing_if = "Option::is_none")]
         amplitude: Option<f64>,
         /// Time in s between samples; default: one sample at each communication point.
-        #[serde(skip_serializing_if = "Option::is_none")]
         every: Option<f64>,
         /// Seed of the random series.
         #[serde(default)]
