@@ -29,7 +29,10 @@ pub fn by_direct_dependencies(system: &System) -> Order {
         .connections
         .iter()
         .filter(|connection| !is_clocked(system, connection))
-        .filter(|connection| through[connection.to.slave].has(connection.to.variable))
+        .filter(|connection| {
+            let inputs = through[connection.to.slave].as_ref();
+            inputs.is_none_or(|inputs| inputs.contains(&connection.to.variable))
+        })
         .map(|connection| (connection.from.slave, connection.to.slave))
         .collect();
     let components = components(system.slaves.len(), &edges);
@@ -44,25 +47,9 @@ fn is_clocked(system: &System, connection: &Connection) -> bool {
     system.signal_type(connection.to) == SignalType::Clocked
 }
 
-/// A set of inputs, by position.
-enum Inputs {
-    All,
-    These(HashSet<usize>),
-}
-
-impl Inputs {
-    fn has(&self, input: usize) -> bool {
-        match self {
-            Inputs::All => true,
-            Inputs::These(inputs) => inputs.contains(&input),
-        }
-    }
-}
-
-/// Returns for each slave the inputs with direct feedthrough to a connected output.
-fn passed_through(system: &System) -> Vec<Inputs> {
-    let mut through: Vec<Inputs> =
-        system.slaves.iter().map(|_| Inputs::These(HashSet::new())).collect();
+/// Returns for each slave the positions of the inputs with direct feedthrough to a connected output; `None`: all.
+fn passed_through(system: &System) -> Vec<Option<HashSet<usize>>> {
+    let mut through = vec![Some(HashSet::new()); system.slaves.len()];
     let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
     for connection in system.connections.iter().filter(|connection| !is_clocked(system, connection))
     {
@@ -73,11 +60,11 @@ fn passed_through(system: &System) -> Vec<Inputs> {
             continue;
         };
         match (&unknown.dependencies, &mut through[from.slave]) {
-            (None, inputs) => *inputs = Inputs::All,
-            (Some(list), Inputs::These(inputs)) => {
+            (None, inputs) => *inputs = None,
+            (Some(list), Some(inputs)) => {
                 inputs.extend(list.iter().map(|&index| index as usize - 1));
             }
-            (Some(_), Inputs::All) => {}
+            (Some(_), None) => {}
         }
     }
     through
