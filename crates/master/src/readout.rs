@@ -169,19 +169,16 @@ impl Readout {
 
     /// Adds an element for a value and returns its position.
     fn add(&mut self, kind: ValueType) -> usize {
-        match kind {
-            ValueType::Real => self.reals.push(0.0),
-            ValueType::Integer => self.integers.push(0),
-            ValueType::Boolean => self.booleans.push(0),
-            ValueType::String | ValueType::Binary => self.strings.push(String::new()),
+        fn push<T: Default>(values: &mut Vec<T>) -> usize {
+            values.push(T::default());
+            values.len() - 1
         }
-        let length = match kind {
-            ValueType::Real => self.reals.len(),
-            ValueType::Integer => self.integers.len(),
-            ValueType::Boolean => self.booleans.len(),
-            ValueType::String | ValueType::Binary => self.strings.len(),
-        };
-        length - 1
+        match kind {
+            ValueType::Real => push(&mut self.reals),
+            ValueType::Integer => push(&mut self.integers),
+            ValueType::Boolean => push(&mut self.booleans),
+            ValueType::String | ValueType::Binary => push(&mut self.strings),
+        }
     }
 
     /// Reads all values. `time` in s appears in the error message.

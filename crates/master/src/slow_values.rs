@@ -109,13 +109,8 @@ impl SlowValues {
         for (position, slow) in self.slaves.iter_mut().enumerate() {
             match state.values.get(position).filter(|_| same) {
                 Some(values) => {
-                    let start_values = &mut slow.start_values;
-                    (
-                        start_values.reals,
-                        start_values.integers,
-                        start_values.booleans,
-                        start_values.strings,
-                    ) = values.clone();
+                    let Readout { reals, integers, booleans, strings, .. } = &mut slow.start_values;
+                    (*reals, *integers, *booleans, *strings) = values.clone();
                 }
                 None => slow.start_values.read(simulation.system(), time)?,
             }
