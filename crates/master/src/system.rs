@@ -272,14 +272,13 @@ impl System {
     /// Returns all variables of the given causality.
     #[must_use]
     pub fn ports(&self, causality: Causality) -> Vec<Port> {
-        let of = |(slave, (_, instance)): (usize, &(String, Box<dyn Slave>))| {
+        let slaves = self.slaves.iter().enumerate();
+        let ports = slaves.flat_map(|(slave, (_, instance))| {
             let variables = instance.description().variables.iter().enumerate();
-            variables
-                .filter(|(_, variable)| variable.causality == causality)
-                .map(|(variable, _)| Port { slave, variable })
-                .collect::<Vec<_>>()
-        };
-        self.slaves.iter().enumerate().flat_map(of).collect()
+            let chosen = variables.filter(move |(_, variable)| variable.causality == causality);
+            chosen.map(move |(variable, _)| Port { slave, variable })
+        });
+        ports.collect()
     }
 
     /// Returns the connection that ends at `input` or at an alias of it.

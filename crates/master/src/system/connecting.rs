@@ -84,6 +84,11 @@ impl System {
         to: Port,
         transformation: &Transformation,
     ) -> Result<(), SystemError> {
+        let wrong = |expected: String| SystemError::Role {
+            name: self.name(to),
+            actual: format!("a variable of type {}", self.type_name(to)),
+            expected,
+        };
         let (source, target) = (&self.variable(from).kind, &self.variable(to).kind);
         let fits = match (ValueType::of(source), ValueType::of(target)) {
             (ValueType::Real | ValueType::Integer, ValueType::Real) => {
@@ -99,21 +104,13 @@ impl System {
                 *transformation == Transformation::Identity
             }
             _ => {
-                return Err(SystemError::Role {
-                    name: self.name(to),
-                    actual: format!("a variable of type {}", self.type_name(to)),
-                    expected: format!("{} as {}", self.type_name(from), self.name(from)),
-                });
+                return Err(wrong(format!("{} as {}", self.type_name(from), self.name(from))));
             }
         };
         if fits {
             return Ok(());
         }
-        Err(SystemError::Role {
-            name: self.name(to),
-            actual: format!("a variable of type {}", self.type_name(to)),
-            expected: format!("the type that its transformation is for: {transformation:?}"),
-        })
+        Err(wrong(format!("the type that its transformation is for: {transformation:?}")))
     }
 
     /// Returns the name of the type of a variable in the version of its FMU.

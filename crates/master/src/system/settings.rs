@@ -168,17 +168,11 @@ impl System {
             && variable.clocks.is_empty()
             && !matches!(variable.kind, Kind::Clock(_))
             && self.source(port).is_none();
-        let set = || self.setting(port);
-        let known = free
-            .then(|| {
-                self.input_values
-                    .get(&port)
-                    .or_else(set)
-                    .cloned()
-                    .or_else(|| Value::start(&variable.kind))
-            })
-            .flatten();
-        match known? {
+        if !free {
+            return None;
+        }
+        let set = self.input_values.get(&port).or_else(|| self.setting(port)).cloned();
+        match set.or_else(|| Value::start(&variable.kind))? {
             #[expect(clippy::cast_possible_truncation, reason = "as the FMU holds it")]
             Value::Real(value) if matches!(variable.kind, Kind::Float32(_)) => {
                 Some(Value::Real((value as f32).into()))
