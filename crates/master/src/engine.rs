@@ -14,12 +14,12 @@ use crate::algorithm::Algorithm;
 use crate::drive::Drives;
 use crate::error::{SystemError, call};
 use crate::exchange::{Exchange, Values};
-use crate::grid::{Grid, size_between};
-use crate::system::{Port, System};
+use crate::grid::{Grid, is_rigid, size_between};
+use crate::system::System;
 use groups::Groups;
 pub(crate) use groups::Schedule;
 pub(crate) use instants::{InstantEnd, Instants, Parts};
-use slave::{CallError, CommunicationStep, Failure, Slave, StepResult, Value};
+use slave::{CallError, CommunicationStep, Failure, StepResult};
 use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.
@@ -77,10 +77,6 @@ struct Rigid {
 
 impl Rigid {
     fn of(system: &System, multiples: &[u32]) -> Option<Self> {
-        let is_rigid = |slave: &dyn Slave| {
-            let flags = slave.description().co_simulation.as_ref();
-            flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
-        };
         let why = if multiples.iter().any(|multiple| *multiple != 1) {
             "some FMUs step at multiples of the communication step (every)".to_owned()
         } else {
@@ -277,14 +273,6 @@ impl Engine {
     /// connection starts, ends or has a kink.
     pub(crate) fn next_breaks(&self, after: f64) -> impl Iterator<Item = f64> {
         [self.drives.next_break(after), self.exchange.next_break(after)].into_iter().flatten()
-    }
-
-    /// Reads the Real output at `port`.
-    pub(crate) fn read_real(&mut self, port: Port, time: f64) -> Result<f64, SystemError> {
-        let value = self.system.get_value(port);
-        let value =
-            value.map_err(|source| call(&self.system.slaves[port.slave].0, time, source))?;
-        Ok(if let Value::Real(value) = value { value } else { f64::NAN })
     }
 
     /// Returns the slaves that step every several communication steps.

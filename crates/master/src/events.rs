@@ -82,7 +82,7 @@ impl Events {
         let rounding = ROUNDING * (end - time);
         let mut first: Option<f64> = None;
         for &port in &self.times {
-            let next = engine.read_real(port, time)?;
+            let next = engine.system.read_real(port, time)?;
             if next > time + rounding && next <= end + rounding {
                 let next = if next < end - rounding { next } else { end };
                 first = Some(first.map_or(next, |first| first.min(next)));
@@ -98,7 +98,7 @@ impl Events {
         }
         self.before.clear();
         for &port in &self.crossings {
-            self.before.push(engine.read_real(port, time)?);
+            self.before.push(engine.system.read_real(port, time)?);
         }
         engine.save(time, &mut self.start)
     }
@@ -114,7 +114,7 @@ impl Events {
         let mut crossing: Option<(f64, Swept)> = None;
         let (mut end, width) = (end, WIDTH * (end - time));
         for (&port, &before) in self.crossings.iter().zip(&self.before) {
-            let after = engine.read_real(port, end)?;
+            let after = engine.system.read_real(port, end)?;
             let Some(mut bracket) = Bracket::new((time, before), (end, after), width) else {
                 continue;
             };
@@ -124,7 +124,7 @@ impl Events {
             };
             while let Some(asked) = bracket.ask() {
                 repeat_until(engine, asked)?;
-                let value = engine.read_real(port, asked)?;
+                let value = engine.system.read_real(port, asked)?;
                 bracket.tell(asked, value);
             }
             end = bracket.after();

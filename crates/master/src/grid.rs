@@ -66,6 +66,12 @@ pub(crate) fn size_between(start: f64, end: f64) -> f64 {
     if start + size < end && start + size.next_up() <= end { size.next_up() } else { size }
 }
 
+/// Whether a slave takes equal steps only.
+pub(crate) fn is_rigid(slave: &dyn Slave) -> bool {
+    let flags = slave.description().co_simulation.as_ref();
+    flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
+}
+
 /// Checks that the stop time, in s, is finite and later than the start time.
 ///
 /// # Errors
@@ -115,10 +121,6 @@ impl Grid {
         reason = "2^53 steps take longer than anyone waits"
     )]
     fn last_whole_step(&self, system: &System, multiples: &[u32], stop: f64) -> Option<EarlyEnd> {
-        let is_rigid = |slave: &dyn Slave| {
-            let flags = slave.description().co_simulation.as_ref();
-            flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
-        };
         let rigid = || {
             let all = system.slaves.iter().zip(multiples);
             all.filter(|((_, slave), _)| is_rigid(slave.as_ref()))

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use fmu_description::Experiment;
-use fmu_description::{DefaultExperiment, Kind, ModelDescription};
+use fmu_description::{DefaultExperiment, ModelDescription};
 
 use crate::drive::{Drive, Scenario};
 use crate::error::{SystemError, call};
@@ -12,6 +12,7 @@ use crate::fault::FaultChain;
 use crate::limits::check_start;
 use crate::order::Rows;
 use crate::signal_type::SignalType;
+use crate::step_control::nominal;
 use crate::system::{Port, System};
 use slave::{Value, ValueType};
 use solve::{Components, Newton, Progress, Scale, Solver, components};
@@ -139,8 +140,7 @@ impl<'a> Graph<'a> {
     }
 
     fn read(&self, system: &mut System, node: usize, time: f64) -> Result<Value, SystemError> {
-        let port = self.outputs[node];
-        system.get_value(port).map_err(|source| call(&system.slaves[port.slave].0, time, source))
+        system.read(self.outputs[node], time)
     }
 
     /// Sets all inputs that are connected to an output.
@@ -227,8 +227,7 @@ impl<'a> Graph<'a> {
         nodes: &[usize],
         time: f64,
     ) -> Result<Vec<f64>, SystemError> {
-        let real = |value| if let Value::Real(value) = value { value } else { f64::NAN };
-        Ok(self.read_all(system, nodes, time)?.into_iter().map(real).collect())
+        nodes.iter().map(|&node| system.read_real(self.outputs[node], time)).collect()
     }
 
     fn solve_reals(
@@ -237,11 +236,7 @@ impl<'a> Graph<'a> {
         nodes: &[usize],
         time: f64,
     ) -> Result<(), SystemError> {
-        let nominal = |&node: &usize| match &system.variable(self.outputs[node]).kind {
-            Kind::Real(real) => real.nominal.unwrap_or(1.0),
-            _ => 1.0,
-        };
-        let nominals = nodes.iter().map(nominal).collect();
+        let nominals = nodes.iter().map(|&node| nominal(system, self.outputs[node])).collect();
         let mut solver = Newton::new(Scale::new(TOLERANCE, TOLERANCE, nominals), EVALUATIONS);
         let mut u = self.reals(system, nodes, time)?;
         let mut next = u.clone();

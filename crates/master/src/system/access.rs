@@ -26,6 +26,17 @@ impl System {
         action(instance.as_mut()).map_err(|source| call(name, time, source))
     }
 
+    /// As [`System::get_value`]; an error names the slave and `time`, in s.
+    pub(crate) fn read(&mut self, port: Port, time: f64) -> Result<Value, SystemError> {
+        self.get_value(port).map_err(|source| call(&self.slaves[port.slave].0, time, source))
+    }
+
+    /// As [`System::read`], for a Real.
+    pub(crate) fn read_real(&mut self, port: Port, time: f64) -> Result<f64, SystemError> {
+        let value = self.read(port, time)?;
+        Ok(if let Value::Real(value) = value { value } else { f64::NAN })
+    }
+
     /// Reads the variable at `port`.
     ///
     /// # Errors
