@@ -10,8 +10,7 @@ use crate::error::SystemError;
 use crate::order::by_direct_dependencies;
 use crate::signal_type::SignalType;
 use crate::system::{Connection, Port, System};
-use fmu_description::{CoSimulation, Version};
-use slave::Slave;
+use fmu_description::Version;
 
 /// Default communication step in s for runs of up to [`STEPS`] steps; used if neither the user nor
 /// an FMU states one.
@@ -139,10 +138,6 @@ pub fn choose(
     Ok(AlgorithmChoice { algorithm, reasons })
 }
 
-fn flags(slave: &dyn Slave) -> Option<&CoSimulation> {
-    slave.description().co_simulation.as_ref()
-}
-
 /// Returns the smallest `stepSize` of the FMUs' default experiments. Without any, returns 1 ms, or
 /// the power of ten with which a run of `length` s has at most [`STEPS`] steps.
 fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 {
@@ -173,16 +168,13 @@ fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
     }
     let names: Vec<_> = order.looped.iter().map(|&k| system.slaves[k].0.as_str()).collect();
     let names = shortened(&names);
-    let able = |can: fn(&CoSimulation) -> bool| {
-        system.slaves.iter().find(|(_, slave)| !flags(slave.as_ref()).is_some_and(can))
-    };
-    if let Some((unable, _)) = able(|flags| flags.can_get_and_set_fmu_state) {
+    if let Some(unable) = system.first_without(|flags| flags.can_get_and_set_fmu_state) {
         reasons.push(format!(
             "coupling once, although direct dependencies form a loop through {names}: the FMU \
              state of {unable} cannot be set (canGetAndSetFMUstate)"
         ));
         Coupling::Once
-    } else if able(|flags| flags.provides_directional_derivative).is_none() {
+    } else if system.first_without(|flags| flags.provides_directional_derivative).is_none() {
         reasons.push(format!(
             "coupling newton: direct dependencies form a loop through {names}, and all FMUs have \
              directional derivatives"
@@ -206,10 +198,8 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
     let is_third = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
     let (third, others): (Vec<usize>, Vec<usize>) = fed.into_iter().partition(is_third);
     let unable = |slaves: &[usize]| -> Vec<&str> {
-        let able = |k: usize| {
-            flags(system.slaves[k].1.as_ref()).is_some_and(|flags| flags.can_interpolate_inputs)
-        };
-        let unable = slaves.iter().filter(|&&k| !able(k));
+        let can = |k: usize| system.can(k, |flags| flags.can_interpolate_inputs);
+        let unable = slaves.iter().filter(|&&k| !can(k));
         unable.map(|&k| system.slaves[k].0.as_str()).collect()
     };
     let held = [
@@ -245,10 +235,7 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
         (SignalType::Discrete, _) | (_, SignalType::Discrete) => SignalType::Discrete,
         _ => SignalType::Continuous,
     };
-    let has_events = |port: Port| {
-        let flags = system.slaves[port.slave].1.description().co_simulation.as_ref();
-        flags.is_some_and(|flags| flags.has_event_mode)
-    };
+    let has_events = |port: Port| system.can(port.slave, |flags| flags.has_event_mode);
     for (chosen, events, what) in [
         (SignalType::Discrete, true, "discrete, passed on at the event at which they change"),
         (

@@ -6,7 +6,6 @@ use crate::engine::{Engine, SavedState, Swept};
 use crate::error::{SystemError, call};
 use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
-use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
 /// Slot of the FMU states to which each evaluation returns.
@@ -101,10 +100,7 @@ impl Iterated {
             }
             Coupling::QuasiNewton => Iteration::QuasiNewton(QuasiNewton::new(scale, limit, REUSE)),
         };
-        let able = |flags: &CoSimulation| flags.provides_directional_derivative;
-        let mut slaves = engine.system.slaves.iter();
-        let directional =
-            slaves.all(|(_, slave)| slave.description().co_simulation.as_ref().is_some_and(able));
+        let unable = engine.system.first_without(|flags| flags.provides_directional_derivative);
         let zeros = || vec![0.0; count];
         Some(Self {
             iteration,
@@ -113,7 +109,7 @@ impl Iterated {
             next: zeros(),
             column: zeros(),
             start: SavedState::new(SLOT),
-            directional,
+            directional: unable.is_none(),
             falls_back: algorithm.fallback,
             fallbacks: Fallbacks::default(),
         })

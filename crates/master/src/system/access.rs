@@ -2,7 +2,7 @@
 
 use super::{Port, System};
 use crate::error::{SystemError, call};
-use fmu_description::Causality;
+use fmu_description::{Causality, CoSimulation};
 use slave::{CallError, Slave, Transformation, Value, ValueType};
 
 impl System {
@@ -24,6 +24,17 @@ impl System {
     ) -> Result<T, SystemError> {
         let (name, instance) = &mut self.slaves[slave];
         action(instance.as_mut()).map_err(|source| call(name, time, source))
+    }
+
+    /// Whether a slave has a capability.
+    pub(crate) fn can(&self, slave: usize, can: fn(&CoSimulation) -> bool) -> bool {
+        self.slaves[slave].1.description().co_simulation.as_ref().is_some_and(can)
+    }
+
+    /// Returns the name of the first slave without a capability.
+    pub(crate) fn first_without(&self, can: fn(&CoSimulation) -> bool) -> Option<&str> {
+        let unable = (0..self.slaves.len()).find(|&slave| !self.can(slave, can));
+        unable.map(|slave| self.slaves[slave].0.as_str())
     }
 
     /// As [`System::get_value`]; an error names the slave and `time`, in s.
