@@ -6,7 +6,7 @@
 use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
-use crate::error::SystemError;
+use crate::error::{SystemError, contradiction};
 use crate::system::{Port, System};
 
 /// Declares an enum whose variants have the names used in the configuration file.
@@ -223,17 +223,7 @@ impl Algorithm {
     /// Returns an error if an FMU lacks a capability flag that the algorithm needs, if a port has
     /// the wrong kind, or if two settings contradict each other.
     pub fn check(&self, system: &System) -> Result<(), SystemError> {
-        let repeats = match (self.coupling, self.control) {
-            (Coupling::Once, StepControl::Doubling | StepControl::Embedded) => {
-                Some(format!("the step control {}", self.control.name()))
-            }
-            (Coupling::Once, _) => None,
-            (coupling, _) => Some(format!("the coupling {}", coupling.name())),
-        };
-        let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
-        let located = crossing.then(|| "the location of crossings".to_owned());
-        let rollback = self.rollback.then(|| "steps with rollback".to_owned());
-        if let Some(required_by) = repeats.or(located).or(rollback) {
+        if let Some(required_by) = self.repeated_by() {
             let lacks = "canGetAndSetFMUstate";
             require(system, lacks, &required_by, |flags| flags.can_get_and_set_fmu_state)?;
         }
@@ -250,25 +240,37 @@ impl Algorithm {
         let several = self.multiples.iter().any(|&multiple| multiple != 1);
         let plain = self.control == StepControl::Fixed && self.coupling == Coupling::Once;
         if several && !(plain && self.events.is_empty()) {
-            let what = "FMUs with multiples of the communication step need fixed steps, made once, \
-                        without events: step-control fixed, coupling once";
-            return Err(SystemError::Algorithm { what: what.to_owned() });
+            return Err(contradiction(
+                "FMUs with multiples of the communication step need fixed steps, made once, without events: \
+                 step-control fixed, coupling once",
+            ));
         }
         if self.control == StepControl::Energy && self.bonds.is_empty() {
-            let what = "the step control energy needs power bonds: pairs of connected inputs whose \
-                        product is a power";
-            return Err(SystemError::Algorithm { what: what.to_owned() });
+            return Err(contradiction(
+                "the step control energy needs power bonds: pairs of connected inputs whose product is a power",
+            ));
         }
         self.check_numbers()
     }
 
     /// Whether steps may be repeated, so that every slave must be able to restore its state.
     pub(crate) fn repeats(&self) -> bool {
-        let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
-        crossing
-            || self.rollback
-            || self.coupling != Coupling::Once
-            || matches!(self.control, StepControl::Doubling | StepControl::Embedded)
+        self.repeated_by().is_some()
+    }
+
+    /// Returns what may repeat steps.
+    fn repeated_by(&self) -> Option<String> {
+        let is_crossing = |event: &EventSource| matches!(event, EventSource::Crossing(_));
+        match (self.coupling, self.control) {
+            (Coupling::Once, StepControl::Doubling | StepControl::Embedded) => {
+                Some(format!("the step control {}", self.control.name()))
+            }
+            (Coupling::Once, _) if self.events.iter().any(is_crossing) => {
+                Some("the location of crossings".to_owned())
+            }
+            (Coupling::Once, _) => self.rollback.then(|| "steps with rollback".to_owned()),
+            (coupling, _) => Some(format!("the coupling {}", coupling.name())),
+        }
     }
 
     fn check_numbers(&self) -> Result<(), SystemError> {
@@ -280,18 +282,16 @@ impl Algorithm {
         ];
         for (what, value) in numbers {
             if !(value > 0.0 && value.is_finite()) {
-                let what = format!("{what} is {value}, expected a number above 0");
-                return Err(SystemError::Algorithm { what });
+                return Err(contradiction(format!("{what} is {value}, expected a number above 0")));
             }
         }
         if self.control != StepControl::Fixed
             && !(self.smallest_step <= self.step && self.step <= self.largest_step)
         {
-            let what = format!(
+            return Err(contradiction(format!(
                 "the first step is {} s, expected one from the smallest, {} s, to the largest, {} s",
                 self.step, self.smallest_step, self.largest_step
-            );
-            return Err(SystemError::Algorithm { what });
+            )));
         }
         Ok(())
     }
@@ -303,14 +303,10 @@ fn require(
     required_by: &str,
     can: fn(&CoSimulation) -> bool,
 ) -> Result<(), SystemError> {
-    let unable = system
-        .slaves
-        .iter()
-        .find(|(_, slave)| !slave.description().co_simulation.as_ref().is_some_and(can));
-    match unable {
+    match system.first_without(can) {
         None => Ok(()),
-        Some((name, _)) => Err(SystemError::Capability {
-            slave: name.clone(),
+        Some(name) => Err(SystemError::Capability {
+            slave: name.to_owned(),
             lacks,
             required_by: required_by.to_owned(),
         }),

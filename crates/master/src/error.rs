@@ -302,3 +302,8 @@ pub enum SystemError {
 pub(crate) fn call(slave: &str, time: f64, source: CallError) -> SystemError {
     SystemError::Call { slave: slave.to_owned(), time, source }
 }
+
+/// Returns the error for settings that contradict each other or the system.
+pub(crate) fn contradiction(what: impl Into<String>) -> SystemError {
+    SystemError::Algorithm { what: what.into() }
+}

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::algorithm::Algorithm;
-use crate::error::SystemError;
+use crate::error::{SystemError, contradiction};
 use crate::signal::reached;
 use crate::system::System;
 use fmu_description::number::seconds;
@@ -245,18 +245,14 @@ pub(crate) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u3
         return Ok(vec![1; count]);
     }
     match algorithm.multiples.iter().position(|&multiple| multiple == 0) {
-        _ if algorithm.multiples.len() != count => Err(SystemError::Algorithm {
-            what: format!(
-                "the multiples of the step are {}, expected one for each of {count} FMUs",
-                algorithm.multiples.len()
-            ),
-        }),
-        Some(slave) => Err(SystemError::Algorithm {
-            what: format!(
-                "{} steps every 0 communication steps, expected 1 or more",
-                system.slaves[slave].0
-            ),
-        }),
+        _ if algorithm.multiples.len() != count => Err(contradiction(format!(
+            "the multiples of the step are {}, expected one for each of {count} FMUs",
+            algorithm.multiples.len()
+        ))),
+        Some(slave) => Err(contradiction(format!(
+            "{} steps every 0 communication steps, expected 1 or more",
+            system.slaves[slave].0
+        ))),
         None => Ok(algorithm.multiples.clone()),
     }
 }

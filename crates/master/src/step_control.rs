@@ -7,7 +7,7 @@ use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::coupling::Coupler;
 use crate::drive::BREAK;
 use crate::engine::{Ending, Engine, SavedState, Swept};
-use crate::error::SystemError;
+use crate::error::{SystemError, contradiction};
 use crate::exchange::Reals;
 use crate::grid::{Grid, size_between};
 use crate::signal::{near, reached};
@@ -405,11 +405,11 @@ fn bonds(
     let source = |port: Port| {
         let connection = system.source(port);
         let output = connection.and_then(|connection| reals.output(connection.from));
-        output.ok_or_else(|| SystemError::Algorithm {
-            what: format!(
-                "a power bond needs two connected Real inputs, and {} is none",
-                system.name(port)
-            ),
+        output.ok_or_else(|| {
+            let name = system.name(port);
+            contradiction(format!(
+                "a power bond needs two connected Real inputs, and {name} is none"
+            ))
         })
     };
     algorithm.bonds.iter().map(|bond| Ok((source(bond.first)?, source(bond.second)?))).collect()

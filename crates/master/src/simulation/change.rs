@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::drive::Scenario;
-use crate::error::SystemError;
+use crate::error::{SystemError, contradiction};
 
 impl Simulation {
     /// Returns the earliest time in s at which a change of the scenario may take effect: the first
@@ -44,9 +44,9 @@ impl Simulation {
             }
         }
         if !same || inherited != earlier {
-            let what = "the new scenario lacks a driven variable or a fault of the present one, \
-                        expected all of them";
-            return Err(SystemError::Algorithm { what: what.to_owned() });
+            return Err(contradiction(
+                "the new scenario lacks a driven variable or a fault of the present one, expected all of them",
+            ));
         }
         engine.exchange.set_faults(&engine.system, &scenario.faults)?;
         engine.drives = scenario.drives;

@@ -10,7 +10,7 @@ use crate::algorithm::Algorithm;
 use crate::coupling::Iteration;
 use crate::drive::{DriveState, Scenario};
 use crate::engine::Ending;
-use crate::error::{SystemError, call};
+use crate::error::{SystemError, call, contradiction};
 use crate::exchange::Values;
 use crate::fault::FaultChain;
 use crate::step_control::Controller;
@@ -204,7 +204,7 @@ impl Simulation {
         self.engine
             .drives
             .restore(checkpoint.drives.clone())
-            .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
+            .map_err(|error| contradiction(error.to_string()))?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
         let (system, time) = (&mut self.engine.system, checkpoint.time);
         self.engine.instants.restore(system, &checkpoint.pending, time)?;
@@ -220,24 +220,16 @@ impl Simulation {
     }
 
     fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
-        let present = self
-            .engine
-            .system
-            .slaves
-            .iter()
-            .map(|(name, slave)| (name.as_str(), slave.description().guid.as_str()));
-        let theirs = checkpoint.slaves.iter().map(|(name, guid, _)| (name.as_str(), guid.as_str()));
-        let list = |names: &mut dyn Iterator<Item = (&str, &str)>| {
-            names.map(|(name, guid)| format!("{name} {guid}")).collect::<Vec<_>>().join(", ")
-        };
+        let slaves = self.engine.system.slaves.iter();
+        let present = slaves.map(|(name, slave)| [name, &slave.description().guid]);
+        let theirs = checkpoint.slaves.iter().map(|(name, guid, _)| [name, guid]);
         if !present.clone().eq(theirs.clone()) {
-            let (mut theirs, mut present) = (theirs, present);
-            let what = format!(
+            let list = |slave: [&String; 2]| slave.map(String::as_str).join(" ");
+            return Err(contradiction(format!(
                 "the checkpoint is one of other FMUs: expected {}, found {}",
-                list(&mut theirs),
-                list(&mut present)
-            );
-            return Err(SystemError::Algorithm { what });
+                theirs.map(list).collect::<Vec<_>>().join(", "),
+                present.map(list).collect::<Vec<_>>().join(", ")
+            )));
         }
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
@@ -246,8 +238,8 @@ impl Simulation {
         if same {
             return Ok(());
         }
-        let what = "the checkpoint was taken with other connections or faults on connections, \
-                    expected the same ones";
-        Err(SystemError::Algorithm { what: what.to_owned() })
+        Err(contradiction(
+            "the checkpoint was taken with other connections or faults on connections, expected the same ones",
+        ))
     }
 }
