@@ -23,17 +23,17 @@ use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
-use crate::error::{SystemError, call};
+use crate::error::{SystemError, call, contradiction};
 use crate::fault::FaultChain;
 use crate::limits::Watch;
 use crate::signal_type::Way;
 use crate::system::{Connection, Port, System};
-use crate::task::Task;
 use channels::{Channels, ChannelsState};
 use instant::Ticks;
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
 use slave::{CallError, CommunicationStep, Slave, StepResult};
+pub(crate) use tasks::Task;
 
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
@@ -103,11 +103,10 @@ impl Exchange {
                 || self.held.set_fault(*input, fault)
                 || self.at_events.set_fault(*input, fault);
             if !set {
-                let what = format!(
+                return Err(contradiction(format!(
                     "{} has a fault, expected a connected input that is no String and no clock",
                     system.name(*input)
-                );
-                return Err(SystemError::Algorithm { what });
+                )));
             }
         }
         self.faulty = !faults.is_empty();
@@ -296,10 +295,10 @@ impl Exchange {
         position: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let (name, slave) = &mut system.slaves[position];
-        let done = self.reals.read(position, slave.as_mut());
-        done.and_then(|()| self.read_discrete(position, slave.as_mut()))
-            .map_err(|source| call(name, time, source))?;
+        system.perform(position, time, |slave| {
+            self.reals.read(position, slave)?;
+            self.read_discrete(position, slave)
+        })?;
         self.check_finite(system, position, time)
     }
 

@@ -46,7 +46,6 @@ mod simulation;
 mod slow_values;
 mod step_control;
 mod system;
-mod task;
 
 pub use algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 pub use choose::{AlgorithmChoice, AlgorithmRequest, choose};

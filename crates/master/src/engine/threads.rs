@@ -6,8 +6,8 @@ mod pool;
 
 use std::time::{Duration, Instant};
 
-use crate::error::SystemError;
-use crate::task::Task;
+use crate::error::{SystemError, contradiction};
+use crate::exchange::Task;
 use pool::Pool;
 
 /// Number of steps measured with and without threads.
@@ -42,8 +42,8 @@ impl Threads {
         if jobs < 2 {
             return Ok(None);
         }
-        let pool = Pool::new(jobs).map_err(|reason| SystemError::Algorithm {
-            what: format!("{jobs} threads cannot be started: {reason}"),
+        let pool = Pool::new(jobs).map_err(|reason| {
+            contradiction(format!("{jobs} threads cannot be started: {reason}"))
         })?;
         Ok(Some(Self { pool, groups: vec![Measured::default(); groups] }))
     }

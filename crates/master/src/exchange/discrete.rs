@@ -182,16 +182,6 @@ impl Wiring {
     fn input(&self, input: Port) -> Option<usize> {
         self.input_ports.iter().position(|&port| port == input)
     }
-
-    fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        let place = self.input(input);
-        place.map(|k| self.faults[k] = Some(fault.clone())).is_some()
-    }
-
-    fn next_break(&self, after: f64) -> Option<f64> {
-        let faults = self.faults.iter().flatten();
-        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
-    }
 }
 
 impl<T: Clone + Default> Channel<T> {
@@ -222,7 +212,8 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        self.wiring.set_fault(input, fault)
+        let place = self.wiring.input(input);
+        place.map(|k| self.wiring.faults[k] = Some(fault.clone())).is_some()
     }
 
     /// Returns the faults on the connection to an input.
@@ -251,7 +242,8 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Returns the first time after `after` at which a fault starts or ends.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
-        self.wiring.next_break(after)
+        let faults = self.wiring.faults.iter().flatten();
+        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
     }
 
     /// Returns the source value of the input at index `k`: the value at the start of the source's

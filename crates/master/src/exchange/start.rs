@@ -1,7 +1,7 @@
 //! Output derivatives at the start time, before the first step.
 
 use super::Exchange;
-use crate::error::{SystemError, call};
+use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::system::System;
 use slave::{CallError, Slave};
@@ -26,10 +26,8 @@ impl Exchange {
             }
             for slave in 0..system.slaves.len() {
                 self.reals.gather(slave, time, size);
-                let (name, instance) = &mut system.slaves[slave];
-                self.reals
-                    .set_derivatives(slave, instance.as_mut())
-                    .map_err(|source| call(name, time, source))?;
+                let reals = &self.reals;
+                system.perform(slave, time, |instance| reals.set_derivatives(slave, instance))?;
                 self.read(system, slave, time)?;
             }
         }

@@ -2,7 +2,6 @@
 
 use super::reals::Reals;
 use crate::system::System;
-use crate::task::Task;
 use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult, finish};
 
 impl Reals {
@@ -59,6 +58,14 @@ impl Reals {
         }
         slaves.iter().map(|&slave| results[slave].take().unwrap_or(Ok(StepResult::Whole))).collect()
     }
+}
+
+/// What a thread does for one slave: its step.
+pub(crate) struct Task<'a> {
+    slave: usize,
+    pub(crate) instance: &'a mut dyn Slave,
+    pub(crate) request: StepRequest<'a>,
+    pub(crate) done: Result<StepResult, CallError>,
 }
 
 /// The steps of a group, sorted by how they are executed.
