@@ -1,26 +1,27 @@
 //! Values of variables: read from a slave, and stated in the XML.
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
+use master::Value::Real;
 use master::{CallError, Slave, ValueType};
 
 /// A value of any type; equality compares bits.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
-    Real(u64),
-    Integer(i64),
-    Boolean(bool),
-    String(String),
-    Binary(Vec<u8>),
+#[derive(Clone, Debug)]
+pub(super) struct Value(master::Value);
+
+impl PartialEq for Value {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Real(one), Real(other)) => one.to_bits() == other.to_bits(),
+            (one, other) => one == other,
+        }
+    }
 }
 
 impl std::fmt::Display for Value {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Value::Real(bits) => write!(formatter, "{:?}", f64::from_bits(*bits)),
-            Value::Integer(value) => write!(formatter, "{value}"),
-            Value::Boolean(value) => write!(formatter, "{value}"),
-            Value::String(value) => write!(formatter, "{value:?}"),
-            Value::Binary(value) => formatter.write_str(&master::to_hex(value)),
+        match &self.0 {
+            Real(value) => write!(formatter, "{value:?}"),
+            other => other.fmt(formatter),
         }
     }
 }
@@ -28,9 +29,8 @@ impl std::fmt::Display for Value {
 impl Value {
     /// Whether the value equals the number in the XML, whose last digit may be rounded.
     pub(super) fn agrees(&self, stated: &Value) -> bool {
-        match (self, stated) {
-            (Value::Real(actual), Value::Real(stated)) => {
-                let (actual, stated) = (f64::from_bits(*actual), f64::from_bits(*stated));
+        match (&self.0, &stated.0) {
+            (Real(actual), Real(stated)) => {
                 (actual - stated).abs() <= 1e-14 * stated.abs().max(actual.abs())
             }
             _ => self == stated,
@@ -39,10 +39,9 @@ impl Value {
 
     /// Returns the difference relative to the larger of the two.
     fn apart(&self, other: &Value) -> f64 {
-        match (self, other) {
+        match (&self.0, &other.0) {
             _ if self == other => 0.0,
-            (Value::Real(one), Value::Real(other)) => {
-                let (one, other) = (f64::from_bits(*one), f64::from_bits(*other));
+            (Real(one), Real(other)) => {
                 let relative = (one - other).abs() / one.abs().max(other.abs());
                 // Positive and negative zero are equal.
                 if (one - other).abs() <= 0.0 {
@@ -56,7 +55,7 @@ impl Value {
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        !matches!(self, Value::Real(bits) if !f64::from_bits(*bits).is_finite())
+        !matches!(self.0, Real(value) if !value.is_finite())
     }
 }
 
@@ -72,50 +71,17 @@ pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
 
 /// Reads one variable.
 pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
-    let reference = [variable.value_reference];
-    Ok(match ValueType::of(&variable.kind) {
-        ValueType::Real => {
-            let mut value = [0.0];
-            slave.get_real(&reference, &mut value)?;
-            Value::Real(value[0].to_bits())
-        }
-        ValueType::Integer => {
-            let mut value = [0];
-            slave.get_integer(&reference, &mut value)?;
-            Value::Integer(value[0])
-        }
-        ValueType::Boolean => {
-            let mut value = [0];
-            slave.get_boolean(&reference, &mut value)?;
-            Value::Boolean(value[0] != 0)
-        }
-        ValueType::String => {
-            let mut value = [String::new()];
-            slave.get_string(&reference, &mut value)?;
-            let [value] = value;
-            Value::String(value)
-        }
-        ValueType::Binary => {
-            let mut value = [Vec::new()];
-            slave.get_binary(&reference, &mut value)?;
-            let [value] = value;
-            Value::Binary(value)
-        }
-    })
+    master::read_value(slave, variable.value_reference, ValueType::of(&variable.kind)).map(Value)
 }
 
 /// Returns the start value in the XML.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
-    match &variable.kind {
-        Kind::String(start) => start.clone().map(Value::String),
-        Kind::Binary(binary) => binary.start.clone().map(Value::Binary),
-        other => match master::Value::start(other)? {
-            master::Value::Real(value) => Some(Value::Real(value.to_bits())),
-            master::Value::Integer(value) => Some(Value::Integer(value)),
-            master::Value::Boolean(value) => Some(Value::Boolean(value)),
-            master::Value::String(_) | master::Value::Binary(_) => None,
-        },
-    }
+    let start = match &variable.kind {
+        Kind::String(start) => start.clone().map(master::Value::String),
+        Kind::Binary(binary) => binary.start.clone().map(master::Value::Binary),
+        other => master::Value::start(other),
+    };
+    start.map(Value)
 }
 
 /// Returns the variables that keep their start value during the initialization: parameters, inputs,

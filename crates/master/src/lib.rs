@@ -63,7 +63,7 @@ pub use slave::{
     Transformation, Value, ValueType, to_hex,
 };
 pub use slow_values::{SlowState, SlowValues};
-pub use system::{Connection, EventObserver, Port, System};
+pub use system::{Connection, EventObserver, Port, System, read_value};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -12,6 +12,7 @@ use std::collections::{HashMap, HashSet};
 use fmu_description::{Causality, ModelDescription, ScalarVariable};
 
 use crate::error::SystemError;
+pub use access::read_value;
 use fmu_description::similar::nearest;
 use slave::{CallError, Slave, Transformation, Value};
 

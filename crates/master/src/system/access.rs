@@ -5,6 +5,35 @@ use crate::error::{SystemError, call};
 use fmu_description::{Causality, CoSimulation};
 use slave::{CallError, Slave, Transformation, Value, ValueType};
 
+/// Reads the variable of a slave with this value reference and type.
+///
+/// # Errors
+///
+/// [`CallError`] if the FMU refuses the read.
+pub fn read_value(
+    slave: &mut dyn Slave,
+    reference: u32,
+    kind: ValueType,
+) -> Result<Value, CallError> {
+    let (mut real, mut integer, mut boolean) = ([0.0], [0], [0]);
+    let (mut text, mut bytes) = ([String::new()], [Vec::new()]);
+    match kind {
+        ValueType::Real => slave.get_real(&[reference], &mut real)?,
+        ValueType::Integer => slave.get_integer(&[reference], &mut integer)?,
+        ValueType::Boolean => slave.get_boolean(&[reference], &mut boolean)?,
+        ValueType::String => slave.get_string(&[reference], &mut text)?,
+        ValueType::Binary => slave.get_binary(&[reference], &mut bytes)?,
+    }
+    let ([text], [bytes]) = (text, bytes);
+    Ok(match kind {
+        ValueType::Real => Value::Real(real[0]),
+        ValueType::Integer => Value::Integer(integer[0]),
+        ValueType::Boolean => Value::Boolean(boolean[0] != 0),
+        ValueType::String => Value::String(text),
+        ValueType::Binary => Value::Binary(bytes),
+    })
+}
+
 impl System {
     /// Takes over the events of the slaves that hand them over. `stop`: their steps end at the first event.
     pub(crate) fn hand_over_events(&mut self, stop: bool, time: f64) -> Result<(), SystemError> {
@@ -55,29 +84,8 @@ impl System {
     /// [`CallError`] if the FMU refuses the read.
     pub fn get_value(&mut self, port: Port) -> Result<Value, CallError> {
         let variable = self.variable(port);
-        let (reference, kind) = ([variable.value_reference], ValueType::of(&variable.kind));
-        let slave = &mut self.slaves[port.slave].1;
-        let (mut real, mut integer, mut text) = ([0.0], [0], [String::new()]);
-        match kind {
-            ValueType::Real => slave.get_real(&reference, &mut real).map(|()| Value::Real(real[0])),
-            ValueType::Boolean => {
-                let mut boolean = [0];
-                slave.get_boolean(&reference, &mut boolean)?;
-                Ok(Value::Boolean(boolean[0] != 0))
-            }
-            ValueType::Binary => {
-                let mut bytes = [Vec::new()];
-                slave.get_binary(&reference, &mut bytes)?;
-                Ok(Value::Binary(std::mem::take(&mut bytes[0])))
-            }
-            ValueType::String => {
-                slave.get_string(&reference, &mut text)?;
-                Ok(Value::String(std::mem::take(&mut text[0])))
-            }
-            ValueType::Integer => {
-                slave.get_integer(&reference, &mut integer).map(|()| Value::Integer(integer[0]))
-            }
-        }
+        let (reference, kind) = (variable.value_reference, ValueType::of(&variable.kind));
+        read_value(self.slaves[port.slave].1.as_mut(), reference, kind)
     }
 
     /// Sets the variable at `port`; `value` has its type. Between two steps of a simulation, only an
