@@ -5,8 +5,8 @@ use std::fmt::Debug;
 use std::sync::{Arc, Mutex};
 
 use tracing::field::{Field, Visit};
-use tracing::span::{Attributes, Id, Record};
-use tracing::{Event, Metadata, Subscriber};
+use tracing::{Event, Subscriber};
+use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 
 /// `target` of the events for messages of FMUs.
 const TARGET: &str = "fmu";
@@ -20,7 +20,7 @@ pub(super) struct MessageSummary {
     pub(super) messages: u64,
 }
 
-/// A subscriber that records the messages.
+/// A layer that records the messages.
 #[derive(Clone, Default)]
 pub(super) struct MessageRecorder {
     messages: Arc<Mutex<MessageSummary>>,
@@ -30,7 +30,8 @@ impl MessageRecorder {
     /// Runs `body`; returns its result and the summary of the messages during the call.
     pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, MessageSummary) {
         let heard = Self::default();
-        let result = tracing::subscriber::with_default(heard.clone(), body);
+        let subscriber = tracing_subscriber::registry().with(heard.clone());
+        let result = tracing::subscriber::with_default(subscriber, body);
         let messages = heard.messages.lock().map(|mut messages| std::mem::take(&mut *messages));
         (result, messages.unwrap_or_default())
     }
@@ -60,20 +61,11 @@ impl Visit for Category {
     }
 }
 
-impl Subscriber for MessageRecorder {
-    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        metadata.target() == TARGET
-    }
-
-    fn new_span(&self, _: &Attributes<'_>) -> Id {
-        Id::from_u64(1)
-    }
-
-    fn record(&self, _: &Id, _: &Record<'_>) {}
-
-    fn record_follows_from(&self, _: &Id, _: &Id) {}
-
-    fn event(&self, event: &Event<'_>) {
+impl<S: Subscriber> Layer<S> for MessageRecorder {
+    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        if event.metadata().target() != TARGET {
+            return;
+        }
         let mut category = Category(None, 1);
         event.record(&mut category);
         if let Ok(mut messages) = self.messages.lock() {
@@ -81,8 +73,4 @@ impl Subscriber for MessageRecorder {
             messages.categories.extend(category.0);
         }
     }
-
-    fn enter(&self, _: &Id) {}
-
-    fn exit(&self, _: &Id) {}
 }
