@@ -136,10 +136,10 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
 
 /// Returns the result if the FMU is not run.
 fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> {
+    let not_tried = |reason: String| Some(TrialResult::NotTried { reason });
     if options.no_run {
-        return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
+        return not_tried("--no-run".to_owned());
     }
-    let not_tried = |reason: &str| Some(TrialResult::NotTried { reason: reason.to_owned() });
     let description = &unpacked.description;
     let simulation =
         description.stepped().map(|flags| (flags.model_identifier, flags.needs_execution_tool));
@@ -149,15 +149,14 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     let is_simulation = simulation.is_some();
     let (identifier, needs_tool) = simulation.or(exchange)?;
     if !is_simulation && cfg!(not(target_os = "linux")) {
-        return not_tried("it is for model exchange only, which is tried on Linux only");
+        return not_tried("it is for model exchange only, which is tried on Linux only".to_owned());
     }
     // With its libraries, an FMU of PythonFMU needs nothing beside it.
     let is_python = |tool: &str| tool.starts_with("PythonFMU");
     let alone = description.generation_tool.as_deref().is_some_and(is_python);
     if needs_tool && !alone && options.preload.is_empty() {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
-        let reason = format!("it needs {tool} beside it (needsExecutionTool)");
-        return Some(TrialResult::NotTried { reason });
+        return not_tried(format!("it needs {tool} beside it (needsExecutionTool)"));
     }
     let refused = unpacked.library(&identifier).err()?;
     Some(TrialResult::No { reason: refused.to_string() })
@@ -173,9 +172,7 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
     if cfg!(target_os = "linux") {
         return isolated(options, unpacked, limit);
     }
-    for library in &options.preload {
-        fmu_import::preload(library)?;
-    }
+    options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let mut fmu = None;
     let mut make = |name: &str, before: Option<Instance>| -> anyhow::Result<Instance> {
         drop(before);

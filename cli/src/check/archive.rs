@@ -39,13 +39,8 @@ pub(super) fn check(
     let mut findings = Findings::about(Part::Archive);
     if path.extension().is_none_or(|extension| extension != "fmu") {
         let why = "Tools that open files by their extension do not offer it.";
-        findings.add(
-            Error,
-            path.display().to_string(),
-            "expected the extension .fmu",
-            why,
-            SECTION,
-        );
+        let place = path.display().to_string();
+        findings.add(Error, place, "expected the extension .fmu", why, SECTION);
     }
     let unread = || format!("cannot read {}", path.display());
     let file = File::open(path).with_context(unread)?;
@@ -82,13 +77,8 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     if entry.version_needed() > 20 {
         let needed = f64::from(entry.version_needed()) / 10.0;
         let what = format!("needs version {needed:.1} of ZIP, expected at most 2.0");
-        findings.add(
-            Error,
-            &name,
-            what,
-            "It may be a Zip64 archive, which not every importer reads.",
-            SECTION,
-        );
+        let why = "It may be a Zip64 archive, which not every importer reads.";
+        findings.add(Error, &name, what, why, SECTION);
     }
     if entry.flags().is_using_data_descriptor() && entry.compression() == CompressionMethod::Stored
     {
@@ -97,14 +87,9 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
         findings.add(Error, &name, what, why, SECTION);
     }
     if !name.is_ascii() && entry.flags().as_u16() & UTF8 == 0 {
+        let what = "a name that is not ASCII, without the flag for UTF-8";
         let why = "Importers decode the name in different ways.";
-        findings.add(
-            Error,
-            &name,
-            "a name that is not ASCII, without the flag for UTF-8",
-            why,
-            SECTION,
-        );
+        findings.add(Error, &name, what, why, SECTION);
     }
     if name.contains(['<', '>', '"', '|', '?', '*']) || name.split('/').any(breaks_windows) {
         let why = "It cannot be unpacked on Windows.";
@@ -112,13 +97,8 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     }
     if name.len() > LONG {
         let what = format!("a path of {} bytes", name.len());
-        findings.add(
-            Note,
-            &name,
-            what,
-            "With more than 260 in all, Windows may refuse to unpack it.",
-            "",
-        );
+        let why = "With more than 260 in all, Windows may refuse to unpack it.";
+        findings.add(Note, &name, what, why, "");
     }
     if entry.unix_mode().is_some_and(|mode| mode & 0o400 == 0) {
         let why = "unzip on UNIX makes a file that nobody can read.";
@@ -182,8 +162,13 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
     }
 }
 
+/// Whether a file, no folder, has a path that starts with `start`.
+fn has_file(names: &[String], start: &str) -> bool {
+    names.iter().any(|name| name.starts_with(start) && !name.ends_with('/'))
+}
+
 fn documentation(names: &[String], findings: &mut Findings) {
-    let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
+    let has = |path: &str| has_file(names, path);
     if has("documentation/") && !has("documentation/index.html") {
         let what = "expected index.html in it, the entry to the documentation";
         findings.add(Warning, "documentation", what, "Tools have nothing to show.", SECTION);
@@ -196,8 +181,7 @@ fn documentation(names: &[String], findings: &mut Findings) {
 
 /// Checks that sources of FMI 3.0 say how they are built.
 fn build_description(names: &[String], findings: &mut Findings) {
-    let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
-    if has("sources/") && !has("sources/buildDescription.xml") {
+    if has_file(names, "sources/") && !has_file(names, "sources/buildDescription.xml") {
         let what = "expected buildDescription.xml in it";
         findings.add(Error, "sources", what, "It cannot be built.", SECTION);
     }
@@ -257,12 +241,7 @@ fn picture<R: std::io::Read>(mut file: ZipFile<'_, R>, findings: &mut Findings) 
     use std::io::Read as _;
     let mut start = [0; 8];
     if file.read_exact(&mut start).is_err() || start != *b"\x89PNG\r\n\x1a\n" {
-        findings.add(
-            Warning,
-            "model.png",
-            "expected a PNG file",
-            "Tools show no picture.",
-            SECTION,
-        );
+        let why = "Tools show no picture.";
+        findings.add(Warning, "model.png", "expected a PNG file", why, SECTION);
     }
 }

@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use fmu_description::number::seconds;
-use fmu_description::{Causality, Experiment, ModelDescription, ScalarVariable, Version};
+use fmu_description::{
+    Causality, DefaultExperiment, Experiment, ModelDescription, ScalarVariable, Version,
+};
 use master::{CallError, Failure, Slave, StepResult, ValueType};
 
 use super::answer::TrialResult;
@@ -110,7 +112,7 @@ impl<S: Slave> Trial<'_, S> {
             steps,
             step: self.step_size(),
             start: self.start_time(),
-            tolerance: self.tolerance(),
+            tolerance: self.experiment().tolerance,
             but: in_part.filter(|_| steps < self.count).map(|finding| finding.what.clone()),
         };
     }
@@ -141,8 +143,8 @@ impl<S: Slave> Trial<'_, S> {
                 return None;
             }
         };
-        let start_time = self.start_time();
-        let experiment = Experiment { start_time, stop_time, tolerance: self.tolerance() };
+        let (start_time, tolerance) = (self.start_time(), self.experiment().tolerance);
+        let experiment = Experiment { start_time, stop_time, tolerance };
         let done = slave
             .setup_experiment(&experiment)
             .and_then(|()| slave.enter_initialization_mode())
@@ -191,19 +193,16 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    fn tolerance(&self) -> Option<f64> {
-        self.description.default_experiment.and_then(|experiment| experiment.tolerance)
+    fn experiment(&self) -> DefaultExperiment {
+        self.description.default_experiment.unwrap_or_default()
     }
 
     fn start_time(&self) -> f64 {
-        self.description
-            .default_experiment
-            .and_then(|experiment| experiment.start_time)
-            .unwrap_or(0.0)
+        self.experiment().start_time.unwrap_or(0.0)
     }
 
     fn step_size(&self) -> f64 {
-        let experiment = self.description.default_experiment.unwrap_or_default();
+        let experiment = self.experiment();
         let span = experiment.stop_time.map(|stop| (stop - self.start_time()) / 1000.0);
         experiment.step_size.or(span).filter(|size| *size > 0.0).unwrap_or(0.001)
     }
@@ -247,7 +246,7 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Returns the number of steps from the start to the stop time of the default experiment.
     fn steps_of_experiment(&self) -> u32 {
-        let stop = self.description.default_experiment.and_then(|experiment| experiment.stop_time);
+        let stop = self.experiment().stop_time;
         let count = stop.map(|stop| ((stop - self.start_time()) / self.step_size()).round());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
         count.map_or(STEPS, |count| (count as u32).max(1))
@@ -352,13 +351,8 @@ impl<S: Slave> Trial<'_, S> {
             }
             Err(error) if error.messages.is_empty() => {
                 let what = "refuses an unknown value reference without a message";
-                self.findings.add(
-                    Warning,
-                    "fmi2GetReal",
-                    what,
-                    "Nobody learns what was wrong.",
-                    "2.1.3",
-                );
+                let why = "Nobody learns what was wrong.";
+                self.findings.add(Warning, "fmi2GetReal", what, why, "2.1.3");
             }
             Err(_) => {}
         }
