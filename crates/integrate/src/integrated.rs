@@ -31,9 +31,10 @@ pub struct Options {
 }
 
 /// The mode of the FMU.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Mode {
     /// Before the end of initialization mode.
+    #[default]
     Setup,
     /// Event mode.
     Event,
@@ -42,7 +43,7 @@ enum Mode {
 }
 
 /// The present point, as far as numbers of a fixed count describe it.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Point {
     /// The time in s.
     time: f64,
@@ -130,21 +131,12 @@ impl Integrated {
     pub fn new(instance: Box<dyn ModelExchange>, options: Options) -> Self {
         let description = description_of(instance.description());
         let (inputs, clocks) = (Inputs::new(&description), clocks_of(&description));
-        let point = Point {
-            time: 0.0,
-            mode: Mode::Setup,
-            next_event: None,
-            ends: false,
-            event: false,
-            input_changed: false,
-            memory: Memory::default(),
-        };
         Self {
             instance,
             description,
             options,
             tolerance: TOLERANCE,
-            point,
+            point: Point::default(),
             stepper: Stepper::new(options.method, Scale::new(TOLERANCE, TOLERANCE, Vec::new())),
             inputs,
             clocks,

@@ -19,7 +19,6 @@ mod inputs;
 mod integrated;
 mod method;
 mod rosenbrock;
-mod start;
 mod stepper;
 
 pub use integrated::{Integrated, Options, description_of};

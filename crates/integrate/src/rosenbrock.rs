@@ -7,7 +7,7 @@
 
 use solve::Factors;
 
-use crate::start::StepStart;
+use crate::stepper::StepStart;
 
 const GAMMA: f64 = 0.25;
 
