@@ -11,7 +11,7 @@ use master::{
 use toml::Spanned;
 
 use crate::assemble::AssembledSystem;
-use crate::config::{Config, ConnectionEntry, Every, Solver};
+use crate::config::{Config, ConnectionEntry, Every};
 
 /// Largest default number of rows with fixed steps.
 const ROWS: f64 = 1e4;
@@ -55,7 +55,10 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     warn_of_resolution(algorithm.step, start.abs().max(stop.abs()));
     let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
     explain_tolerances(system, tolerance, &mut reasons);
-    explain_interfaces(&assembled.integrated, &mut reasons);
+    reasons.extend(assembled.integrated.iter().map(|(name, method)| {
+        let method = method.name();
+        format!("{name} runs by model exchange: the master integrates it, solver {method}")
+    }));
     let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
     let every =
         config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
@@ -83,16 +86,6 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
         if let Some(tolerance) = default.and_then(DefaultExperiment::usable_tolerance) {
             reasons.push(format!("tolerance {tolerance:e} for {name}: from its DefaultExperiment"));
         }
-    }
-}
-
-/// Explains which FMUs the master integrates.
-fn explain_interfaces(integrated: &[(String, Solver)], reasons: &mut Vec<String>) {
-    for (name, method) in integrated {
-        reasons.push(format!(
-            "{name} runs by model exchange: the master integrates it, solver {}",
-            method.name()
-        ));
     }
 }
 

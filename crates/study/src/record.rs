@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::sync::{Arc, Mutex, TryLockError, Weak};
 use std::thread;
 use std::time::Duration;
 
@@ -14,6 +14,7 @@ use master::{Port, Readout, Simulation, SlowState, SlowValues, System};
 use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink};
 
 use crate::config::Every;
+use crate::store::lock;
 
 /// All open results files, so that they can be completed when the process ends.
 static FILES: Mutex<Files> = Mutex::new(Files { open: Vec::new(), is_watched: false });
@@ -92,7 +93,7 @@ impl Recorder {
         let recorder = Self::with_sink(simulation, ports, every, start, make)?;
         let Some(recorder) = recorder else { return Ok(None) };
         path.clone_into(&mut lock(&recorder.recording).path);
-        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut files = lock(&FILES);
         files.open.push(Arc::downgrade(&recorder.recording));
         if !files.is_watched {
             // Without the thread, rows are written with the next row only.
@@ -223,7 +224,7 @@ impl Drop for Recorder {
 fn write_stalled() {
     loop {
         thread::sleep(STALL);
-        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut files = lock(&FILES);
         let open = files.open();
         files.is_watched = !open.is_empty();
         drop(files);
@@ -251,10 +252,6 @@ fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>,
     }
     let readable = ports.iter().filter(|port| refused.iter().all(|(refused, _)| refused != *port));
     Ok(readable.copied().collect())
-}
-
-fn lock(recording: &Mutex<Recording>) -> MutexGuard<'_, Recording> {
-    recording.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes the rows of all open files when the process is about to end; returns each file with the

@@ -31,20 +31,21 @@ impl Every {
             Err(format!("expected {EXPECTED}, found {value}"))
         }
     }
+
+    fn named(text: &str) -> Result<Self, String> {
+        match text {
+            STEP => Ok(Self::Step),
+            NEVER => Ok(Self::Never),
+            _ => Err(format!("expected {EXPECTED}, found {text:?}")),
+        }
+    }
 }
 
 impl FromStr for Every {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            STEP => Ok(Self::Step),
-            NEVER => Ok(Self::Never),
-            _ => match text.parse() {
-                Ok(value) => Self::seconds(value),
-                Err(_) => Err(format!("expected {EXPECTED}, found {text:?}")),
-            },
-        }
+        text.parse().map_or_else(|_| Self::named(text), Self::seconds)
     }
 }
 
@@ -93,10 +94,6 @@ impl Visitor<'_> for EveryVisitor {
     }
 
     fn visit_str<E: Error>(self, value: &str) -> Result<Every, E> {
-        match value {
-            STEP => Ok(Every::Step),
-            NEVER => Ok(Every::Never),
-            _ => Err(E::custom(format!("expected {EXPECTED}, found {value:?}"))),
-        }
+        Every::named(value).map_err(E::custom)
     }
 }

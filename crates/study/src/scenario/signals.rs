@@ -106,9 +106,6 @@ impl<'a> Resolver<'a> {
             None if table.column(&target.name).is_some() => target.name.clone(),
             None => variable.clone(),
         };
-        if table.column(&name).is_none() {
-            return Err(Reason::Column { path, name, known: some(&table.names) });
-        }
         column_signal(&path, &table, &name, target, csv.hold)
     }
 
