@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use fmu_description::number::seconds;
-use indicatif::MultiProgress;
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use report::Message;
 use study::LogFields;
 use tracing::{Event, Level, Subscriber};
@@ -82,10 +82,9 @@ impl<S: Subscriber> Layer<S> for Collector {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         if let Some(messages) = FORWARDED.get().filter(|_| *event.metadata().level() <= Level::INFO)
         {
-            let mut parts = LogFields::default();
-            event.record(&mut parts);
             let is_of_fmu = event.metadata().target() == FMU;
-            messages.send(if is_of_fmu { &parts.instance } else { "" }, sentence(event));
+            let instance = if is_of_fmu { fields(event).instance } else { String::new() };
+            messages.send(&instance, sentence(event));
         }
         if *event.metadata().level() > Level::WARN {
             return;
@@ -94,18 +93,23 @@ impl<S: Subscriber> Layer<S> for Collector {
         if let Some((messages, count)) = collected.as_mut() {
             *count += 1;
             if messages.len() < KEPT {
-                let mut parts = LogFields::default();
-                event.record(&mut parts);
-                messages.push(Message { time: parts.time, text: sentence(event) });
+                messages.push(Message { time: fields(event).time, text: sentence(event) });
             }
         }
     }
 }
 
 /// Returns the display of progress bars.
-pub(crate) fn bars() -> &'static MultiProgress {
+fn bars() -> &'static MultiProgress {
     static BARS: OnceLock<MultiProgress> = OnceLock::new();
     BARS.get_or_init(MultiProgress::new)
+}
+
+/// Shows a progress bar of this length.
+pub(crate) fn bar(template: &str, length: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template(template);
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+    bars().add(ProgressBar::new(length).with_style(style))
 }
 
 /// A writer to standard error that hides the progress bar while it writes.
@@ -148,10 +152,14 @@ where
     }
 }
 
+fn fields(event: &Event<'_>) -> LogFields {
+    let mut fields = LogFields::default();
+    event.record(&mut fields);
+    fields
+}
+
 fn sentence(event: &Event<'_>) -> String {
     let metadata = event.metadata();
-    let mut parts = LogFields::default();
-    event.record(&mut parts);
     let word = match *metadata.level() {
         Level::ERROR => "error",
         Level::WARN => "warning",
@@ -159,7 +167,7 @@ fn sentence(event: &Event<'_>) -> String {
         Level::DEBUG => "debug",
         Level::TRACE => "trace",
     };
-    let LogFields { message, instance, category, time, others } = parts;
+    let LogFields { message, instance, category, time, others } = fields(event);
     if metadata.target() != FMU {
         return format!("{word}: {message}{others}");
     }

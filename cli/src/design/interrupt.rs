@@ -6,8 +6,7 @@ use std::sync::{Arc, OnceLock};
 use anyhow::Context;
 use fmu_import::crash;
 
-/// The number of SIGINT.
-const INTERRUPT: u8 = 2;
+use crate::crash::{INTERRUPT, on_signal};
 
 /// Starts to listen; returns the flag that the first Ctrl-C sets.
 pub(super) fn listen() -> anyhow::Result<Arc<AtomicBool>> {
@@ -23,16 +22,6 @@ pub(super) fn listen() -> anyhow::Result<Arc<AtomicBool>> {
         }
         eprintln!("interrupted: the design ends with what there is; Ctrl-C again ends it at once");
     };
-    handle_signals(react).context("Ctrl-C cannot be handled")?;
+    on_signal(react).context("Ctrl-C cannot be handled")?;
     Ok(flag)
-}
-
-#[cfg(unix)]
-fn handle_signals(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<()> {
-    Ok(crash::on_ending_signal(move |signal| react(u8::try_from(signal).unwrap_or(0)))?)
-}
-
-#[cfg(not(unix))]
-fn handle_signals(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<()> {
-    Ok(ctrlc::set_handler(move || react(INTERRUPT))?)
 }

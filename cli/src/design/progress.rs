@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use design::Progress;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use crate::logging;
 
@@ -36,10 +36,8 @@ impl Reporter {
         if !std::io::stderr().is_terminal() {
             return Self::Lines(Lines::new());
         }
-        let style =
-            ProgressStyle::with_template("{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = logging::bars().add(ProgressBar::new(parts(1.0)).with_style(style));
+        let template = "{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}";
+        let bar = logging::bar(template, parts(1.0));
         bar.enable_steady_tick(REDRAWN);
         Self::Bar(bar)
     }

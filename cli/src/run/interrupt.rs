@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use fmu_import::crash;
 
+use crate::crash::on_signal;
+
 /// Time limit of a call of an FMU, and of a whole step, after the signal.
 const CALL: Duration = Duration::from_millis(800);
 const STEP: Duration = Duration::from_secs(5);
@@ -39,19 +41,7 @@ pub(super) fn listen() -> anyhow::Result<()> {
     let waiting = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
     let waiting = waiting.context("signals cannot be handled")?;
     let _ = WAITING.set(waiting.thread().clone());
-    handle_signals().context("signals cannot be handled")
-}
-
-#[cfg(unix)]
-fn handle_signals() -> anyhow::Result<()> {
-    Ok(crash::on_ending_signal(|signal| raise(u8::try_from(signal).unwrap_or(0)))?)
-}
-
-#[cfg(not(unix))]
-fn handle_signals() -> anyhow::Result<()> {
-    /// The number of SIGINT elsewhere.
-    const INTERRUPT: u8 = 2;
-    Ok(ctrlc::set_handler(|| raise(INTERRUPT))?)
+    on_signal(raise).context("signals cannot be handled")
 }
 
 /// Acts on a signal.

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::time::Instant;
 
 use fmu_description::number::rounded;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use crate::logging;
 
@@ -25,12 +25,9 @@ pub(super) struct Progress {
 impl Progress {
     /// Creates a bar from `start` to `stop`, in s.
     pub(super) fn new(start: f64, stop: f64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let template = "{bar:24} {percent:>3} %, {msg}, {eta} left";
-            let style = ProgressStyle::with_template(template)
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            logging::bars().add(ProgressBar::new(whole(PARTS)).with_style(style))
-        });
+        let bar = std::io::stderr()
+            .is_terminal()
+            .then(|| logging::bar("{bar:24} {percent:>3} %, {msg}, {eta} left", whole(PARTS)));
         let next = if bar.is_some() { start } else { f64::INFINITY };
         Self { bar, start, part: (stop - start) / PARTS, next, began: Instant::now() }
     }
