@@ -17,6 +17,7 @@ use anyhow::Context;
 use design::{Design, Language, LogOptions, Precision, TimeLimits};
 use files::check_distinct;
 use progress::Reporter;
+use serde::Serialize;
 
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
@@ -40,24 +41,14 @@ pub(crate) struct Options {
     /// Columns of the log that are commands
     ///
     /// Names with commas between them [default: `u`, `u1`, `u2` and so on].
-    #[arg(
-        long,
-        value_name = "NAMES",
-        requires = "init",
-        value_delimiter = ',',
-        help_heading = "Logs"
-    )]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(requires = "init", help_heading = "Logs")]
     inputs: Vec<String>,
     /// Columns of the log that are measurements
     ///
     /// [default: `y`, `y1`, `y2` and so on; beside --inputs all other columns]
-    #[arg(
-        long,
-        value_name = "NAMES",
-        requires = "init",
-        value_delimiter = ',',
-        help_heading = "Logs"
-    )]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(requires = "init", help_heading = "Logs")]
     outputs: Vec<String>,
     /// Number of states of the identified plant
     ///
@@ -158,9 +149,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let filter = options.kalman_fmu.as_ref().map(|_| models::default_fmu(models::FILTER));
     let filter = filter.transpose()?;
     check_distinct(&inputs(options, from.as_deref(), None), &outputs)?;
-    for library in &options.preload {
-        fmu_import::preload(library)?;
-    }
+    options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let mut design = {
         let progress = Reporter::new();
         let limits = TimeLimits {
@@ -210,10 +199,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         eprintln!("warning: {warning}");
     }
     if options.json {
-        let mut output = std::io::stdout().lock();
-        serde_json::to_writer_pretty(&mut output, &design.report)
-            .context("cannot print the report")?;
-        writeln!(output)?;
+        print_json(&design.report, "the report")?;
     } else {
         terminal::summarise(&design.report);
         for (_, path) in outputs {
@@ -271,9 +257,7 @@ fn init(options: &Options) -> anyhow::Result<()> {
         "{} exists; --out names another file, --force overwrites it",
         out.display()
     );
-    for library in &options.preload {
-        fmu_import::preload(library)?;
-    }
+    options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let limits = TimeLimits {
         gains: options.gain_time,
         interrupted: interrupt::listen()?,
@@ -305,9 +289,7 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     let path = options.report.clone().unwrap_or_else(page);
     let outputs = [("--report", path.as_path())];
     check_distinct(&inputs(options, None, None), &outputs)?;
-    for library in &options.preload {
-        fmu_import::preload(library)?;
-    }
+    options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let comparison = design::compare(&options.plant)?;
     check_distinct(&inputs(options, None, comparison.model.as_deref()), &outputs)?;
     if !options.force {
@@ -318,15 +300,20 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     staged.stage(&path, |path| fs::write(path, &text))?;
     staged.commit()?;
     if options.json {
-        let mut output = std::io::stdout().lock();
-        serde_json::to_writer_pretty(&mut output, &comparison)
-            .context("cannot print the comparison")?;
-        writeln!(output)?;
+        print_json(&comparison, "the comparison")?;
     } else {
         terminal::compare(&comparison);
         println!("{}", path.display());
     }
     Ok(())
+}
+
+/// Prints a value as JSON; an error says `what` it is.
+fn print_json(value: &impl Serialize, what: &str) -> anyhow::Result<()> {
+    let mut output = std::io::stdout().lock();
+    let printed = serde_json::to_writer_pretty(&mut output, value);
+    printed.with_context(|| format!("cannot print {what}"))?;
+    Ok(writeln!(output)?)
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

@@ -5,7 +5,7 @@ use design::report::fallback::FallbackReport;
 use design::report::family::MemberReport;
 use design::report::losses::LossLoop;
 use design::report::reconfiguration::ReconfigurationReport;
-use design::report::robustness::{Number, ToleranceProof, ToleranceResult};
+use design::report::robustness::{LoopPoint, Number, ToleranceProof, ToleranceResult};
 use design::report::schedule::ScheduleReport;
 use design::report::{CommandPeak, Loop, Matrix, PidController, ReferenceStep};
 use design::{Comparison, Report};
@@ -18,26 +18,13 @@ const ROUNDING: f64 = 1e-14;
 
 /// Prints gains, eigenvalues, the three figures that matter, and the verdict.
 pub(crate) fn summarise(report: &Report) {
-    for matrix in &report.gains {
-        print_gain(matrix);
-    }
-    for controller in &report.pid {
-        print_pid(controller);
-    }
-    for feedback_loop in [&report.feedback, &report.observer] {
-        print_loop(feedback_loop);
-    }
-    for step in &report.references {
-        print_reference(step);
-    }
+    report.gains.iter().for_each(print_gain);
+    report.pid.iter().for_each(print_pid);
+    [&report.feedback, &report.observer].into_iter().for_each(print_loop);
+    report.references.iter().for_each(print_reference);
     println!("estimation law: {}", report.estimation.law);
     if let Some(robustness) = &report.robustness {
-        let peaks: Vec<_> = robustness
-            .points
-            .iter()
-            .map(|point| format!("{} at the {}", number(point.judged), point.point))
-            .collect();
-        println!("peak of S: {}", peaks.join(", "));
+        println!("peak of S: {}", peaks(&robustness.points));
         let delay = number(robustness.delay_margin);
         let hold = number(robustness.longest_hold);
         match (&report.plant.sample_time, &report.sampling) {
@@ -71,21 +58,11 @@ pub(crate) fn summarise(report: &Report) {
             ),
         }
     }
-    if let Some(schedule) = &report.schedule {
-        print_schedule(schedule);
-    }
-    if let Some(detection) = &report.detection {
-        print_detection(detection);
-    }
-    if let Some(losses) = &report.losses {
-        losses.loops.iter().for_each(print_losses);
-    }
-    if let Some(reconfiguration) = &report.reconfiguration {
-        print_reconfigurations(reconfiguration);
-    }
-    if let Some(fallback) = &report.fallback {
-        print_fallback(fallback);
-    }
+    report.schedule.iter().for_each(print_schedule);
+    report.detection.iter().for_each(print_detection);
+    report.losses.iter().flat_map(|losses| &losses.loops).for_each(print_losses);
+    report.reconfiguration.iter().for_each(print_reconfigurations);
+    report.fallback.iter().for_each(print_fallback);
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
     }
@@ -220,17 +197,17 @@ fn print_members(kind: &str, members: &[&MemberReport]) {
             println!("{kind} {}: not stable", member.name);
             continue;
         };
-        let peaks: Vec<_> = margins
-            .points
-            .iter()
-            .map(|point| format!("{} at the {}", number(point.judged), point.point))
-            .collect();
         let tolerance = margins.tolerance.as_ref().map_or(String::new(), |tolerance| {
             let cases = stable_cases(tolerance);
             format!("; {} entries vary: {cases}", tolerance.entries)
         });
-        println!("{kind} {}: peak of S {}{tolerance}", member.name, peaks.join(", "));
+        println!("{kind} {}: peak of S {}{tolerance}", member.name, peaks(&margins.points));
     }
+}
+
+fn peaks(points: &[LoopPoint]) -> String {
+    let peak = |point: &LoopPoint| format!("{} at the {}", number(point.judged), point.point);
+    points.iter().map(peak).collect::<Vec<_>>().join(", ")
 }
 
 fn print_schedule(schedule: &ScheduleReport) {
