@@ -161,14 +161,10 @@ pub(crate) fn folder_of_models(dist: &Path) -> anyhow::Result<PathBuf> {
         println!("FMUs: {}", folder.display());
         return Ok(folder);
     }
-    pack_into(&models::clone()?, dist)?;
+    let (out, versions) = (dist, Versions::Two);
+    let packing = PackOptions { out, binaries: None, sbom: false, locked: true, versions };
+    pack_models(&models::clone()?, &packing)?;
     Ok(dist.to_owned())
-}
-
-/// Builds all models of the workspace `root` and packs each into the folder `out`.
-pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu>> {
-    let versions = Versions::Two;
-    pack_models(root, &PackOptions { out, binaries: None, sbom: false, locked: true, versions })
 }
 
 fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {

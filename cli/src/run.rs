@@ -299,7 +299,9 @@ impl Started {
                 0
             }
             RunEnd::Interrupted => {
-                let more = self.run.checkpoint_file().map(|path| resume_hint(path, &self.here));
+                let more = self.run.checkpoint_file().map(|path| relative(path, &self.here));
+                let more =
+                    more.map(|path| format!("; to go on: {}", run_command("--resume ", &path)));
                 let more = more.unwrap_or_default();
                 told = format!("the run was interrupted at t = {shown} s{more}");
                 tracing::error!("{told}");
@@ -399,7 +401,7 @@ impl Started {
 
     /// Prints the name of a file that was written.
     fn show(&self, path: &Path) {
-        println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
+        println!("{}", relative(path, &self.here));
     }
 
     /// Draws the plot of the results in `file`, if one is requested.
@@ -432,12 +434,15 @@ fn apart(asked: f64, end: f64) -> String {
     )
 }
 
-/// Returns a hint with the command line that resumes from the checkpoint at `path`, from the folder
-/// `here`.
-fn resume_hint(path: &Path, here: &Path) -> String {
+/// Returns a path as it is from the folder `here`.
+fn relative(path: &Path, here: &Path) -> String {
+    path.strip_prefix(here).unwrap_or(path).display().to_string()
+}
+
+/// Returns the command line of a run of `file`, with an option before it.
+fn run_command(option: &str, file: &str) -> String {
     let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
-    let path = path.strip_prefix(here).unwrap_or(path).display().to_string();
-    format!("; to go on: {} run --resume {}", quoted(&command), quoted(&path))
+    format!("{} run {option}{}", quoted(&command), quoted(file))
 }
 
 /// Quotes an argument for a shell if it has characters that are unusual in paths.

@@ -12,7 +12,7 @@ use master::{Port, Probe, Readout, System};
 use study::config::CheckpointSettings;
 use study::{Error, RealTime, Run};
 
-use super::{interrupt, quoted};
+use super::{interrupt, relative, run_command};
 use crate::logging;
 
 /// Largest number of signals, and of variables that can be set, on the page.
@@ -75,8 +75,8 @@ impl Live {
             ("live.toml".to_owned(), format!("{first}."))
         };
         let file = results.with_file_name(file);
-        let shown = shown(&file, here);
-        let repeat = repeat_command(&shown);
+        let shown = relative(&file, here);
+        let repeat = run_command("", &shown);
         let settable = settable(run.simulation.system());
         let unrecorded = settable.iter().filter(|port| !ports.contains(port));
         let probe = probe(run, &ports.iter().chain(unrecorded).copied().collect::<Vec<_>>())?;
@@ -275,19 +275,10 @@ impl Live {
     /// current folder.
     pub(super) fn end(self, outcome: &str, here: &Path) {
         if self.remarks.len() > 1 {
-            println!("to repeat it: {}", repeat_command(&shown(&self.file, here)));
+            println!("to repeat it: {}", run_command("", &relative(&self.file, here)));
         }
         self.view.end(outcome, PATIENCE);
     }
-}
-
-fn shown(file: &Path, here: &Path) -> String {
-    file.strip_prefix(here).unwrap_or(file).display().to_string()
-}
-
-fn repeat_command(file: &str) -> String {
-    let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
-    format!("{} run {}", quoted(&command), quoted(file))
 }
 
 /// Returns a probe of the variables that can be read: those that are recorded, then those that can be set.

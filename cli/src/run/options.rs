@@ -1,6 +1,7 @@
 //! The options of `aso-ftc run`, which take precedence over a `system.toml`.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use fmu_description::number::seconds;
@@ -130,12 +131,12 @@ struct SystemOptions {
     /// Use co-simulation or model-exchange
     ///
     /// For an FMU that offers both; the default is co-simulation. May be repeated.
-    #[arg(long = "interface", value_name = "FMU=INTERFACE", value_parser = interface)]
+    #[arg(long = "interface", value_name = "FMU=INTERFACE", value_parser = named::<Interface>)]
     interfaces: Vec<(String, Interface)>,
     /// Method for a model-exchange FMU
     ///
     /// Integrate it by this method: automatic (the default), explicit or stiff. May be repeated.
-    #[arg(long = "solver", value_name = "FMU=METHOD", value_parser = solver)]
+    #[arg(long = "solver", value_name = "FMU=METHOD", value_parser = named::<Solver>)]
     solvers: Vec<(String, Solver)>,
     /// Connect an output to an input
     ///
@@ -334,14 +335,10 @@ fn multiple(text: &str) -> Result<(String, u32), String> {
     }
 }
 
-fn interface(text: &str) -> Result<(String, Interface), String> {
+/// Splits `name=value` and parses the value.
+fn named<T: FromStr<Err = String>>(text: &str) -> Result<(String, T), String> {
     let (name, value) = setting(text)?;
-    value.parse().map(|interface| (name, interface))
-}
-
-fn solver(text: &str) -> Result<(String, Solver), String> {
-    let (name, value) = setting(text)?;
-    value.parse().map(|solver| (name, solver))
+    value.parse().map(|value| (name, value))
 }
 
 fn method(text: &str) -> Result<Method, String> {
