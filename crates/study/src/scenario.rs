@@ -17,7 +17,7 @@ pub use body::{
 };
 pub use error::{Reason, ScenarioError};
 pub use literal::Literal;
-pub use resolve::{Lookup, ResolvedScenario, Setup};
+pub use resolve::{ResolvedScenario, Setup};
 
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;

@@ -67,7 +67,7 @@ impl Run {
         // The paths are absolute already.
         let setup =
             Setup { folder: Path::new(""), start, step: self.plan.algorithm.step, tables: &[] };
-        let resolved = scenario.resolve(&*self.simulation.system(), &setup)?;
+        let resolved = scenario.resolve(self.simulation.system(), &setup)?;
         self.simulation.change_scenario(resolved.scenario)?;
         if let Some(recorder) = &mut self.recorder {
             recorder.follow(&self.simulation);

@@ -6,7 +6,7 @@ use serde_spanned::Spanned;
 use super::convert::Conversion;
 use super::literal::fits_integer;
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
-use super::signals::conversion;
+use super::signals::{conversion, unfit};
 use super::{
     Delay, Dropout, FaultEntry, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
 };
@@ -71,7 +71,7 @@ impl<'a> Resolver<'a> {
             None => (None, stated.trim()),
         };
         let target = self.target(input)?;
-        let source_port = self.names.source(target.port);
+        let source_port = self.system.source(target.port).map(|connection| connection.from);
         if source_port.is_none() && self.driver(target.port).is_none() {
             let description = match target.variable.causality {
                 Causality::Input => "an input without a source",
@@ -81,16 +81,12 @@ impl<'a> Resolver<'a> {
             return Err(Reason::NoConnection { name: target.name, actual: description });
         }
         if let Some(source) = source {
-            let stated_source = self.names.port(source)?;
+            let stated_source = self.system.port(source)?;
             if source_port != Some(stated_source) {
-                let description =
-                    source_port.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
-                let stated = self.names.name(stated_source);
-                return Err(Reason::OtherSource {
-                    target: target.name,
-                    actual: description,
-                    stated,
-                });
+                let description = source_port
+                    .map_or_else(|| "a signal".to_owned(), |port| self.system.name(port));
+                let (target, stated) = (target.name, self.system.name(stated_source));
+                return Err(Reason::OtherSource { target, actual: description, stated });
             }
         }
         Ok(target)
@@ -183,8 +179,7 @@ impl Reader<'_> {
         if fits {
             return Ok(());
         }
-        let kind = self.target.variable.kind.element();
-        Err(Reason::Unfit { what, name: self.target.name.clone(), kind, expected })
+        Err(unfit(what, &self.target, expected))
     }
 
     /// Checks that a number is an integer if the input is not a Real.
@@ -197,13 +192,9 @@ impl Reader<'_> {
     /// Converts a value to the type of the input.
     fn value(&self, value: Option<&Literal>, unit: Conversion) -> Result<Option<f64>, Reason> {
         let Some(value) = value else { return Ok(None) };
-        let refused = |expected| Reason::Value {
-            name: self.target.name.clone(),
-            actual: value.to_string(),
-            expected,
-        };
         let number = value.number(self.target.variable, self.target.description);
-        Ok(Some(unit.absolute(number.map_err(refused)?)))
+        let number = number.map_err(|expected| self.target.refused(value, expected))?;
+        Ok(Some(unit.absolute(number)))
     }
 
     fn draw(&self, seed: u64, every: Option<f64>) -> Result<RandomSeries, Reason> {

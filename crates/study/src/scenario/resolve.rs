@@ -10,48 +10,10 @@ use fmu_description::{
 };
 use serde_spanned::Spanned;
 
-use super::{Reason, Scenario, ScenarioError};
+use super::{Literal, Reason, Scenario, ScenarioError};
 use crate::table::{self, Table};
-use master::SystemError;
 use master::drive::{Drive, DriveKind, DriveSource, Drives};
 use master::{Port, System};
-
-/// The information about a system that a scenario needs.
-pub trait Lookup {
-    /// Returns the port of the variable `name`, in the form `slave.variable`.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if there is no such variable.
-    fn port(&self, name: &str) -> Result<Port, SystemError>;
-
-    /// Returns the name `slave.variable` of a port.
-    fn name(&self, port: Port) -> String;
-
-    /// Returns the model description of a slave.
-    fn description(&self, slave: usize) -> &ModelDescription;
-
-    /// Returns the output that is connected to an input.
-    fn source(&self, input: Port) -> Option<Port>;
-}
-
-impl Lookup for System {
-    fn port(&self, name: &str) -> Result<Port, SystemError> {
-        System::port(self, name)
-    }
-
-    fn name(&self, port: Port) -> String {
-        System::name(self, port)
-    }
-
-    fn description(&self, slave: usize) -> &ModelDescription {
-        self.slaves[slave].1.description()
-    }
-
-    fn source(&self, input: Port) -> Option<Port> {
-        System::source(self, input).map(|connection| connection.from)
-    }
-}
 
 /// Settings of the run that a scenario needs.
 #[derive(Clone, Copy, Debug)]
@@ -83,11 +45,11 @@ impl Scenario {
     /// Returns [`ScenarioError`] for the first invalid entry, with its location.
     pub fn resolve(
         &self,
-        names: &dyn Lookup,
+        system: &System,
         setup: &Setup<'_>,
     ) -> Result<ResolvedScenario, ScenarioError> {
         let mut resolver = Resolver {
-            names,
+            system,
             setup: *setup,
             files: HashMap::new(),
             drives: Vec::new(),
@@ -118,7 +80,7 @@ pub(super) fn at<T>(entry: &Spanned<T>, path: &str) -> impl FnOnce(Reason) -> Sc
 
 /// The state of the resolution.
 pub(super) struct Resolver<'a> {
-    pub(super) names: &'a dyn Lookup,
+    pub(super) system: &'a System,
     pub(super) setup: Setup<'a>,
     files: HashMap<PathBuf, Rc<Table>>,
     /// The drives, each with the path of its entry.
@@ -145,16 +107,22 @@ impl Target<'_> {
     pub(super) fn is_real(&self) -> bool {
         self.variable.kind.as_real().is_some()
     }
+
+    /// Returns the error for a value that is not the `expected` one.
+    pub(super) fn refused(&self, value: &Literal, expected: impl Into<String>) -> Reason {
+        let (name, actual) = (self.name.clone(), value.to_string());
+        Reason::Value { name, actual, expected: expected.into() }
+    }
 }
 
 impl<'a> Resolver<'a> {
     /// Returns the variable called `name`.
     pub(super) fn target(&self, name: &str) -> Result<Target<'a>, Reason> {
-        let names = self.names;
-        let port = names.port(name)?;
-        let description = names.description(port.slave);
-        let variable = &description.variables[port.variable];
-        Ok(Target { port, name: names.name(port), variable, description })
+        let system = self.system;
+        let port = system.port(name)?;
+        let (name, variable) = (system.name(port), system.variable(port));
+        let description = system.slaves[port.slave].1.description();
+        Ok(Target { port, name, variable, description })
     }
 
     /// Returns the variable called `name` if it can be driven and no other entry drives it.
@@ -175,8 +143,8 @@ impl<'a> Resolver<'a> {
             let description = "a clock that ticks by itself".to_owned();
             return Err(Reason::NotSettable { name: target.name, actual: description });
         }
-        if let Some(source) = self.names.source(target.port) {
-            let source_name = self.names.name(source);
+        if let Some(connection) = self.system.source(target.port) {
+            let source_name = self.system.name(connection.from);
             return Err(Reason::Connected { name: target.name, source_name });
         }
         Ok(target)

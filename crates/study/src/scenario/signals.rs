@@ -11,10 +11,9 @@ use super::literal::{Literal, fits_integer, integers};
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
 use super::{Csv, Ramp, Reason, ScenarioError, SetEntry, SignalEntry, Sine, TableEntry};
 use crate::table::Table;
-use master::Port;
-use master::SystemError;
 use master::drive::DriveSource;
 use master::signal::{Interpolation, Signal, Track};
+use master::{Port, SystemError};
 
 /// Kinds of a signal.
 const KINDS: &str = "constant, steps, points, ramp, sine, csv";
@@ -163,7 +162,7 @@ fn some(names: &[String]) -> String {
     format!("{}{more}", names[..names.len().min(MOST_NAMES)].join(", "))
 }
 
-fn unfit(what: &'static str, target: &Target<'_>, expected: &'static str) -> Reason {
+pub(super) fn unfit(what: &'static str, target: &Target<'_>, expected: &'static str) -> Reason {
     let kind = target.variable.kind.element();
     Reason::Unfit { what, name: target.name.clone(), kind, expected }
 }
@@ -184,19 +183,15 @@ fn encode(
     conversion: Conversion,
     texts: &mut Vec<String>,
 ) -> Result<f64, Reason> {
-    let refused = |expected: String| Reason::Value {
-        name: target.name.clone(),
-        actual: value.to_string(),
-        expected,
-    };
     if let Kind::String(_) = target.variable.kind {
         let Literal::Text(text) = value else {
-            return Err(refused("a text in quotes".to_owned()));
+            return Err(target.refused(value, "a text in quotes"));
         };
         texts.push(text.clone());
         return Ok((texts.len() - 1) as f64);
     }
-    let number = value.number(target.variable, target.description).map_err(refused)?;
+    let number = value.number(target.variable, target.description);
+    let number = number.map_err(|expected| target.refused(value, expected))?;
     Ok(conversion.absolute(number))
 }
 
