@@ -5,12 +5,9 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use master::Slave;
-use master::System;
-use master::Transformation;
+use master::{Slave, System, Transformation};
 use ssp::structure::DefaultExperiment;
-use ssp::{self, Opened};
-use ssp::{Element, Link, Terminal};
+use ssp::{Element, Link, Opened, Terminal};
 
 use crate::assembly_options::AssemblyOptions;
 use crate::config::{ConnectionEntry, LoadedConfig, Solver};

@@ -9,7 +9,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use fmu_description::Kind;
 use fmu_description::can::{MATCHING_RULE, Operation};
-use fmu_description::terminals::Terminal;
 use master::{CallError, Slave, System};
 
 use crate::error::Error;
@@ -174,19 +173,14 @@ fn nodes(system: &System) -> Vec<Node> {
         let description = instance.description();
         for terminal in &description.terminals {
             let variable = |name: &str| {
-                let name_of_variable = member(terminal, name)?;
-                let element = format!("{name_of_variable}[1]");
-                description.variable(name_of_variable).or_else(|| description.variable(&element))
-            };
-            let is_can = |kind: &Kind| match kind {
-                Kind::Binary(binary) => {
-                    binary.mime_type.as_ref().is_some_and(|mime| mime.contains(CAN))
-                }
-                _ => false,
+                let member = terminal.members.iter().find(|member| member.name == name)?;
+                let element = format!("{}[1]", member.variable);
+                description.variable(&member.variable).or_else(|| description.variable(&element))
             };
             if let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data"))
                 && terminal.matching_rule == MATCHING_RULE
-                && is_can(&data.kind)
+                && let Kind::Binary(binary) = &data.kind
+                && binary.mime_type.as_ref().is_some_and(|mime| mime.contains(CAN))
             {
                 let (clock, reference) = (clock.value_reference, data.value_reference);
                 nodes.push(Node {
@@ -220,13 +214,4 @@ fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
         }
     }
     links
-}
-
-/// Returns the name of the variable that is the member `name` of a terminal.
-fn member<'a>(terminal: &'a Terminal, name: &str) -> Option<&'a str> {
-    terminal
-        .members
-        .iter()
-        .find(|member| member.name == name)
-        .map(|member| member.variable.as_str())
 }

@@ -1,9 +1,8 @@
 //! Chooses what a configuration leaves open: algorithm, times, interval between rows.
 
 use crate::error::Error;
-use fmu_description::DefaultExperiment;
-use fmu_description::Experiment;
 use fmu_description::number::{rounded, seconds};
+use fmu_description::{DefaultExperiment, Experiment};
 use master::{
     Algorithm, AlgorithmRequest, Coupling, Extrapolation, Method, StepControl, System,
     by_direct_dependencies, check_stop_time, choose,

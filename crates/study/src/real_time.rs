@@ -19,16 +19,13 @@ impl std::str::FromStr for RealTimeFactor {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "expected a finite number above 0, for example 2 for twice real time";
         match text.parse::<f64>() {
             Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(Self(factor)),
-            Ok(_) => {
-                Err("expected a finite number above 0, for example 2 for twice real time".into())
+            Ok(_) => Err(expected.to_owned()),
+            Err(_) => {
+                Err(format!("{expected}; to state no factor before a file, write --real-time=1"))
             }
-            Err(_) => Err(
-                "expected a finite number above 0, for example 2 for twice real time; to state no \
-                           factor before a file, write --real-time=1"
-                    .into(),
-            ),
         }
     }
 }

@@ -108,12 +108,8 @@ impl Format {
 
 fn candump(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Result<()> {
     let Frame { identifier, extended, kind, data } = frame;
-    write!(file, "({time:.6}) {} ", name(bus))?;
-    if *extended {
-        write!(file, "{identifier:08X}#")?;
-    } else {
-        write!(file, "{identifier:03X}#")?;
-    }
+    let width = if *extended { 8 } else { 3 };
+    write!(file, "({time:.6}) {} {identifier:0width$X}#", name(bus))?;
     match kind {
         FrameKind::Remote => return writeln!(file, "R"),
         FrameKind::Flexible { .. } => write!(file, "#{:X}", flags(*kind))?,
