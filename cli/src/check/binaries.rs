@@ -288,75 +288,20 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
 }
 
 /// Start of the names, in lower case, of libraries that belong to the operating system.
-const SYSTEM: [&str; 60] = [
-    "libc.so",
-    "libm.so",
-    "libpthread.so",
-    "libdl.so",
-    "librt.so",
-    "libutil.so",
-    "libgcc_s.so",
-    "ld-linux",
-    "linux-vdso",
-    "libstdc++.so",
-    "/usr/lib/",
-    "/system/",
-    "kernel32",
-    "kernelbase",
-    "ntdll",
-    "user32",
-    "advapi32",
-    "ws2_32",
-    "ole32",
-    "oleaut32",
-    "shell32",
-    "shlwapi",
-    "gdi32",
-    "comdlg32",
-    "comctl32",
-    "msvcrt.dll",
-    "bcrypt",
-    "crypt32",
-    "userenv",
-    "dbghelp",
-    "psapi",
-    "version.dll",
-    "winmm",
-    "rpcrt4",
-    "secur32",
-    "iphlpapi",
-    "setupapi",
-    "imm32",
-    "powrprof",
-    "netapi32",
-    "mpr.dll",
-    "wsock32",
-    "api-ms-win-",
-    "ext-ms-win-",
-    "ucrtbase",
-    "opengl32",
-    "normaliz",
-    "cfgmgr32",
-    "wintrust",
-    "dhcpcsvc",
-    "wininet",
-    "winhttp",
-    "winspool",
-    "wldap32",
-    "wtsapi32",
-    "urlmon",
-    "dnsapi",
-    "ncrypt",
-    "gdiplus",
-    "pdh.dll",
-];
+const SYSTEM: &str = "libc.so libm.so libpthread.so libdl.so librt.so libutil.so libgcc_s.so ld-linux \
+    linux-vdso libstdc++.so /usr/lib/ /system/ kernel32 kernelbase ntdll user32 advapi32 \
+    ws2_32 ole32 oleaut32 shell32 shlwapi gdi32 comdlg32 comctl32 msvcrt.dll bcrypt crypt32 \
+    userenv dbghelp psapi version.dll winmm rpcrt4 secur32 iphlpapi setupapi imm32 powrprof \
+    netapi32 mpr.dll wsock32 api-ms-win- ext-ms-win- ucrtbase opengl32 normaliz cfgmgr32 \
+    wintrust dhcpcsvc wininet winhttp winspool wldap32 wtsapi32 urlmon dnsapi ncrypt gdiplus \
+    pdh.dll";
 
 fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut Findings) {
     let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
     for library in file.import_libraries().into_iter().flatten().flatten() {
         let name = String::from_utf8_lossy(library.name()).into_owned();
         let lower = name.to_ascii_lowercase();
-        if SYSTEM.iter().any(|prefix| lower.starts_with(prefix)) {
+        if SYSTEM.split(' ').any(|prefix| lower.starts_with(prefix)) {
             continue;
         }
         let last = name.rsplit('/').next().unwrap_or(&name);
@@ -380,19 +325,13 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
 
 /// Reports the newest version of glibc that a library for Linux needs.
 fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
-    let mut newest: Option<(Vec<u32>, String)> = None;
-    for import in file.imports().into_iter().flatten().flatten() {
-        let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { continue };
-        let Some(text) =
-            std::str::from_utf8(version).ok().and_then(|text| text.strip_prefix("GLIBC_"))
-        else {
-            continue;
-        };
+    let versions = file.imports().into_iter().flatten().flatten().filter_map(|import| {
+        let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { return None };
+        let text = std::str::from_utf8(version).ok()?.strip_prefix("GLIBC_")?;
         let numbers: Vec<u32> = text.split('.').map_while(|part| part.parse().ok()).collect();
-        if newest.as_ref().is_none_or(|(most, _)| *most < numbers) {
-            newest = Some((numbers, text.to_owned()));
-        }
-    }
+        Some((numbers, text.to_owned()))
+    });
+    let newest = versions.reduce(|most, other| if most.0 < other.0 { other } else { most });
     if let Some((_, version)) = newest {
         let what = format!("needs glibc {version} or later");
         findings.add(Note, path, what, "It does not load on older systems.", "");

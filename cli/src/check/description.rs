@@ -24,32 +24,23 @@ const RULES: [Rule; 20] = {
     let dates = "FMPy's schema refuses some of these dates; others show what is there.";
     let validation = "fmpy.validation.validate_fmu reports it; few importers use the list.";
     let refused = "FMPy's validation refuses it.";
+    let zero = "FMPy's validation refuses it; FMI Library assumes zero.";
+    let unstated = "Importers that order FMUs by their dependencies may go wrong.";
+    let combinations = "FMPy refuses combinations that are not in the table.";
     let order = "Importers that order FMUs by their dependencies go wrong.";
     [
         rule("must be \"2.0\"", "FMPy reads 2.0 only.", &[Fmpy]),
         rule("generationDateAndTime", dates, &[]),
         rule("no C identifier", "Tools that build from the sources make C names of it.", &[]),
         rule("which is not defined", refused, &[FmpyValidation]),
-        rule(
-            "needs a start value",
-            "FMPy's validation refuses it; FMI Library assumes zero.",
-            &[FmpyValidation],
-        ),
+        rule("needs a start value", zero, &[FmpyValidation]),
         rule("has a start value, which", refused, &[FmpyValidation]),
         // FMPy treats it as the default.
         rule("initial exact is not allowed for discrete input", "", &[]),
         rule("initial exact is not allowed for continuous input", "", &[]),
         rule("is not allowed for", refused, &[FmpyValidation]),
-        rule(
-            "cannot be stated",
-            "Importers that order FMUs by their dependencies may go wrong.",
-            &[],
-        ),
-        rule(
-            "cannot be",
-            "FMPy refuses combinations that are not in the table.",
-            &[FmpyValidation],
-        ),
+        rule("cannot be stated", unstated, &[]),
+        rule("cannot be", combinations, &[FmpyValidation]),
         // FMI 3.0.
         rule("only for a float", "", &[]),
         rule("dependenciesKind", "FMI Library refuses some of these lists.", &[]),
@@ -112,11 +103,8 @@ fn notes(description: &ModelDescription, findings: &mut Findings) {
     };
     let experiment = description.default_experiment.unwrap_or_default();
     let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];
-    let absent: Vec<_> = stated
-        .iter()
-        .filter(|attribute| attribute.1.is_none())
-        .map(|attribute| attribute.0)
-        .collect();
+    let absent = stated.iter().filter(|(_, value)| value.is_none());
+    let absent: Vec<_> = absent.map(|(name, _)| *name).collect();
     if !absent.is_empty() {
         let what = format!("no {} in DefaultExperiment", absent.join(" and no "));
         let why =
