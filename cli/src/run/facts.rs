@@ -25,14 +25,11 @@ pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
         let tool = description.generation_tool.as_ref().map(|tool| format!("written by {tool}"));
         Fmu { name: name.clone(), details: [model, version].into_iter().chain(tool).collect() }
     });
+    let outputs = system.ports(Causality::Output).into_iter().map(|port| system.name(port));
     Run {
         fmus: fmus.collect(),
         connections: connections.collect(),
-        outputs: system
-            .ports(Causality::Output)
-            .into_iter()
-            .map(|port| system.name(port))
-            .collect(),
+        outputs: outputs.collect(),
         plotted: plotted.to_vec(),
         algorithm: plan.explanation(system).lines().map(without_dash).collect(),
         ..Run::default()

@@ -213,8 +213,8 @@ impl Stepper {
 
     /// Chooses the next step size (a PI controller, Gustafsson 1991) and method.
     fn accept(&mut self, size: f64, error: f64, rejected: bool) {
+        let order = self.order();
         let memory = &mut self.memory;
-        let order = if self.last_is_stiff { 4.0 } else { 5.0 };
         let error = error.max(1e-10);
         let before = if memory.error > 0.0 { memory.error } else { error };
         let target = SAFETY.powf(order);

@@ -3,8 +3,7 @@
 
 use std::collections::HashMap;
 
-use fmu_description::Experiment;
-use fmu_description::{DefaultExperiment, ModelDescription};
+use fmu_description::{DefaultExperiment, Experiment, ModelDescription};
 
 use crate::drive::{Drive, Scenario};
 use crate::error::{SystemError, call};

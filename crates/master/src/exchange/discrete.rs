@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fault::FaultChain;
 use crate::system::{Connection, Port, System};
-use slave::Transformation;
-use slave::{CallError, Slave};
+use slave::{CallError, Slave, Transformation};
 
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
