@@ -34,13 +34,31 @@ impl Integrated {
     }
 }
 
+/// Defines functions that the instance performs.
+macro_rules! forward {
+    ($($name:ident($($argument:ident: $kind:ty),*);)*) => {
+        $(fn $name(&mut self, $($argument: $kind),*) -> Result<(), CallError> {
+            self.instance.$name($($argument),*)
+        })*
+    };
+}
+
 impl Slave for Integrated {
     fn description(&self) -> &ModelDescription {
         &self.description
     }
 
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.instance.set_debug_logging(on)
+    forward! {
+        set_debug_logging(on: bool);
+        enter_initialization_mode();
+        terminate();
+        free();
+        get_real(references: &[u32], values: &mut [f64]);
+        get_integer(references: &[u32], values: &mut [i64]);
+        get_boolean(references: &[u32], values: &mut [i32]);
+        get_string(references: &[u32], values: &mut [String]);
+        get_binary(references: &[u32], values: &mut [Vec<u8>]);
+        directional_derivative(unknowns: &[u32], knowns: &[u32], seed: &[f64], changes: &mut [f64]);
     }
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
@@ -56,10 +74,6 @@ impl Slave for Integrated {
         self.instance.setup_experiment(experiment)
     }
 
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.instance.enter_initialization_mode()
-    }
-
     /// Also iterates the first event and enters continuous-time mode, unless the master handles the events.
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         self.instance.exit_initialization_mode()?;
@@ -67,18 +81,6 @@ impl Slave for Integrated {
         self.allocate()?;
         self.inputs.read(self.instance.as_mut(), self.point.time)?;
         if self.hands_over { Ok(()) } else { self.settle() }
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
-        self.instance.terminate()
-    }
-
-    fn free(&mut self) -> Result<(), CallError> {
-        self.instance.free()
-    }
-
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        self.instance.get_real(references, values)
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
@@ -96,10 +98,6 @@ impl Slave for Integrated {
         self.instance.set_real(references, values)
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        self.instance.get_integer(references, values)
-    }
-
     fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         if self.point.mode != Mode::Setup {
             self.integers.resize(references.len(), 0);
@@ -110,10 +108,6 @@ impl Slave for Integrated {
             self.enter_event()?;
         }
         self.instance.set_integer(references, values)
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.instance.get_boolean(references, values)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
@@ -134,10 +128,6 @@ impl Slave for Integrated {
         self.instance.set_boolean(references, values)
     }
 
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        self.instance.get_string(references, values)
-    }
-
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         if self.point.mode != Mode::Setup {
             let mut known = vec![String::new(); references.len()];
@@ -147,10 +137,6 @@ impl Slave for Integrated {
             self.enter_event()?;
         }
         self.instance.set_string(references, values)
-    }
-
-    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        self.instance.get_binary(references, values)
     }
 
     fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
@@ -182,16 +168,6 @@ impl Slave for Integrated {
         }
         self.instance.begin_communication_step();
         self.integrate(time + size, never_back)
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        changes: &mut [f64],
-    ) -> Result<(), CallError> {
-        self.instance.directional_derivative(unknowns, knowns, seed, changes)
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
