@@ -114,12 +114,7 @@ impl Grid {
 
     /// Returns the early end of the run if some slaves take equal steps only; `None`: the run ends
     /// at the stop time.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "2^53 steps take longer than anyone waits"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     fn last_whole_step(&self, system: &System, multiples: &[u32], stop: f64) -> Option<EarlyEnd> {
         let rigid = || {
             let all = system.slaves.iter().zip(multiples);
@@ -136,7 +131,7 @@ impl Grid {
         Some(EarlyEnd {
             slave: name.clone(),
             step: f64::from(multiple) * self.step,
-            end: self.start + whole as f64 * self.step,
+            end: self.point(whole),
             stop,
         })
     }
@@ -164,12 +159,18 @@ impl Grid {
         self.limited(self.time + size, size)
     }
 
-    /// Returns the first grid point after `time`, in s; both may be beyond the stop time.
+    /// Returns the grid point `t_start + number H`, in s.
+    #[inline]
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    fn point(&self, number: u64) -> f64 {
+        self.start + number as f64 * self.step
+    }
+
+    /// Returns the first grid point after `time`, in s; both may be beyond the stop time.
     pub(crate) fn point_after(&self, time: f64) -> f64 {
         let mut count = self.count + 1;
         loop {
-            let point = self.start + count as f64 * self.step;
+            let point = self.point(count);
             if !reached(time, point) {
                 return point;
             }
@@ -195,12 +196,10 @@ impl Grid {
 
     /// Returns the size of the step from `time` of a slave whose step covers `multiple`
     /// communication steps. The step ends at the next grid point whose number is a multiple.
-    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     pub(crate) fn size_of(&self, multiple: u32, time: f64) -> f64 {
         let multiple = u64::from(multiple);
         let number = (self.count / multiple + 1) * multiple;
-        let end = self.start + number as f64 * self.step;
-        size_between(time, self.limited(end, self.step))
+        size_between(time, self.limited(self.point(number), self.step))
     }
 
     /// Records the completion of a step to `end`, on the grid or not.
@@ -212,10 +211,8 @@ impl Grid {
         self.time = end;
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     fn set_count(&mut self, count: u64) {
-        let point = |count: u64| self.start + count as f64 * self.step;
-        (self.count, self.points) = (count, (point(count), point(count + 1)));
+        (self.count, self.points) = (count, (self.point(count), self.point(count + 1)));
     }
 
     /// Resumes at `time` after `count` grid points. The end of the first run may have been counted
