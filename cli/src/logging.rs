@@ -11,7 +11,7 @@ use study::LogFields;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::format::Writer;
-use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 
@@ -27,7 +27,7 @@ pub(crate) fn start(verbose: u8, json: bool) {
         1 => LevelFilter::INFO,
         _ => LevelFilter::TRACE,
     };
-    let text = tracing_subscriber::fmt::layer().with_writer(StandardError);
+    let text = tracing_subscriber::fmt::layer().with_writer(|| StandardError);
     let registry = tracing_subscriber::registry().with(level).with(Collector);
     // A second call keeps the existing subscriber.
     let _ = if json {
@@ -123,14 +123,6 @@ impl Write for StandardError {
 
     fn flush(&mut self) -> io::Result<()> {
         io::stderr().flush()
-    }
-}
-
-impl MakeWriter<'_> for StandardError {
-    type Writer = Self;
-
-    fn make_writer(&self) -> Self {
-        Self
     }
 }
 

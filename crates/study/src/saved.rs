@@ -72,9 +72,9 @@ impl SavedRun {
             )));
         }
         postcard::from_bytes(content).map_err(|error| {
-            let what =
-                format!("{shown}: expected a checkpoint of this version of aso-ftc: {error}");
-            Error::Invalid(what)
+            Error::Invalid(format!(
+                "{shown}: expected a checkpoint of this version of aso-ftc: {error}"
+            ))
         })
     }
 

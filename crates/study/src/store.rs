@@ -66,10 +66,8 @@ impl Store {
         }
         let content = open()?;
         if content.is_reusable() {
-            let stale = |stored: &FmuKey| {
-                stored.isolated == isolated && stored.stamp.path == key.stamp.path
-            };
-            fmus.retain(|stored, _| !stale(stored));
+            let path = &key.stamp.path;
+            fmus.retain(|stored, _| stored.isolated != isolated || stored.stamp.path != *path);
             fmus.insert(key, content.clone());
         }
         Ok(content)
