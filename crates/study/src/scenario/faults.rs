@@ -5,7 +5,7 @@ use serde_spanned::Spanned;
 
 use super::convert::Conversion;
 use super::literal::fits_integer;
-use super::resolve::{Resolver, Target, at, finite, only, positive, require};
+use super::resolve::{Resolver, Target, at, finite, kinds, only, positive, require};
 use super::signals::{conversion, unfit};
 use super::{
     Delay, Dropout, FaultEntry, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
@@ -103,18 +103,8 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn fault(&self, entry: &FaultEntry) -> Result<(Window, Fault), Reason> {
-        let kinds = [
-            ("bias", entry.bias.is_some()),
-            ("gain", entry.gain.is_some()),
-            ("drift", entry.drift.is_some()),
-            ("stuck", entry.stuck.is_some()),
-            ("dropout", entry.dropout.is_some()),
-            ("delay", entry.delay.is_some()),
-            ("quantisation", entry.quantisation.is_some()),
-            ("saturation", entry.saturation.is_some()),
-            ("noise", entry.noise.is_some()),
-            ("inversion", entry.inversion.is_some()),
-        ];
+        let kinds = kinds!(entry: bias, gain, drift, stuck, dropout, delay, quantisation, saturation,
+            noise, inversion);
         self.expect_fit(only(&kinds, KINDS)?)?;
         let unit = conversion(entry.unit.as_ref(), &self.target)?;
         let (window, fault) = self.body(entry, unit)?;
@@ -127,41 +117,28 @@ impl Reader<'_> {
     }
 
     fn body(&self, entry: &FaultEntry, unit: Conversion) -> Result<(Window, Fault), Reason> {
-        let start = self.start;
-        if let Some(bias) = entry.bias.as_ref().map(Spanned::get_ref) {
+        /// Returns the window and the fault if the entry is of this kind.
+        macro_rules! of {
+            ($kind:ident => $fault:expr) => {
+                if let Some($kind) = entry.$kind.as_ref().map(Spanned::get_ref) {
+                    return Ok(($kind.window(self.start), $fault));
+                }
+            };
+        }
+        of!(bias => {
             let value = unit.relative(finite("value", bias.value)?);
-            return Ok((bias.window(start), Fault::Bias(self.whole("value", value)?)));
-        }
-        if let Some(gain) = entry.gain.as_ref().map(Spanned::get_ref) {
-            return Ok((gain.window(start), Fault::Gain(finite("factor", gain.factor)?)));
-        }
-        if let Some(drift) = entry.drift.as_ref().map(Spanned::get_ref) {
-            let rate = unit.relative(finite("rate", drift.rate)?);
-            return Ok((drift.window(start), Fault::Drift(rate)));
-        }
-        if let Some(stuck) = entry.stuck.as_ref().map(Spanned::get_ref) {
-            let value = self.value(stuck.value.as_ref(), unit)?;
-            return Ok((stuck.window(start), Fault::Stuck(value)));
-        }
-        if let Some(dropout) = entry.dropout.as_ref().map(Spanned::get_ref) {
-            return Ok((dropout.window(start), self.dropout(dropout, unit)?));
-        }
-        if let Some(delay) = entry.delay.as_ref().map(Spanned::get_ref) {
-            return Ok((delay.window(start), self.delay(delay, unit)?));
-        }
-        if let Some(quantisation) = entry.quantisation.as_ref().map(Spanned::get_ref) {
-            return Ok((quantisation.window(start), levels(quantisation, unit)?));
-        }
-        if let Some(saturation) = entry.saturation.as_ref().map(Spanned::get_ref) {
-            return Ok((saturation.window(start), self.saturation(saturation, unit)?));
-        }
-        if let Some(noise) = entry.noise.as_ref().map(Spanned::get_ref) {
-            return Ok((noise.window(start), self.noise(noise, unit)?));
-        }
-        match entry.inversion.as_ref().map(Spanned::get_ref) {
-            Some(inversion) => Ok((inversion.window(start), Fault::Inversion)),
-            None => Err(Reason::Kinds { actual: Vec::new(), expected: KINDS }),
-        }
+            Fault::Bias(self.whole("value", value)?)
+        });
+        of!(gain => Fault::Gain(finite("factor", gain.factor)?));
+        of!(drift => Fault::Drift(unit.relative(finite("rate", drift.rate)?)));
+        of!(stuck => Fault::Stuck(self.value(stuck.value.as_ref(), unit)?));
+        of!(dropout => self.dropout(dropout, unit)?);
+        of!(delay => self.delay(delay, unit)?);
+        of!(quantisation => levels(quantisation, unit)?);
+        of!(saturation => self.saturation(saturation, unit)?);
+        of!(noise => self.noise(noise, unit)?);
+        of!(inversion => Fault::Inversion);
+        Err(Reason::Kinds { actual: Vec::new(), expected: KINDS })
     }
 
     /// Checks that a kind of fault fits the type of the input.

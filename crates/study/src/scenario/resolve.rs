@@ -220,6 +220,12 @@ pub(super) fn require(
     if holds { Ok(number) } else { Err(Reason::Number { what, actual: number, expected }) }
 }
 
+/// The kinds that an entry can have, each with whether it has it.
+macro_rules! kinds {
+    ($entry:ident: $($kind:ident),*) => { [$((stringify!($kind), $entry.$kind.is_some())),*] };
+}
+pub(super) use kinds;
+
 /// Returns the only kind of an entry, or an error if there are none or several.
 pub(super) fn only(
     kinds: &[(&'static str, bool)],

@@ -8,7 +8,7 @@ use serde_spanned::Spanned;
 
 use super::convert::Conversion;
 use super::literal::{Literal, fits_integer, integers};
-use super::resolve::{Resolver, Target, at, finite, only, positive, require};
+use super::resolve::{Resolver, Target, at, finite, kinds, only, positive, require};
 use super::{Csv, Ramp, Reason, ScenarioError, SetEntry, SignalEntry, Sine, TableEntry};
 use crate::table::Table;
 use master::drive::DriveSource;
@@ -65,15 +65,7 @@ impl<'a> Resolver<'a> {
     /// Resolves an entry of `[[scenario.signal]]`.
     pub(super) fn signal(&mut self, entry: &SignalEntry, path: &str) -> Result<(), Reason> {
         let target = self.free(entry.variable.get_ref())?;
-        let kinds = [
-            ("constant", entry.constant.is_some()),
-            ("steps", entry.steps.is_some()),
-            ("points", entry.points.is_some()),
-            ("ramp", entry.ramp.is_some()),
-            ("sine", entry.sine.is_some()),
-            ("csv", entry.csv.is_some()),
-        ];
-        let kind = only(&kinds, KINDS)?;
+        let kind = only(&kinds!(entry: constant, steps, points, ramp, sine, csv), KINDS)?;
         if ["points", "ramp", "sine"].contains(&kind) && !target.is_real() {
             return Err(unfit(kind, &target, "constant, steps or csv"));
         }
