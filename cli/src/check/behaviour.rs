@@ -406,10 +406,8 @@ impl<S: Slave> Trial<'_, S> {
         }
         let serialize = flags.can_serialize_fmu_state;
         let Some(mut slave) = self.initialized("states", None, None) else { return };
-        if self
-            .steps(&mut slave, 0, STEPS)
-            .is_none_or(|trajectory| trajectory.len() <= STEPS as usize)
-        {
+        let before = self.steps(&mut slave, 0, STEPS);
+        if before.is_none_or(|trajectory| trajectory.len() <= STEPS as usize) {
             return;
         }
         if let Err(error) = slave.save_state(0) {

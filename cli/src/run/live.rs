@@ -81,14 +81,10 @@ impl Live {
         let unrecorded = settable.iter().filter(|port| !ports.contains(port));
         let probe = probe(run, &ports.iter().chain(unrecorded).copied().collect::<Vec<_>>())?;
         let system = run.simulation.system();
+        let names: Vec<_> = system.slaves.iter().map(|(name, _)| name.as_str()).collect();
         let facts = Facts {
             subject: Subject::Run,
-            system: system
-                .slaves
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect::<Vec<_>>()
-                .join(", "),
+            system: names.join(", "),
             start: begin,
             stop,
             pace,

@@ -431,16 +431,13 @@ impl Options {
                  or an .fmu",
                 path.display()
             ),
-            [_, _, ..] => bail!(
-                "expected one system or any number of FMUs, found {}; --fmu NAME=FMU adds \
-                 an FMU to a system",
-                self.system
-                    .inputs
-                    .iter()
-                    .map(|path| path.display().to_string())
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
+            several @ [_, _, ..] => {
+                let paths: Vec<_> = several.iter().map(|path| path.display().to_string()).collect();
+                bail!(
+                    "expected one system or any number of FMUs, found {}; --fmu NAME=FMU adds an FMU to a system",
+                    paths.join(", ")
+                )
+            }
             [] if self.system.fmus.is_empty() => {
                 let stated = [&self.system.plant, &self.system.controller];
                 for ((name, file), stated) in models::FMUS.into_iter().zip(stated) {
