@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{SystemError, call};
+use crate::error::{SystemError, call, contradiction};
 use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, near, reached};
 use crate::system::{Port, System};
@@ -149,16 +149,6 @@ pub struct DriveSource {
 pub struct DriveState {
     faults: Option<FaultChain>,
     accepted: Option<Sample>,
-}
-
-/// Error: a checkpoint and a scenario have different numbers of driven variables.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the checkpoint is of {actual} driven variables, expected {expected} as in the scenario")]
-pub struct CheckpointError {
-    /// Number of driven variables in the scenario.
-    pub expected: usize,
-    /// Number of driven variables in the checkpoint.
-    pub actual: usize,
 }
 
 /// All driven variables of a system. Only the constructor allocates.
@@ -394,9 +384,12 @@ impl Drives {
     /// # Errors
     ///
     /// Returns an error if the checkpoint has another number of driven variables.
-    pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), CheckpointError> {
-        if state.len() != self.all.len() {
-            return Err(CheckpointError { expected: self.all.len(), actual: state.len() });
+    pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), SystemError> {
+        let (expected, actual) = (self.all.len(), state.len());
+        if actual != expected {
+            return Err(contradiction(format!(
+                "the checkpoint is of {actual} driven variables, expected {expected} as in the scenario"
+            )));
         }
         for (drive, DriveState { faults, accepted }) in self.all.iter_mut().zip(state) {
             drive.faults = faults;

@@ -201,10 +201,7 @@ impl Simulation {
         for (fault, saved) in self.engine.exchange.faults().zip(&checkpoint.faults) {
             fault.clone_from(saved);
         }
-        self.engine
-            .drives
-            .restore(checkpoint.drives.clone())
-            .map_err(|error| contradiction(error.to_string()))?;
+        self.engine.drives.restore(checkpoint.drives.clone())?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
         let (system, time) = (&mut self.engine.system, checkpoint.time);
         self.engine.instants.restore(system, &checkpoint.pending, time)?;
