@@ -40,12 +40,9 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
 /// Returns `algorithm`, without iteration if the iteration was chosen by default and the state of
 /// an FMU cannot be restored.
 pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
-    let mut confirmed = algorithm.clone();
-    let optional = algorithm.fallback
-        && algorithm.coupling != Coupling::Once
-        && !Algorithm { coupling: Coupling::Once, ..algorithm.clone() }.repeats();
-    if !optional {
-        return confirmed;
+    let once = Algorithm { coupling: Coupling::Once, ..algorithm.clone() };
+    if !algorithm.fallback || algorithm.coupling == Coupling::Once || once.repeats() {
+        return algorithm.clone();
     }
     for (name, slave) in &mut system.slaves {
         let done = slave.save_state(0).and_then(|()| slave.restore_state(0));
@@ -53,9 +50,8 @@ pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Al
             tracing::warn!(
                 "{name}: {error}, although its canGetAndSetFMUstate is true; steps are not iterated"
             );
-            confirmed.coupling = Coupling::Once;
-            break;
+            return once;
         }
     }
-    confirmed
+    algorithm.clone()
 }

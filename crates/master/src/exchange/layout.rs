@@ -3,8 +3,6 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use fmu_description::Kind;
-
 use crate::algorithm::{Algorithm, Extrapolation};
 use crate::order::Rows;
 use crate::signal_type::{SignalType, Way};
@@ -142,7 +140,7 @@ impl Layout {
             if self.indices.insert(from, 0).is_some() {
                 continue;
             }
-            if is_real(&system.variable(from).kind) {
+            if ValueType::of(&system.variable(from).kind) == ValueType::Real {
                 by_slave[from.slave].push(from);
             } else {
                 integers.push(from);
@@ -235,25 +233,21 @@ impl Layout {
     fn place_derivatives(&mut self) {
         for port_map in &mut self.port_maps {
             let start = self.output_derivatives;
-            for order in 1..=port_map.output_order {
+            let places = [(1, &mut self.slopes), (2, &mut self.curvatures)];
+            for (order, places) in places.into_iter().take(port_map.output_order) {
                 for output in port_map.output_range.clone() {
-                    let places = if order == 1 { &mut self.slopes } else { &mut self.curvatures };
                     places[output] = Some(index(self.output_derivatives));
                     self.output_derivatives += 1;
                 }
                 port_map.derived_outputs.extend(&port_map.outputs);
-                port_map
-                    .output_orders
-                    .extend(port_map.outputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+                port_map.output_orders.extend(port_map.outputs.iter().map(|_| order));
             }
             port_map.output_derivative_range = start..self.output_derivatives;
             let start = self.input_derivatives;
-            for order in 1..=port_map.input_order {
+            for order in [1, 2].into_iter().take(port_map.input_order) {
                 self.input_derivatives += port_map.inputs.len();
                 port_map.derived_inputs.extend(&port_map.inputs);
-                port_map
-                    .input_orders
-                    .extend(port_map.inputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+                port_map.input_orders.extend(port_map.inputs.iter().map(|_| order));
             }
             port_map.input_derivative_range = start..self.input_derivatives;
         }
@@ -263,11 +257,6 @@ impl Layout {
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }
-}
-
-/// Whether the values of a variable are Reals.
-fn is_real(kind: &Kind) -> bool {
-    ValueType::of(kind) == ValueType::Real
 }
 
 /// Converts a position to an index; systems have fewer than 2^32 variables.
