@@ -23,11 +23,9 @@ impl Content {
     /// Whether several runs of a process can use it.
     pub(crate) fn is_reusable(&self) -> bool {
         let description = self.description();
-        let simulation = description.stepped();
-        let exchange = description.model_exchange.as_ref();
-        let once = simulation
-            .is_some_and(|simulation| simulation.can_be_instantiated_only_once_per_process)
-            || exchange.is_some_and(|exchange| exchange.can_be_instantiated_only_once_per_process);
+        let (simulation, exchange) = (description.stepped(), description.model_exchange.as_ref());
+        let once = simulation.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process)
+            || exchange.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
         !once || matches!(self, Content::Isolated(_))
     }
 }

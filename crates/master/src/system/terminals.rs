@@ -188,13 +188,11 @@ impl System {
     pub(super) fn is_clock_of_time(&self, from: Port, to: Port) -> bool {
         let (source, target) = (self.variable(from), self.variable(to));
         let inputs = source.causality == Causality::Input && target.causality == Causality::Input;
-        let triggered = |kind: &Kind| match kind {
-            Kind::Clock(clock) => {
-                Some(clock.interval_variability == IntervalVariability::Triggered)
-            }
-            _ => None,
+        let (Kind::Clock(first), Kind::Clock(second)) = (&source.kind, &target.kind) else {
+            return false;
         };
-        inputs && triggered(&source.kind) == Some(false) && triggered(&target.kind) == Some(true)
+        let variabilities = [first, second].map(|clock| clock.interval_variability);
+        inputs && variabilities.map(|one| one == IntervalVariability::Triggered) == [false, true]
     }
 }
 
