@@ -3,24 +3,59 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// `fmi2Component`.
-pub type fmi2Component = *mut c_void;
-/// `fmi2ComponentEnvironment`.
-pub type fmi2ComponentEnvironment = *mut c_void;
-/// `fmi2FMUstate`.
-pub type fmi2FMUstate = *mut c_void;
-/// `fmi2ValueReference`.
-pub type fmi2ValueReference = u32;
-/// `fmi2Real`.
-pub type fmi2Real = f64;
-/// `fmi2Integer`.
-pub type fmi2Integer = c_int;
+/// Declares types that have no documentation but their names.
+macro_rules! c_types {
+    ($($name:ident = $type:ty;)*) => {
+        $(#[doc = concat!("`", stringify!($name), "`.")] pub type $name = $type;)*
+    };
+}
+pub(crate) use c_types;
+
+/// Declares an enumeration of a header. The names of its values have a prefix there.
+macro_rules! c_enumeration {
+    ($(#[$meta:meta])* $name:ident: $type:ty, $prefix:literal { $($variant:ident = $value:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[repr(i32)]
+        pub enum $name {
+            $(#[doc = concat!("`", $prefix, stringify!($variant), "`.")] $variant = $value,)*
+        }
+
+        impl $name {
+            /// Converts a C value; `None` if the header does not have it.
+            #[must_use]
+            pub fn from_c(value: $type) -> Option<Self> {
+                match value {
+                    $($value => Some(Self::$variant),)*
+                    _ => None,
+                }
+            }
+
+            /// Returns the name in the C header.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => concat!($prefix, stringify!($variant)),)*
+                }
+            }
+        }
+    };
+}
+pub(crate) use c_enumeration;
+
+c_types! {
+    fmi2Component = *mut c_void;
+    fmi2ComponentEnvironment = *mut c_void;
+    fmi2FMUstate = *mut c_void;
+    fmi2ValueReference = u32;
+    fmi2Real = f64;
+    fmi2Integer = c_int;
+    fmi2Byte = c_char;
+}
 /// `fmi2Boolean`: zero is false, anything else true.
 pub type fmi2Boolean = c_int;
 /// `fmi2String`: zero-terminated UTF-8.
 pub type fmi2String = *const c_char;
-/// `fmi2Byte`.
-pub type fmi2Byte = c_char;
 /// `fmi2Status` as an integer; see [`Status`].
 pub type fmi2Status = c_int;
 /// `fmi2Type`: 0 model exchange, 1 co-simulation.
@@ -37,60 +72,16 @@ pub const TYPES_PLATFORM: &std::ffi::CStr = c"default";
 /// `fmi2GetVersion`.
 pub const VERSION: &std::ffi::CStr = c"2.0";
 
-/// The values of `fmi2Status` (section 2.1.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(i32)]
-pub enum Status {
-    /// `fmi2OK`.
-    OK = 0,
-    /// `fmi2Warning`.
-    Warning = 1,
-    /// `fmi2Discard`.
-    Discard = 2,
-    /// `fmi2Error`.
-    Error = 3,
-    /// `fmi2Fatal`.
-    Fatal = 4,
-    /// `fmi2Pending`.
-    Pending = 5,
+c_enumeration! {
+    /// The values of `fmi2Status` (section 2.1.3).
+    Status: fmi2Status, "fmi2" { OK = 0, Warning = 1, Discard = 2, Error = 3, Fatal = 4, Pending = 5, }
 }
 
-impl Status {
-    /// Converts a C value to a status; `None` if it is no `fmi2Status`.
-    #[must_use]
-    pub fn from_c(status: fmi2Status) -> Option<Self> {
-        use Status::{Discard, Error, Fatal, OK, Pending, Warning};
-        [OK, Warning, Discard, Error, Fatal, Pending]
-            .into_iter()
-            .find(|known| *known as fmi2Status == status)
+c_enumeration! {
+    /// The values of `fmi2StatusKind` (section 4.2.3).
+    StatusKind: fmi2StatusKind, "fmi2" {
+        DoStepStatus = 0, PendingStatus = 1, LastSuccessfulTime = 2, Terminated = 3,
     }
-
-    /// Returns the name in the C header.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::OK => "fmi2OK",
-            Status::Warning => "fmi2Warning",
-            Status::Discard => "fmi2Discard",
-            Status::Error => "fmi2Error",
-            Status::Fatal => "fmi2Fatal",
-            Status::Pending => "fmi2Pending",
-        }
-    }
-}
-
-/// The values of `fmi2StatusKind` (section 4.2.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i32)]
-pub enum StatusKind {
-    /// `fmi2DoStepStatus`.
-    DoStepStatus = 0,
-    /// `fmi2PendingStatus`.
-    PendingStatus = 1,
-    /// `fmi2LastSuccessfulTime`.
-    LastSuccessfulTime = 2,
-    /// `fmi2Terminated`.
-    Terminated = 3,
 }
 
 /// `fmi2EventInfo`.

@@ -4,51 +4,35 @@
 //! 0 nor 1 would not be a valid `bool`. Both are passed in the same way by the C ABIs of all platforms.
 #![expect(non_camel_case_types, reason = "the names of the C headers")]
 
-mod functions;
-
 use std::ffi::{c_char, c_int, c_void};
 
-pub use functions::*;
+use crate::abi::{c_enumeration, c_types};
 
-/// `fmi3Instance`.
-pub type fmi3Instance = *mut c_void;
-/// `fmi3InstanceEnvironment`.
-pub type fmi3InstanceEnvironment = *mut c_void;
-/// `fmi3FMUState`.
-pub type fmi3FMUState = *mut c_void;
-/// `fmi3ValueReference`.
-pub type fmi3ValueReference = u32;
-/// `fmi3Float32`.
-pub type fmi3Float32 = f32;
-/// `fmi3Float64`.
-pub type fmi3Float64 = f64;
-/// `fmi3Int8`.
-pub type fmi3Int8 = i8;
-/// `fmi3UInt8`.
-pub type fmi3UInt8 = u8;
-/// `fmi3Int16`.
-pub type fmi3Int16 = i16;
-/// `fmi3UInt16`.
-pub type fmi3UInt16 = u16;
-/// `fmi3Int32`.
-pub type fmi3Int32 = i32;
-/// `fmi3UInt32`.
-pub type fmi3UInt32 = u32;
-/// `fmi3Int64`.
-pub type fmi3Int64 = i64;
-/// `fmi3UInt64`.
-pub type fmi3UInt64 = u64;
-/// `fmi3Boolean`: [`FALSE`] or [`TRUE`].
+c_types! {
+    fmi3Instance = *mut c_void;
+    fmi3InstanceEnvironment = *mut c_void;
+    fmi3FMUState = *mut c_void;
+    fmi3ValueReference = u32;
+    fmi3Float32 = f32;
+    fmi3Float64 = f64;
+    fmi3Int8 = i8;
+    fmi3UInt8 = u8;
+    fmi3Int16 = i16;
+    fmi3UInt16 = u16;
+    fmi3Int32 = i32;
+    fmi3UInt32 = u32;
+    fmi3Int64 = i64;
+    fmi3UInt64 = u64;
+    fmi3Char = c_char;
+    fmi3Byte = u8;
+}
+/// `fmi3Boolean`: 0 is false, 1 is true.
 pub type fmi3Boolean = u8;
-/// `fmi3Char`.
-pub type fmi3Char = c_char;
 /// `fmi3String`: zero-terminated UTF-8.
 pub type fmi3String = *const fmi3Char;
-/// `fmi3Byte`.
-pub type fmi3Byte = u8;
 /// `fmi3Binary`: bytes with a length that is given apart from them.
 pub type fmi3Binary = *const fmi3Byte;
-/// `fmi3Clock`: [`CLOCK_INACTIVE`] or [`CLOCK_ACTIVE`].
+/// `fmi3Clock`: 0 is inactive, 1 is active.
 pub type fmi3Clock = u8;
 /// `fmi3Status` as an integer; see [`Status`].
 pub type fmi3Status = c_int;
@@ -57,14 +41,6 @@ pub type fmi3DependencyKind = c_int;
 /// `fmi3IntervalQualifier` as an integer; see [`IntervalQualifier`].
 pub type fmi3IntervalQualifier = c_int;
 
-/// `fmi3False`.
-pub const FALSE: fmi3Boolean = 0;
-/// `fmi3True`.
-pub const TRUE: fmi3Boolean = 1;
-/// `fmi3ClockInactive`.
-pub const CLOCK_INACTIVE: fmi3Clock = 0;
-/// `fmi3ClockActive`.
-pub const CLOCK_ACTIVE: fmi3Clock = 1;
 /// The result of `fmi3GetVersion`, for every 3.0.x.
 pub const VERSION: &std::ffi::CStr = c"3.0";
 
@@ -147,94 +123,22 @@ pub const FUNCTIONS: [&str; 75] = [
     "fmi3ActivateModelPartition",
 ];
 
-/// The values of `fmi3Status` (section 2.2.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(i32)]
-pub enum Status {
-    /// `fmi3OK`.
-    OK = 0,
-    /// `fmi3Warning`.
-    Warning = 1,
-    /// `fmi3Discard`.
-    Discard = 2,
-    /// `fmi3Error`.
-    Error = 3,
-    /// `fmi3Fatal`.
-    Fatal = 4,
+c_enumeration! {
+    /// The values of `fmi3Status` (section 2.2.4).
+    Status: fmi3Status, "fmi3" { OK = 0, Warning = 1, Discard = 2, Error = 3, Fatal = 4, }
 }
 
-impl Status {
-    /// Converts a C value to a status; `None` if it is no `fmi3Status`.
-    #[must_use]
-    pub fn from_c(status: fmi3Status) -> Option<Self> {
-        use Status::{Discard, Error, Fatal, OK, Warning};
-        [OK, Warning, Discard, Error, Fatal]
-            .into_iter()
-            .find(|known| *known as fmi3Status == status)
-    }
-
-    /// Returns the name in the C header.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::OK => "fmi3OK",
-            Status::Warning => "fmi3Warning",
-            Status::Discard => "fmi3Discard",
-            Status::Error => "fmi3Error",
-            Status::Fatal => "fmi3Fatal",
-        }
+c_enumeration! {
+    /// The values of `fmi3DependencyKind` (section 2.2.9).
+    DependencyKind: fmi3DependencyKind, "fmi3" {
+        Independent = 0, Constant = 1, Fixed = 2, Tunable = 3, Discrete = 4, Dependent = 5,
     }
 }
 
-/// The values of `fmi3DependencyKind` (section 2.2.9).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i32)]
-pub enum DependencyKind {
-    /// `fmi3Independent`.
-    Independent = 0,
-    /// `fmi3Constant`.
-    Constant = 1,
-    /// `fmi3Fixed`.
-    Fixed = 2,
-    /// `fmi3Tunable`.
-    Tunable = 3,
-    /// `fmi3Discrete`.
-    Discrete = 4,
-    /// `fmi3Dependent`.
-    Dependent = 5,
-}
-
-impl DependencyKind {
-    /// Converts a C value; `None` if it is no `fmi3DependencyKind`.
-    #[must_use]
-    pub fn from_c(kind: fmi3DependencyKind) -> Option<Self> {
-        use DependencyKind::{Constant, Dependent, Discrete, Fixed, Independent, Tunable};
-        [Independent, Constant, Fixed, Tunable, Discrete, Dependent]
-            .into_iter()
-            .find(|known| *known as fmi3DependencyKind == kind)
-    }
-}
-
-/// The values of `fmi3IntervalQualifier` (section 2.2.8.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i32)]
-pub enum IntervalQualifier {
-    /// `fmi3IntervalNotYetKnown`.
-    NotYetKnown = 0,
-    /// `fmi3IntervalUnchanged`.
-    Unchanged = 1,
-    /// `fmi3IntervalChanged`.
-    Changed = 2,
-}
-
-impl IntervalQualifier {
-    /// Converts a C value; `None` if it is no `fmi3IntervalQualifier`.
-    #[must_use]
-    pub fn from_c(qualifier: fmi3IntervalQualifier) -> Option<Self> {
-        use IntervalQualifier::{Changed, NotYetKnown, Unchanged};
-        [NotYetKnown, Unchanged, Changed]
-            .into_iter()
-            .find(|known| *known as fmi3IntervalQualifier == qualifier)
+c_enumeration! {
+    /// The values of `fmi3IntervalQualifier` (section 2.2.8.4).
+    IntervalQualifier: fmi3IntervalQualifier, "fmi3Interval" {
+        NotYetKnown = 0, Unchanged = 1, Changed = 2,
     }
 }
 

@@ -7,7 +7,7 @@
 //!   returns a [`Warning`] for each defect; [`ModelDescription::problems`] lists the rules of the
 //!   standard that a description breaks; [`ModelDescription::to_xml`] writes one.
 //! * `package` (feature `package`) unpacks and writes `.fmu` archives.
-//! * [`abi1`], [`abi`] (FMI 2.0) and [`abi3`] have the C types of each version.
+//! * [`abi`] (FMI 2.0) and [`abi3`] have the C types, [`abi1`] the names of the functions of FMI 1.0.
 //! * [`limits`] protect memory and disk against files that are too large.
 //! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
 //!   back, [`documentation`] writes the documentation page of a model, [`number`] rounds numbers for messages.
