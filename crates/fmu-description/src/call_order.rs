@@ -78,76 +78,75 @@ const ALL: u16 = I | M | V | N | C | F | K | T | E;
 /// The states in which values may be read.
 const READ: u16 = ALL & !I;
 
+/// Declares the functions of a version of FMI, and the states in which each may be called.
 macro_rules! functions {
-    ($($name:ident: $exchange:expr, $simulation:expr;)*) => {
-        /// A function of FMI that takes an instance.
+    ($prefix:literal, $(#[$meta:meta])* { $($($name:ident)+: $exchange:expr, $simulation:expr;)* }) => {
+        $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Function { $(#[doc = concat!("`fmi2", stringify!($name), "`")] $name,)* }
+        pub enum Function {
+            $($(#[doc = concat!("`", $prefix, stringify!($name), "`")] $name,)+)*
+        }
 
         impl Function {
-            /// Every function, in the order of the tables.
-            pub const EVERY: &[Function] = &[$(Function::$name,)*];
+            /// Every function, in the order of the table.
+            pub const EVERY: &[Function] = &[$($(Function::$name,)+)*];
 
             /// Returns the name in the C ABI.
             #[must_use]
             pub fn name(self) -> &'static str {
-                match self { $(Function::$name => concat!("fmi2", stringify!($name)),)* }
+                match self { $($(Function::$name => concat!($prefix, stringify!($name)),)+)* }
             }
 
             /// Returns the states in which the function may be called for an interface.
             fn states(self, interface: InterfaceType) -> u16 {
                 match (self, interface) {
-                    $((Function::$name, InterfaceType::ModelExchange) => $exchange,
-                    (Function::$name, InterfaceType::CoSimulation) => $simulation,)*
+                    $($((Function::$name, InterfaceType::ModelExchange) => $exchange,
+                    (Function::$name, InterfaceType::CoSimulation) => $simulation,)+)*
                 }
             }
         }
+
+        /// Whether `function` may be called in `state` of an instance for `interface`.
+        ///
+        /// Conditions on single variables are covered by [`settable`].
+        #[must_use]
+        pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
+            function.states(interface) & state.bit() != 0
+        }
     };
 }
+pub(crate) use functions;
 
-// A row: function: states in model exchange, states in co-simulation.
+// A row: functions: states in model exchange, states in co-simulation.
 functions! {
-    SetDebugLogging: ALL, ALL | P;
-    FreeInstance: ALL, ALL;
-    SetupExperiment: I, I;
-    EnterInitializationMode: I, I;
-    ExitInitializationMode: M, M;
-    Terminate: V | N, C | F;
-    Reset: ALL, ALL;
-    GetReal: READ, READ;
-    GetInteger: READ, READ;
-    GetBoolean: READ, READ;
-    GetString: READ, READ;
-    SetReal: I | M | V | N, I | M | C;
-    SetInteger: I | M | V, I | M | C;
-    SetBoolean: I | M | V, I | M | C;
-    SetString: I | M | V, I | M | C;
-    GetFMUstate: ALL, ALL;
-    SetFMUstate: ALL, ALL;
-    FreeFMUstate: ALL, ALL;
-    SerializedFMUstateSize: ALL, ALL;
-    SerializeFMUstate: ALL, ALL;
-    DeSerializeFMUstate: ALL, ALL;
-    GetDirectionalDerivative: READ, READ;
-    EnterEventMode: V | N, 0;
-    NewDiscreteStates: V, 0;
-    EnterContinuousTimeMode: V, 0;
-    CompletedIntegratorStep: N, 0;
-    SetTime: V | N, 0;
-    SetContinuousStates: N, 0;
-    GetEventIndicators: READ, 0;
-    GetContinuousStates: READ, 0;
-    GetDerivatives: READ, 0;
-    GetNominalsOfContinuousStates: ALL, 0;
-    SetRealInputDerivatives: 0, I | M | C;
-    GetRealOutputDerivatives: 0, C | F | K | T | E;
-    DoStep: 0, C;
-    CancelStep: 0, P;
-    GetStatus: 0, C | P | F | T;
-    GetRealStatus: 0, C | P | F | T;
-    GetIntegerStatus: 0, C | P | F | T;
-    GetBooleanStatus: 0, C | P | F | T;
-    GetStringStatus: 0, C | P | F | T;
+    "fmi2",
+    /// A function of FMI that takes an instance.
+    {
+        SetDebugLogging: ALL, ALL | P;
+        FreeInstance: ALL, ALL;
+        SetupExperiment EnterInitializationMode: I, I;
+        ExitInitializationMode: M, M;
+        Terminate: V | N, C | F;
+        Reset: ALL, ALL;
+        GetReal GetInteger GetBoolean GetString: READ, READ;
+        SetReal: I | M | V | N, I | M | C;
+        SetInteger SetBoolean SetString: I | M | V, I | M | C;
+        GetFMUstate SetFMUstate FreeFMUstate: ALL, ALL;
+        SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate: ALL, ALL;
+        GetDirectionalDerivative: READ, READ;
+        EnterEventMode: V | N, 0;
+        NewDiscreteStates EnterContinuousTimeMode: V, 0;
+        CompletedIntegratorStep: N, 0;
+        SetTime: V | N, 0;
+        SetContinuousStates: N, 0;
+        GetEventIndicators GetContinuousStates GetDerivatives: READ, 0;
+        GetNominalsOfContinuousStates: ALL, 0;
+        SetRealInputDerivatives: 0, I | M | C;
+        GetRealOutputDerivatives: 0, C | F | K | T | E;
+        DoStep: 0, C;
+        CancelStep: 0, P;
+        GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus: 0, C | P | F | T;
+    }
 }
 
 /// Whether `function` may return `fmi2Discard` (section 2.1.3).
@@ -169,14 +168,6 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
         | F::GetStringStatus => interface == InterfaceType::CoSimulation,
         _ => false,
     }
-}
-
-/// Whether `function` may be called in `state` of an instance for `interface`.
-///
-/// Conditions on single variables (the numbers in the cells of the tables) are covered by [`settable`].
-#[must_use]
-pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
-    function.states(interface) & state.bit() != 0
 }
 
 /// Returns the set of states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4,

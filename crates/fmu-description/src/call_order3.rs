@@ -4,7 +4,7 @@
 //! The states are those of [`call_order`](crate::call_order): [`State::StepComplete`] is Step Mode. After
 //! `fmi3Error` an instance is in state [`State::Terminated`] (section 2.3.1), so no state `Error` exists.
 
-use crate::call_order::{InterfaceType, State};
+use crate::call_order::{InterfaceType, State, functions};
 use crate::{Causality, Initial, Variability};
 
 const I: u16 = State::Instantiated.bit();
@@ -30,114 +30,46 @@ const GET_CS: u16 = I | M | V | C | U | T;
 /// `Instantiated` and Event Mode only; the others do no harm.
 const COUNT: u16 = I | M | V | N | T;
 
-macro_rules! functions {
-    ($($name:ident: $exchange:expr, $simulation:expr;)*) => {
-        /// A function of FMI 3.0 that takes an instance.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Function { $(#[doc = concat!("`fmi3", stringify!($name), "`")] $name,)* }
-
-        impl Function {
-            /// Every function, in the order of `fmi3Functions.h`.
-            pub const EVERY: &[Function] = &[$(Function::$name,)*];
-
-            /// Returns the name in the C ABI.
-            #[must_use]
-            pub fn name(self) -> &'static str {
-                match self { $(Function::$name => concat!("fmi3", stringify!($name)),)* }
-            }
-
-            /// Returns the states in which the function may be called for an interface.
-            fn states(self, interface: InterfaceType) -> u16 {
-                match (self, interface) {
-                    $((Function::$name, InterfaceType::ModelExchange) => $exchange,
-                    (Function::$name, InterfaceType::CoSimulation) => $simulation,)*
-                }
-            }
-        }
-    };
-}
-
-// A row: function: states in model exchange, states in co-simulation.
+// A row: functions: states in model exchange, states in co-simulation.
 functions! {
-    SetDebugLogging: ME, CS;
-    FreeInstance: ME, CS;
-    EnterInitializationMode: I, I;
-    ExitInitializationMode: M, M;
-    EnterEventMode: N, C;
-    Terminate: V | N | R, V | C | R;
-    Reset: ME, CS;
-    GetFloat32: GET_ME, GET_CS;
-    GetFloat64: GET_ME, GET_CS;
-    GetInt8: GET_ME, GET_CS;
-    GetUInt8: GET_ME, GET_CS;
-    GetInt16: GET_ME, GET_CS;
-    GetUInt16: GET_ME, GET_CS;
-    GetInt32: GET_ME, GET_CS;
-    GetUInt32: GET_ME, GET_CS;
-    GetInt64: GET_ME, GET_CS;
-    GetUInt64: GET_ME, GET_CS;
-    GetBoolean: GET_ME, GET_CS;
-    GetString: GET_ME, GET_CS;
-    GetBinary: GET_ME, GET_CS;
-    GetClock: V, V;
-    SetFloat32: SET_ME | N, SET_CS | U;
-    SetFloat64: SET_ME | N, SET_CS | U;
-    SetInt8: SET_ME, SET_CS;
-    SetUInt8: SET_ME, SET_CS;
-    SetInt16: SET_ME, SET_CS;
-    SetUInt16: SET_ME, SET_CS;
-    SetInt32: SET_ME, SET_CS;
-    SetUInt32: SET_ME, SET_CS;
-    SetInt64: SET_ME, SET_CS;
-    SetUInt64: SET_ME, SET_CS;
-    SetBoolean: SET_ME, SET_CS;
-    SetString: SET_ME, SET_CS;
-    SetBinary: SET_ME, SET_CS;
-    SetClock: V, V;
-    GetNumberOfVariableDependencies: ME, CS;
-    GetVariableDependencies: ME, CS;
-    GetFMUState: ME, CS;
-    SetFMUState: ME, CS;
-    FreeFMUState: ME, CS;
-    SerializedFMUStateSize: ME, CS;
-    SerializeFMUState: ME, CS;
-    DeserializeFMUState: ME, CS;
-    GetDirectionalDerivative: M | V | N | T, M | V | C | T;
-    GetAdjointDerivative: M | V | N | T, M | V | C | T;
-    EnterConfigurationMode: I | V, I | C;
-    ExitConfigurationMode: G | R, G | R;
-    GetIntervalDecimal: M | V, M | V;
-    GetIntervalFraction: M | V, M | V;
-    GetShiftDecimal: M, M;
-    GetShiftFraction: M, M;
-    SetIntervalDecimal: M | V, M | V;
-    SetIntervalFraction: M | V, M | V;
-    SetShiftDecimal: M, M;
-    SetShiftFraction: M, M;
-    EvaluateDiscreteStates: V, V;
-    UpdateDiscreteStates: V, V;
-    EnterContinuousTimeMode: V, 0;
-    CompletedIntegratorStep: N, 0;
-    SetTime: N, 0;
-    SetContinuousStates: N, 0;
-    GetContinuousStateDerivatives: M | V | N | T, 0;
-    GetEventIndicators: M | V | N | T, 0;
-    GetContinuousStates: M | V | N | T, 0;
-    GetNominalsOfContinuousStates: M | V | N | R | T, 0;
-    GetNumberOfEventIndicators: COUNT, 0;
-    GetNumberOfContinuousStates: COUNT, 0;
-    EnterStepMode: 0, V;
-    GetOutputDerivatives: 0, C | U | T;
-    DoStep: 0, C;
-    ActivateModelPartition: 0, 0;
-}
-
-/// Whether `function` may be called in `state` of an instance for `interface`.
-///
-/// Conditions on single variables are covered by [`settable`].
-#[must_use]
-pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
-    function.states(interface) & state.bit() != 0
+    "fmi3",
+    /// A function of FMI 3.0 that takes an instance.
+    {
+        SetDebugLogging FreeInstance: ME, CS;
+        EnterInitializationMode: I, I;
+        ExitInitializationMode: M, M;
+        EnterEventMode: N, C;
+        Terminate: V | N | R, V | C | R;
+        Reset: ME, CS;
+        GetFloat32 GetFloat64: GET_ME, GET_CS;
+        GetInt8 GetUInt8 GetInt16 GetUInt16 GetInt32 GetUInt32 GetInt64 GetUInt64: GET_ME, GET_CS;
+        GetBoolean GetString GetBinary: GET_ME, GET_CS;
+        GetClock: V, V;
+        SetFloat32 SetFloat64: SET_ME | N, SET_CS | U;
+        SetInt8 SetUInt8 SetInt16 SetUInt16 SetInt32 SetUInt32 SetInt64 SetUInt64: SET_ME, SET_CS;
+        SetBoolean SetString SetBinary: SET_ME, SET_CS;
+        SetClock: V, V;
+        GetNumberOfVariableDependencies GetVariableDependencies: ME, CS;
+        GetFMUState SetFMUState FreeFMUState: ME, CS;
+        SerializedFMUStateSize SerializeFMUState DeserializeFMUState: ME, CS;
+        GetDirectionalDerivative GetAdjointDerivative: M | V | N | T, M | V | C | T;
+        EnterConfigurationMode: I | V, I | C;
+        ExitConfigurationMode: G | R, G | R;
+        GetIntervalDecimal GetIntervalFraction: M | V, M | V;
+        GetShiftDecimal GetShiftFraction: M, M;
+        SetIntervalDecimal SetIntervalFraction: M | V, M | V;
+        SetShiftDecimal SetShiftFraction: M, M;
+        EvaluateDiscreteStates UpdateDiscreteStates: V, V;
+        EnterContinuousTimeMode: V, 0;
+        CompletedIntegratorStep SetTime SetContinuousStates: N, 0;
+        GetContinuousStateDerivatives GetEventIndicators GetContinuousStates: M | V | N | T, 0;
+        GetNominalsOfContinuousStates: M | V | N | R | T, 0;
+        GetNumberOfEventIndicators GetNumberOfContinuousStates: COUNT, 0;
+        EnterStepMode: 0, V;
+        GetOutputDerivatives: 0, C | U | T;
+        DoStep: 0, C;
+        ActivateModelPartition: 0, 0;
+    }
 }
 
 /// Whether a call of `function` that fails may leave the instance unchanged: whether it may return
