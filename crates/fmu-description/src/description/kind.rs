@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::Version;
 use super::words::spelt;
+use super::{NativeType, Version};
 
 /// `SimpleType` of `TypeDefinitions`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,42 +21,72 @@ pub struct SimpleType {
     pub items: Vec<(String, i64)>,
 }
 
-/// The type of a variable with the attributes that depend on it.
-///
-/// The types of FMI 1.0 and 2.0 are types of FMI 3.0 too: `Real` is `Float64` there and `Integer` is
-/// `Int32`. An `Enumeration` is an `Int32` in FMI 2.0 and an `Int64` in FMI 3.0.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub enum Kind {
+/// Declares the types: attributes, name of the element in FMI 2.0 (if it has the type) and in FMI 3.0, type in C.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $variant:ident($attributes:ty): $element:literal $element_of_3:literal $native:ident;)*) => {
+        /// The type of a variable with the attributes that depend on it.
+        ///
+        /// The types of FMI 1.0 and 2.0 are types of FMI 3.0 too: `Real` is `Float64` there and `Integer` is
+        /// `Int32`. An `Enumeration` is an `Int32` in FMI 2.0 and an `Int64` in FMI 3.0.
+        #[derive(Clone, Debug, PartialEq, Serialize)]
+        pub enum Kind { $($(#[$doc])* $variant($attributes),)* }
+
+        impl Kind {
+            /// Returns the name of the XML element, with the names of FMI 2.0 for the types that it has:
+            /// `Real`, `Integer`.
+            #[must_use]
+            pub fn element(&self) -> &'static str {
+                match self { $(Kind::$variant(_) => $element,)* }
+            }
+
+            /// Returns the type of the values in the C interface of FMI 3.0. Those of an `Enumeration` are `Int64`.
+            #[must_use]
+            pub fn native_type(&self) -> NativeType {
+                match self { $(Kind::$variant(_) => NativeType::$native,)* }
+            }
+
+            /// Returns the kind of an element of FMI 3.0 without attributes; `None` if `name` is no type.
+            pub(super) fn blank(name: &str) -> Option<Self> {
+                match name {
+                    $($element_of_3 => Some(Kind::$variant(<$attributes>::default())),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+kinds! {
     /// `Real`, in FMI 3.0 `Float64`.
-    Real(RealType),
+    Real(RealType): "Real" "Float64" Float64;
     /// `Integer`, in FMI 3.0 `Int32`.
-    Integer(IntegerType),
+    Integer(IntegerType): "Integer" "Int32" Int32;
     /// `Boolean` with its `start`.
-    Boolean(Option<bool>),
+    Boolean(Option<bool>): "Boolean" "Boolean" Boolean;
     /// `String` with its `start`.
-    String(Option<String>),
+    String(Option<String>): "String" "String" String;
     /// `Enumeration` as an integer; the type `declared_type` has the names of its items.
-    Enumeration(IntegerType),
+    Enumeration(IntegerType): "Enumeration" "Enumeration" Int64;
     /// `Float32`; its numbers are those of an `f32`.
-    Float32(RealType),
+    Float32(RealType): "Float32" "Float32" Float32;
     /// `Int8`.
-    Int8(IntegerType),
+    Int8(IntegerType): "Int8" "Int8" Int8;
     /// `UInt8`.
-    UInt8(IntegerType),
+    UInt8(IntegerType): "UInt8" "UInt8" UInt8;
     /// `Int16`.
-    Int16(IntegerType),
+    Int16(IntegerType): "Int16" "Int16" Int16;
     /// `UInt16`.
-    UInt16(IntegerType),
+    UInt16(IntegerType): "UInt16" "UInt16" UInt16;
     /// `UInt32`.
-    UInt32(IntegerType),
+    UInt32(IntegerType): "UInt32" "UInt32" UInt32;
     /// `Int64`.
-    Int64(IntegerType),
+    Int64(IntegerType): "Int64" "Int64" Int64;
     /// `UInt64`.
-    UInt64(IntegerType),
+    UInt64(IntegerType): "UInt64" "UInt64" UInt64;
     /// `Binary`.
-    Binary(BinaryType),
+    Binary(BinaryType): "Binary" "Binary" Binary;
     /// `Clock`.
-    Clock(ClockType),
+    Clock(ClockType): "Clock" "Clock" Clock;
 }
 
 /// The pattern of the types whose values are integers.
@@ -75,29 +105,6 @@ macro_rules! integers {
 }
 
 impl Kind {
-    /// Returns the name of the XML element, with the names of FMI 2.0 for the types that it has:
-    /// `Real`, `Integer`.
-    #[must_use]
-    pub fn element(&self) -> &'static str {
-        match self {
-            Kind::Real(_) => "Real",
-            Kind::Integer(_) => "Integer",
-            Kind::Boolean(_) => "Boolean",
-            Kind::String(_) => "String",
-            Kind::Enumeration(_) => "Enumeration",
-            Kind::Float32(_) => "Float32",
-            Kind::Int8(_) => "Int8",
-            Kind::UInt8(_) => "UInt8",
-            Kind::Int16(_) => "Int16",
-            Kind::UInt16(_) => "UInt16",
-            Kind::UInt32(_) => "UInt32",
-            Kind::Int64(_) => "Int64",
-            Kind::UInt64(_) => "UInt64",
-            Kind::Binary(_) => "Binary",
-            Kind::Clock(_) => "Clock",
-        }
-    }
-
     /// Returns the name of the XML element in a version of FMI: `Float64` and `Int32` in FMI 3.0.
     #[must_use]
     pub fn element_in(&self, version: Version) -> &'static str {
@@ -105,6 +112,16 @@ impl Kind {
             (Kind::Real(_), Version::V3) => "Float64",
             (Kind::Integer(_), Version::V3) => "Int32",
             _ => self.element(),
+        }
+    }
+
+    /// Returns the type with which the type shares its value references in FMI 1.0 and 2.0: an
+    /// `Enumeration` is an `Integer`.
+    #[must_use]
+    pub fn base(&self) -> &'static str {
+        match self {
+            Kind::Enumeration(_) => "Integer",
+            other => other.element(),
         }
     }
 

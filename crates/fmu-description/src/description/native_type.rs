@@ -1,7 +1,5 @@
 //! The types of values for which FMI 3.0 has functions of their own.
 
-use super::Kind;
-
 macro_rules! native_types {
     ($($name:ident)*) => {
         /// The types of values in the C interface of FMI 3.0 (`fmi3FunctionTypes.h`). Each has two functions,
@@ -34,27 +32,4 @@ macro_rules! native_types {
 
 native_types! {
     Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock
-}
-
-impl Kind {
-    /// Returns the type of the values in the C interface of FMI 3.0. Those of an `Enumeration` are `Int64`.
-    #[must_use]
-    pub fn native_type(&self) -> NativeType {
-        match self {
-            Kind::Float32(_) => NativeType::Float32,
-            Kind::Real(_) => NativeType::Float64,
-            Kind::Int8(_) => NativeType::Int8,
-            Kind::UInt8(_) => NativeType::UInt8,
-            Kind::Int16(_) => NativeType::Int16,
-            Kind::UInt16(_) => NativeType::UInt16,
-            Kind::Integer(_) => NativeType::Int32,
-            Kind::UInt32(_) => NativeType::UInt32,
-            Kind::Int64(_) | Kind::Enumeration(_) => NativeType::Int64,
-            Kind::UInt64(_) => NativeType::UInt64,
-            Kind::Boolean(_) => NativeType::Boolean,
-            Kind::String(_) => NativeType::String,
-            Kind::Binary(_) => NativeType::Binary,
-            Kind::Clock(_) => NativeType::Clock,
-        }
-    }
 }

@@ -97,8 +97,8 @@ pub(super) fn check_names(
         let local =
             [first, &variable].iter().all(|variable| variable.causality == Causality::Local);
         if !local
-            && (base(&first.kind), first.value_reference)
-                != (base(&variable.kind), variable.value_reference)
+            && (first.kind.base(), first.value_reference)
+                != (variable.kind.base(), variable.value_reference)
         {
             return Err(element.wrong("name", expected, &variable.name));
         }
@@ -112,14 +112,14 @@ pub(super) fn check_references(
     elements: &[Node<'_>],
     variables: &[ScalarVariable],
 ) -> Result<(), ParseError> {
-    let mut settable: HashMap<(u8, u32), &str> = HashMap::new();
+    let mut settable: HashMap<(&str, u32), &str> = HashMap::new();
     for (element, variable) in elements.iter().zip(variables) {
         let set_from_outside =
             matches!(variable.causality, Causality::Input | Causality::Parameter);
         if !set_from_outside || variable.alias_of.is_some() {
             continue;
         }
-        let key = (base(&variable.kind), variable.value_reference);
+        let key = (variable.kind.base(), variable.value_reference);
         if let Some(first) = settable.insert(key, &variable.name) {
             let expected =
                 format!("one that no other input or parameter of this type has, {first} has it");
@@ -128,26 +128,6 @@ pub(super) fn check_references(
         }
     }
     Ok(())
-}
-
-/// Variables of the same base type share the space of value references.
-pub(super) fn base(kind: &Kind) -> u8 {
-    match kind {
-        Kind::Real(_) => 0,
-        Kind::Integer(_) | Kind::Enumeration(_) => 1,
-        Kind::Boolean(_) => 2,
-        Kind::String(_) => 3,
-        Kind::Float32(_) => 4,
-        Kind::Int8(_) => 5,
-        Kind::UInt8(_) => 6,
-        Kind::Int16(_) => 7,
-        Kind::UInt16(_) => 8,
-        Kind::UInt32(_) => 9,
-        Kind::Int64(_) => 10,
-        Kind::UInt64(_) => 11,
-        Kind::Binary(_) => 12,
-        Kind::Clock(_) => 13,
-    }
 }
 
 fn variable(

@@ -70,11 +70,8 @@ fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
 
 /// Key of the variables with the same value: base type and value reference of FMI 2.0.
 fn value_of(variable: &ScalarVariable) -> (bool, &'static str, u32) {
-    let element = match variable.kind {
-        Kind::Enumeration(_) => "Integer",
-        ref kind => kind.element(),
-    };
-    (variable.causality == Causality::Independent, element, variable.value_reference)
+    let is_time = variable.causality == Causality::Independent;
+    (is_time, variable.kind.base(), variable.value_reference)
 }
 
 /// Whether the variable precedes the others: time, and the structural parameters, because fmusim 0.0.39 crashes

@@ -6,7 +6,7 @@ use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::parse::structure::ANYTHING;
 use crate::description::parse::variables::{
-    Types, base, check_names, check_references, kind, scalar_variables, typed,
+    Types, check_names, check_references, kind, scalar_variables, typed,
 };
 use crate::description::{
     Causality, Initial, ModelStructure, ScalarVariable, SimpleType, Unknown, Variability,
@@ -95,10 +95,10 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
         .map(|element| word(*element, NAME, &["noAlias", "alias", "negatedAlias"]))
         .collect();
     let is_alias = |stated: Option<&str>| matches!(stated, Some("alias" | "negatedAlias"));
-    let mut bases: HashMap<(u8, u32), String> = HashMap::new();
+    let mut bases: HashMap<(&str, u32), String> = HashMap::new();
     for (variable, stated) in variables.iter().zip(&stated) {
         if !is_alias(*stated) {
-            let key = (base(&variable.kind), variable.value_reference);
+            let key = (variable.kind.base(), variable.value_reference);
             bases.entry(key).or_insert_with(|| variable.name.clone());
         }
     }
@@ -106,7 +106,7 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
         if !is_alias(stated) {
             continue;
         }
-        let base_name = bases.get(&(base(&variable.kind), variable.value_reference));
+        let base_name = bases.get(&(variable.kind.base(), variable.value_reference));
         if base_name.is_none() {
             let expected = "the value reference of a variable with alias=\"noAlias\"";
             let actual = variable.value_reference.to_string();

@@ -10,36 +10,13 @@ use crate::description::{
 
 const INTERVALS: [&str; 6] = ["constant", "fixed", "tunable", "changing", "countdown", "triggered"];
 
-/// Returns the kind of an element without attributes; `None` if `name` is no type of FMI 3.0.
-pub(super) fn blank(name: &str) -> Option<Kind> {
-    let (real, integer) = (RealType::default(), IntegerType::default());
-    Some(match name {
-        "Float32" => Kind::Float32(real),
-        "Float64" => Kind::Real(real),
-        "Int8" => Kind::Int8(integer),
-        "UInt8" => Kind::UInt8(integer),
-        "Int16" => Kind::Int16(integer),
-        "UInt16" => Kind::UInt16(integer),
-        "Int32" => Kind::Integer(integer),
-        "UInt32" => Kind::UInt32(integer),
-        "Int64" => Kind::Int64(integer),
-        "UInt64" => Kind::UInt64(integer),
-        "Boolean" => Kind::Boolean(None),
-        "String" => Kind::String(None),
-        "Binary" => Kind::Binary(BinaryType::default()),
-        "Enumeration" => Kind::Enumeration(integer),
-        "Clock" => Kind::Clock(ClockType::default()),
-        _ => return None,
-    })
-}
-
 pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     let Some(list) = root.optional_child("TypeDefinitions")? else { return Ok(Vec::new()) };
     let mut types = Vec::new();
     for element in list.children() {
         let name = element.element.name.strip_suffix("Type");
         // The check against the schema has warned of other elements.
-        let Some(mut kind) = name.and_then(blank) else { continue };
+        let Some(mut kind) = name.and_then(Kind::blank) else { continue };
         attributes(element, &mut kind, None)?;
         let items = if let Kind::Enumeration(_) = kind {
             element.children_named("Item").map(item).collect::<Result<_, _>>()?

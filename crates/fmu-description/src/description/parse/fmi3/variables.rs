@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::kinds::{attributes, blank};
+use super::kinds::attributes;
 use super::start;
 use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
@@ -41,7 +41,7 @@ pub(super) fn read(
     // A few bytes of the file may name an alias of a variable with long texts and lists.
     let mut inherited = 0;
     for element in list.children() {
-        let Some(kind) = blank(element.element.name) else { continue };
+        let Some(kind) = Kind::blank(element.element.name) else { continue };
         let variable = variable(element, kind, &types)?;
         let position = variables.len();
         elements.push(element);
