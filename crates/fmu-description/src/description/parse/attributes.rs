@@ -1,13 +1,11 @@
 //! Typed access to attributes and children, with errors and warnings that name them.
 
-use std::ops::RangeInclusive;
-
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::warning::{Warnings, section};
-use crate::defect::ParseError;
-use crate::defect::Warning;
+use crate::defect::{ParseError, Warning};
 use crate::xml::tree::Element;
 
 /// The white space of XML.
@@ -166,15 +164,8 @@ impl<'a> Node<'a> {
 
     /// Reads an `xs:int`. An integer written with a point (`1.0`) gives a warning.
     pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>, ParseError> {
-        let Some((text, trimmed)) = self.content(name, INTEGER) else { return Ok(None) };
-        if let Ok(value) = trimmed.parse() {
-            return Ok(Some(value));
-        }
-        let real = trimmed.parse::<f64>().ok().filter(|real| real.fract() == 0.0);
-        let value = real.and_then(|real| format!("{real:.0}").parse::<i32>().ok());
-        let value = value.ok_or_else(|| self.wrong(name, INTEGER, text))?;
-        self.warn(name, INTEGER, text, &format!("read as {value}"));
-        Ok(Some(value))
+        let value = self.whole(name, &(i32::MIN.into()..=i32::MAX.into()), INTEGER)?;
+        Ok(value.and_then(|value| i32::try_from(value).ok()))
     }
 
     /// Reads an integer of a type of FMI 3.0 with its smallest and largest value. An integer written
@@ -184,8 +175,18 @@ impl<'a> Node<'a> {
         name: &'static str,
         range: &RangeInclusive<i128>,
     ) -> Result<Option<i128>, ParseError> {
+        self.whole(name, range, "an integer")
+    }
+
+    /// Reads an integer in a range; `content` says what an empty attribute should have.
+    fn whole(
+        &self,
+        name: &'static str,
+        range: &RangeInclusive<i128>,
+        content: &str,
+    ) -> Result<Option<i128>, ParseError> {
         let expected = || format!("an integer from {} to {}", range.start(), range.end());
-        let Some((text, trimmed)) = self.content(name, "an integer") else { return Ok(None) };
+        let Some((text, trimmed)) = self.content(name, content) else { return Ok(None) };
         let inside = |value: &i128| range.contains(value);
         if let Some(value) = trimmed.parse().ok().filter(inside) {
             return Ok(Some(value));
@@ -199,12 +200,7 @@ impl<'a> Node<'a> {
 
     /// Reads an `xs:unsignedLong` that a simulation does not need.
     pub(super) fn optional_counter(&self, name: &'static str) -> Option<u64> {
-        let (text, trimmed) = self.content(name, COUNTER)?;
-        let value = trimmed.parse().ok();
-        if value.is_none() {
-            self.warn(name, COUNTER, text, NOTHING);
-        }
-        value
+        self.optional_number(name, COUNTER)
     }
 
     /// Reads an `xs:unsignedInt`; any other value is an error.
@@ -216,10 +212,14 @@ impl<'a> Node<'a> {
 
     /// Reads an `xs:unsignedInt` that a simulation does not need.
     pub(super) fn optional_unsigned(&self, name: &'static str) -> Option<u32> {
-        let (text, trimmed) = self.content(name, UNSIGNED)?;
+        self.optional_number(name, UNSIGNED)
+    }
+
+    fn optional_number<T: FromStr>(&self, name: &str, expected: &str) -> Option<T> {
+        let (text, trimmed) = self.content(name, expected)?;
         let value = trimmed.parse().ok();
         if value.is_none() {
-            self.warn(name, UNSIGNED, text, NOTHING);
+            self.warn(name, expected, text, NOTHING);
         }
         value
     }
@@ -253,17 +253,21 @@ impl<'a> Node<'a> {
     }
 
     /// Reads one of `words`, also in another case; any other word counts as missing.
-    pub(super) fn word<T: FromStr>(&self, name: &'static str, words: &[&str]) -> Option<T> {
+    pub(super) fn word<T: FromStr>(&self, name: &'static str, words: &[&'static str]) -> Option<T> {
+        let stated = self.attribute(name)?.parse().ok();
+        stated.or_else(|| self.one_of(name, words)?.parse().ok())
+    }
+
+    /// The same for words that have no type.
+    pub(super) fn one_of(&self, name: &str, words: &[&'static str]) -> Option<&'static str> {
         let text = self.attribute(name)?;
-        if let Ok(value) = text.parse() {
-            return Some(value);
-        }
-        let expected = format!("one of {}", words.join(", "));
         let trimmed = text.trim_matches(WHITE_SPACE);
-        let meant = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed));
-        let assumed = meant.map_or(NOTHING.to_owned(), |word| format!("read as {word}"));
-        self.warn(name, &expected, text, &assumed);
-        meant.and_then(|word| word.parse().ok())
+        let meant = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed)).copied();
+        if meant != Some(text) {
+            let assumed = meant.map_or(NOTHING.to_owned(), |word| format!("read as {word}"));
+            self.warn(name, &format!("one of {}", words.join(", ")), text, &assumed);
+        }
+        meant
     }
 
     pub(super) fn children(self) -> impl Iterator<Item = Node<'a>> {
@@ -285,6 +289,15 @@ impl<'a> Node<'a> {
                 Err(self.misses(format!("one element {name}"), actual))
             }
         }
+    }
+
+    /// Reads the child called `name`, if there is one.
+    pub(super) fn optional<T>(
+        self,
+        name: &'a str,
+        read: impl FnOnce(Node<'a>) -> Result<T, ParseError>,
+    ) -> Result<Option<T>, ParseError> {
+        self.optional_child(name)?.map(read).transpose()
     }
 
     pub(super) fn child(self, name: &'a str) -> Result<Node<'a>, ParseError> {

@@ -1,11 +1,34 @@
-//! Reads what FMI 2.0 and 3.0 write in the same way: units, log categories, the default experiment.
+//! Reads what several versions of FMI write in the same way: the attributes of the root element, units, log
+//! categories, the default experiment.
 
 use super::attributes::Node;
 use crate::defect::ParseError;
-use crate::description::{DefaultExperiment, LogCategory, Version};
+use crate::description::{DefaultExperiment, LogCategory, ModelDescription, Version};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 
-pub(super) fn structured_names(root: Node<'_>) -> bool {
+/// Reads the attributes of the root element that mean the same in every version.
+pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
+    let version = root.warnings.version;
+    let model_name = root.text_or("modelName", model_name);
+    let structured_names = structured_names(root);
+    ModelDescription {
+        fmi_version: version.as_str().to_owned(),
+        model_name,
+        description: root.text("description"),
+        author: root.text("author"),
+        version: root.text("version"),
+        generation_tool: root.text("generationTool"),
+        generation_date_and_time: root.text("generationDateAndTime"),
+        structured_names,
+        number_of_event_indicators: match version {
+            Version::V1 | Version::V2 => root.optional_unsigned("numberOfEventIndicators"),
+            Version::V3 => None,
+        },
+        ..ModelDescription::default()
+    }
+}
+
+fn structured_names(root: Node<'_>) -> bool {
     const NAME: &str = "variableNamingConvention";
     match root.attribute(NAME) {
         None | Some("flat") => false,
@@ -29,7 +52,7 @@ pub(super) fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
     Ok(Unit {
         name: element.required("name")?.to_owned(),
         display_units: display_units.collect::<Result<_, ParseError>>()?,
-        base: element.optional_child("BaseUnit")?.map(base_unit).transpose()?,
+        base: element.optional("BaseUnit", base_unit)?,
     })
 }
 

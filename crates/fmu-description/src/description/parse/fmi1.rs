@@ -3,7 +3,7 @@
 mod variables;
 
 use super::attributes::Node;
-use super::definitions::{experiment, structured_names};
+use super::definitions::{experiment, general};
 use super::schema;
 use super::variables::{integer_limits, real_limits};
 use crate::defect::ParseError;
@@ -16,12 +16,10 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     schema::check(root, Version::V1);
     let identifier = root.required("modelIdentifier")?.to_owned();
     let types = root.list("TypeDefinitions", "Type", simple_type)?;
-    let list = root.optional_child("ModelVariables")?;
-    let variables = list.map(|list| variables::read(list, &types)).transpose()?;
+    let variables = root.optional("ModelVariables", |list| variables::read(list, &types))?;
     let (variables, structure) = variables.unwrap_or_default();
-    let implementation = root.optional_child("Implementation")?;
     let co_simulation =
-        implementation.map(|element| co_simulation(element, identifier.clone())).transpose()?;
+        root.optional("Implementation", |element| co_simulation(element, identifier.clone()))?;
     let model_exchange = co_simulation.is_none().then(|| ModelExchange {
         model_identifier: identifier.clone(),
         number_of_continuous_states: root
@@ -30,27 +28,15 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
         ..ModelExchange::default()
     });
     Ok(ModelDescription {
-        fmi_version: Version::V1.as_str().to_owned(),
-        model_name: root.text_or("modelName", identifier),
         guid: root.required("guid")?.to_owned(),
-        description: root.text("description"),
-        author: root.text("author"),
-        version: root.text("version"),
-        generation_tool: root.text("generationTool"),
-        generation_date_and_time: root.text("generationDateAndTime"),
-        structured_names: structured_names(root),
-        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
         model_exchange,
         co_simulation,
         units: root.list("UnitDefinitions", "BaseUnit", unit)?,
         types,
-        default_experiment: root
-            .optional_child("DefaultExperiment")?
-            .map(experiment)
-            .transpose()?,
+        default_experiment: root.optional("DefaultExperiment", experiment)?,
         variables,
         structure,
-        ..ModelDescription::default()
+        ..general(root, identifier)
     })
 }
 

@@ -1,7 +1,7 @@
 //! Reads a model description of FMI 2.0.
 
 use super::attributes::Node;
-use super::definitions::{category, experiment, structured_names, unit};
+use super::definitions::{category, experiment, general, unit};
 use super::{schema, structure, variables};
 use crate::defect::ParseError;
 use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
@@ -12,36 +12,24 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     let types = variables::types(root)?;
     let variables = variables::variables(root.child("ModelVariables")?, &types)?;
     let structure = structure::read(root, &variables)?;
-    let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
-    let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
+    let model_exchange = root.optional("ModelExchange", model_exchange)?;
+    let co_simulation = root.optional("CoSimulation", co_simulation)?;
     let identifier = co_simulation.as_ref().map(|flags| &flags.model_identifier);
     let identifier = identifier.or(model_exchange.as_ref().map(|flags| &flags.model_identifier));
-    let model_name = root.text_or("modelName", identifier.cloned().unwrap_or_default());
+    let identifier = identifier.cloned().unwrap_or_default();
     Ok(ModelDescription {
-        fmi_version: "2.0".to_owned(),
-        model_name,
         guid: root.required("guid")?.to_owned(),
-        description: root.text("description"),
-        author: root.text("author"),
-        version: root.text("version"),
         copyright: root.text("copyright"),
         license: root.text("license"),
-        generation_tool: root.text("generationTool"),
-        generation_date_and_time: root.text("generationDateAndTime"),
-        structured_names: structured_names(root),
-        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
         model_exchange,
         co_simulation,
         units: root.list("UnitDefinitions", "Unit", unit)?,
         types,
         log_categories: root.list("LogCategories", "Category", category)?,
-        default_experiment: root
-            .optional_child("DefaultExperiment")?
-            .map(experiment)
-            .transpose()?,
+        default_experiment: root.optional("DefaultExperiment", experiment)?,
         variables,
         structure,
-        ..ModelDescription::default()
+        ..general(root, identifier)
     })
 }
 
@@ -52,10 +40,6 @@ fn version(root: Node<'_>) {
     }
 }
 
-fn identifier(element: Node<'_>) -> Result<String, ParseError> {
-    Ok(element.required("modelIdentifier")?.to_owned())
-}
-
 fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
     element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
 }
@@ -63,7 +47,7 @@ fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
 fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
     let flag = |name| element.flag(name);
     Ok(ModelExchange {
-        model_identifier: identifier(element)?,
+        model_identifier: element.required("modelIdentifier")?.to_owned(),
         needs_execution_tool: flag("needsExecutionTool"),
         completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
         can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
@@ -79,7 +63,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
 fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
     let flag = |name| element.flag(name);
     Ok(CoSimulation {
-        model_identifier: identifier(element)?,
+        model_identifier: element.required("modelIdentifier")?.to_owned(),
         needs_execution_tool: flag("needsExecutionTool"),
         can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
         can_interpolate_inputs: flag("canInterpolateInputs"),

@@ -16,31 +16,48 @@ pub(super) fn read(
     root: Node<'_>,
     variables: &[ScalarVariable],
 ) -> Result<ModelStructure, ParseError> {
-    let Some(element) = root.optional_child("ModelStructure")? else {
-        let place = "<fmiModelDescription>".to_owned();
-        let expected = "an element ModelStructure";
-        root.warn_of(true, place, expected, "none".to_owned(), ANYTHING);
-        return Ok(ModelStructure {
-            outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
-            ..ModelStructure::default()
-        });
+    let Some(element) = child(root)? else {
+        let missing = missing_outputs(&[], variables).map(|(row, _)| row);
+        return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
     };
     let mut outputs = list(element, "Outputs", variables.len())?;
-    let missing: Vec<_> = missing_outputs(&outputs, variables).collect();
-    if !missing.is_empty() {
-        let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
-        let more = if missing.len() > 5 { ", and others" } else { "" };
-        let actual = format!("no row for {}{more}", names.join(", "));
-        let place = "<ModelStructure>".to_owned();
-        element.warn_of(false, place, "every output in Outputs", actual, ANYTHING);
-        outputs.extend(missing.into_iter().map(|(row, _)| row));
-    }
+    let missing = missing_outputs(&outputs, variables).collect();
+    add_outputs(element, &mut outputs, missing, ["every output in Outputs", "no row for"]);
     Ok(ModelStructure {
         outputs,
         derivatives: derivatives(element, variables.len())?,
         initial_unknowns: list(element, "InitialUnknowns", variables.len())?,
         ..ModelStructure::default()
     })
+}
+
+/// Returns the element `ModelStructure`, or warns that there is none.
+pub(super) fn child(root: Node<'_>) -> Result<Option<Node<'_>>, ParseError> {
+    let element = root.optional_child("ModelStructure")?;
+    if element.is_none() {
+        let place = "<fmiModelDescription>".to_owned();
+        let expected = "an element ModelStructure";
+        root.warn_of(true, place, expected, "none".to_owned(), ANYTHING);
+    }
+    Ok(element)
+}
+
+/// Adds the rows that are missing, each with the name of its output, and warns of them; `texts` say what is
+/// expected, and what is there instead.
+pub(super) fn add_outputs(
+    element: Node<'_>,
+    outputs: &mut Vec<Unknown>,
+    missing: Vec<(Unknown, &str)>,
+    [expected, none_for]: [&str; 2],
+) {
+    if missing.is_empty() {
+        return;
+    }
+    let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
+    let more = if missing.len() > 5 { ", and others" } else { "" };
+    let actual = format!("{none_for} {}{more}", names.join(", "));
+    element.warn_of(false, "<ModelStructure>".to_owned(), expected, actual, ANYTHING);
+    outputs.extend(missing.into_iter().map(|(row, _)| row));
 }
 
 pub(super) fn missing_outputs<'a>(

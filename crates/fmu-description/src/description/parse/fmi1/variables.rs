@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::defect::ParseError;
-use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::parse::attributes::Node;
 use crate::description::parse::structure::ANYTHING;
 use crate::description::parse::variables::{
     Types, check_names, check_references, kind, scalar_variables, typed,
@@ -35,9 +35,9 @@ fn variable(
 ) -> Result<ScalarVariable, ParseError> {
     let value = typed(element)?;
     let kind = kind(value, types, count)?;
-    let stated = word(element, "variability", &VARIABILITIES);
+    let stated = element.one_of("variability", &VARIABILITIES);
     let continuous = kind.as_real().is_some();
-    let (causality, variability) = match (word(element, "causality", &CAUSALITIES), stated) {
+    let (causality, variability) = match (element.one_of("causality", &CAUSALITIES), stated) {
         (_, Some("parameter")) if kind.has_start() => (Causality::Parameter, Variability::Fixed),
         (_, Some("parameter")) => (Causality::CalculatedParameter, Variability::Fixed),
         (causality, variability) => {
@@ -72,27 +72,12 @@ fn variable(
     })
 }
 
-/// Reads one of `words`, also in another case; any other word counts as missing.
-fn word(element: Node<'_>, name: &str, words: &[&'static str]) -> Option<&'static str> {
-    let text = element.attribute(name)?;
-    let trimmed = text.trim_matches(WHITE_SPACE);
-    let known = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed)).copied();
-    if known != Some(text) {
-        let assumed = known.map_or_else(
-            || "read as if it were not there".to_owned(),
-            |word| format!("read as {word}"),
-        );
-        element.warn(name, &format!("one of {}", words.join(", ")), text, &assumed);
-    }
-    known
-}
-
 /// Sets `alias_of` and `negated` by the attribute `alias`.
 fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
     const NAME: &str = "alias";
     let stated: Vec<_> = elements
         .iter()
-        .map(|element| word(*element, NAME, &["noAlias", "alias", "negatedAlias"]))
+        .map(|element| element.one_of(NAME, &["noAlias", "alias", "negatedAlias"]))
         .collect();
     let is_alias = |stated: Option<&str>| matches!(stated, Some("alias" | "negatedAlias"));
     let mut bases: HashMap<(&str, u32), String> = HashMap::new();

@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use super::kinds::Precision;
 use crate::defect::ParseError;
-use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::parse::attributes::Node;
+use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
 
 /// Reads `start`, or the elements `Start` of a String or Binary. A single value becomes the start of
@@ -21,8 +22,9 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
     }
     let precision = Precision::of(kind);
     if let Some(real_type) = kind.as_real_mut() {
-        let values =
-            list(element, |text| Some(precision.round(real(text)?)), || "numbers".to_owned())?;
+        // XML Schema has `INF`, `-INF` and `NaN`, and so has `parse`.
+        let number = |text: &str| Some(precision.round(text.parse().ok()?));
+        let values = list(element, number, || "numbers".to_owned())?;
         return Ok(single(values, |value| real_type.start = Some(value)).map(Elements::Real));
     }
     Ok(match kind {
@@ -60,11 +62,9 @@ fn list<T>(
     expected: impl Fn() -> String,
 ) -> Result<Vec<T>, ParseError> {
     let Some(text) = element.attribute("start") else { return Ok(Vec::new()) };
-    let words = text.split(WHITE_SPACE).filter(|word| !word.is_empty());
-    let mut values = Vec::new();
-    for word in words {
-        values.push(value(word).ok_or_else(|| element.wrong("start", &expected(), word))?);
-    }
+    let wrong = |word| element.wrong("start", &expected(), word);
+    let values = words(text).map(|word| value(word).ok_or_else(|| wrong(word)));
+    let values: Vec<T> = values.collect::<Result<_, _>>()?;
     if values.is_empty() {
         element.warn("start", &expected(), text, "read as if it were not there");
     }
@@ -78,11 +78,6 @@ fn integer(text: &str, range: &RangeInclusive<i128>) -> Option<i128> {
         format!("{real:.0}").parse().ok()
     };
     plain.or_else(whole).filter(|value| range.contains(value))
-}
-
-/// A number of XML Schema, which has `INF`, `-INF` and `NaN`.
-fn real(text: &str) -> Option<f64> {
-    text.parse().ok()
 }
 
 fn boolean(text: &str) -> Option<bool> {

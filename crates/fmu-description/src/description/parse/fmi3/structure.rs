@@ -2,13 +2,13 @@
 
 use std::collections::HashSet;
 
-use super::variables::References;
+use super::variables::{A_REFERENCE, References};
 use crate::defect::ParseError;
 use crate::description::parse::attributes::Node;
-use crate::description::parse::structure::{ANYTHING, kinds, missing_outputs, words};
+use crate::description::parse::structure::{
+    ANYTHING, add_outputs, child, kinds, missing_outputs, words,
+};
 use crate::description::{ModelStructure, ScalarVariable, Unknown};
-
-const A_REFERENCE: &str = "the value reference of a variable";
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
@@ -19,25 +19,13 @@ pub(super) fn read(
     variables: &[ScalarVariable],
     references: &References,
 ) -> Result<ModelStructure, ParseError> {
-    let Some(element) = root.optional_child("ModelStructure")? else {
-        let place = "<fmiModelDescription>".to_owned();
-        let expected = "an element ModelStructure";
-        root.warn_of(true, place, expected, "none".to_owned(), ANYTHING);
-        return Ok(ModelStructure {
-            outputs: missing(&[], variables, references).map(|(row, _)| row).collect(),
-            ..ModelStructure::default()
-        });
+    let Some(element) = child(root)? else {
+        let missing = missing(&[], variables, references).map(|(row, _)| row);
+        return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
     };
     let mut outputs = list(element, "Output", references)?;
-    let missing: Vec<_> = missing(&outputs, variables, references).collect();
-    if !missing.is_empty() {
-        let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
-        let more = if missing.len() > 5 { ", and others" } else { "" };
-        let actual = format!("none for {}{more}", names.join(", "));
-        let place = "<ModelStructure>".to_owned();
-        element.warn_of(false, place, "an Output for every output", actual, ANYTHING);
-        outputs.extend(missing.into_iter().map(|(row, _)| row));
-    }
+    let missing = missing(&outputs, variables, references).collect();
+    add_outputs(element, &mut outputs, missing, ["an Output for every output", "none for"]);
     for row in element.children_named("ContinuousStateDerivative") {
         if index(row, references)?.is_none() {
             // The rows determine the states.

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use super::kinds::attributes;
 use super::start;
 use crate::defect::ParseError;
-use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::parse::attributes::Node;
+use crate::description::parse::structure::words;
 use crate::description::parse::variables::{
     Types, VARIABILITIES, VARIABLES, by_name, check_names, check_references, declared,
 };
@@ -26,7 +27,7 @@ const CAUSALITIES: [&str; 7] = [
     "independent",
     "structuralParameter",
 ];
-const A_REFERENCE: &str = "the value reference of a variable";
+pub(super) const A_REFERENCE: &str = "the value reference of a variable";
 
 /// The 1-based index of the variable with a value reference, without aliases.
 pub(super) type References = HashMap<u32, u32>;
@@ -220,9 +221,8 @@ fn reference(element: Node<'_>, name: &'static str) -> Result<Option<u32>, Parse
 /// Reads the attribute `clocks` as value references.
 fn clocks(element: Node<'_>) -> Result<Vec<u32>, ParseError> {
     let text = element.attribute("clocks").unwrap_or_default();
-    let words = text.split(WHITE_SPACE).filter(|word| !word.is_empty());
     let wrong = |word| element.wrong("clocks", "value references of clocks", word);
-    words.map(|word| word.parse().map_err(|_| wrong(word))).collect()
+    words(text).map(|word| word.parse().map_err(|_| wrong(word))).collect()
 }
 
 /// Checks that each dimension has an extent, and drops start values that are not as many as the
