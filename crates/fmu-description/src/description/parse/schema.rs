@@ -11,8 +11,8 @@ use crate::description::Version;
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
     attributes: &'static [&'static str],
-    /// Attributes that this element shares with other elements.
-    shared: &'static [&'static str],
+    /// Lists of attributes that this element shares with other elements.
+    shared: [&'static [&'static str]; 3],
     children: &'static [&'static str],
     /// The children are one optional list, which must not be empty.
     list: bool,
@@ -22,7 +22,8 @@ struct Shape {
 
 impl Shape {
     const fn with(self, shared: &'static [&'static str]) -> Shape {
-        Shape { shared, ..self }
+        let [first, second, _] = self.shared;
+        Shape { shared: [shared, first, second], ..self }
     }
 }
 
@@ -35,7 +36,7 @@ const fn list(children: &'static [&'static str]) -> Shape {
 }
 
 const fn branch(attributes: &'static [&'static str], children: &'static [&'static str]) -> Shape {
-    Shape { attributes, shared: &[], children, list: false, unordered: 0 }
+    Shape { attributes, shared: [&[]; 3], children, list: false, unordered: 0 }
 }
 
 /// Warns of everything in the file with the root element `root`.
@@ -53,8 +54,8 @@ fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<
     let Some(shape) = shapes(parent, element.name) else { return };
     for (name, value) in &element.attributes {
         // FMI defines no namespaces.
-        let is_listed = shape.attributes.contains(name) || shape.shared.contains(name);
-        let known = is_listed || *name == "xmlns" || name.contains(':');
+        let mut lists = shape.shared.iter().chain([&shape.attributes]);
+        let known = lists.any(|list| list.contains(name)) || *name == "xmlns" || name.contains(':');
         if !known {
             node.warn(name, "an attribute of the standard", value, "it was skipped");
         }

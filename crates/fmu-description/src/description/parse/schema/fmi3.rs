@@ -56,40 +56,20 @@ const CO_SIMULATION: Shape = branch(
     &["Annotations"],
 )
 .with(INTERFACE);
-const TYPES: [&str; 15] = [
-    "Float32Type",
-    "Float64Type",
-    "Int8Type",
-    "UInt8Type",
-    "Int16Type",
-    "UInt16Type",
-    "Int32Type",
-    "UInt32Type",
-    "Int64Type",
-    "UInt64Type",
-    "BooleanType",
-    "StringType",
-    "BinaryType",
-    "EnumerationType",
-    "ClockType",
-];
-const VARIABLES: [&str; 15] = [
-    "Float32",
-    "Float64",
-    "Int8",
-    "UInt8",
-    "Int16",
-    "UInt16",
-    "Int32",
-    "UInt32",
-    "Int64",
-    "UInt64",
-    "Boolean",
-    "String",
-    "Binary",
-    "Enumeration",
-    "Clock",
-];
+
+/// Declares the elements of variables and those of types.
+macro_rules! elements {
+    ($($name:literal)*) => {
+        const VARIABLES: [&str; 15] = [$($name),*];
+        const TYPES: [&str; VARIABLES.len()] = [$(concat!($name, "Type")),*];
+    };
+}
+
+elements! {
+    "Float32" "Float64" "Int8" "UInt8" "Int16" "UInt16" "Int32" "UInt32" "Int64" "UInt64"
+    "Boolean" "String" "Binary" "Enumeration" "Clock"
+}
+
 /// Attributes of all variables.
 const VARIABLE: &[&str] = &[
     "name",
@@ -101,6 +81,12 @@ const VARIABLE: &[&str] = &[
     "clocks",
     "declaredType",
 ];
+/// Attributes of a type.
+const TYPE: &[&str] = &["name", "description"];
+/// Attributes of a number, as a type and as a variable.
+const REAL: &[&str] =
+    &["quantity", "unit", "displayUnit", "relativeQuantity", "unbounded", "min", "max", "nominal"];
+const INTEGER: &[&str] = &["quantity", "min", "max"];
 /// Attributes of a clock, as a type and as a variable.
 const CLOCK: &[&str] = &[
     "canBeDeactivated",
@@ -157,70 +143,33 @@ const ROWS: [&str; 5] =
     ["Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator"];
 
 fn of_type(name: &str) -> Option<Shape> {
-    Some(match name {
-        "Float32Type" | "Float64Type" => branch(
-            &[
-                "name",
-                "description",
-                "quantity",
-                "unit",
-                "displayUnit",
-                "relativeQuantity",
-                "unbounded",
-                "min",
-                "max",
-                "nominal",
-            ],
-            ANNOTATED,
-        ),
-        "BooleanType" | "StringType" => branch(&["name", "description"], ANNOTATED),
-        "BinaryType" => branch(&["name", "description", "mimeType", "maxSize"], ANNOTATED),
-        "EnumerationType" => Shape {
-            unordered: 1,
-            ..branch(&["name", "description", "quantity", "min", "max"], &["Annotations", "Item"])
-        },
-        "ClockType" => branch(&["name", "description"], ANNOTATED).with(CLOCK),
-        other if TYPES.contains(&other) => {
-            branch(&["name", "description", "quantity", "min", "max"], ANNOTATED)
-        }
+    let shape = match name {
+        "Float32Type" | "Float64Type" => branch(REAL, ANNOTATED),
+        "BooleanType" | "StringType" => branch(&[], ANNOTATED),
+        "BinaryType" => branch(&["mimeType", "maxSize"], ANNOTATED),
+        "EnumerationType" => Shape { unordered: 1, ..branch(INTEGER, &["Annotations", "Item"]) },
+        "ClockType" => branch(CLOCK, ANNOTATED),
+        other if TYPES.contains(&other) => branch(INTEGER, ANNOTATED),
         _ => return None,
-    })
+    };
+    Some(shape.with(TYPE))
 }
 
 fn of_variable(name: &str) -> Option<Shape> {
+    const CHANGING: &[&str] = &["initial", "intermediateUpdate", "previous"];
     const INITIALIZED: &[&str] = &["Annotations", "Dimension", "Alias"];
     const WITH_STARTS: &[&str] = &["Annotations", "Dimension", "Start", "Alias"];
     let shape = match name {
-        "Float32" | "Float64" => branch(
-            &[
-                "initial",
-                "intermediateUpdate",
-                "previous",
-                "quantity",
-                "unit",
-                "displayUnit",
-                "relativeQuantity",
-                "unbounded",
-                "min",
-                "max",
-                "nominal",
-                "start",
-                "derivative",
-                "reinit",
-            ],
-            INITIALIZED,
-        ),
-        "Boolean" => branch(&["initial", "intermediateUpdate", "previous", "start"], INITIALIZED),
-        "String" => branch(&["initial", "intermediateUpdate", "previous"], WITH_STARTS),
-        "Binary" => branch(
-            &["initial", "intermediateUpdate", "previous", "mimeType", "maxSize"],
-            WITH_STARTS,
-        ),
+        "Float32" | "Float64" => {
+            branch(&["start", "derivative", "reinit"], INITIALIZED).with(REAL).with(CHANGING)
+        }
+        "Boolean" => branch(&["start"], INITIALIZED).with(CHANGING),
+        "String" => branch(CHANGING, WITH_STARTS),
+        "Binary" => branch(&["mimeType", "maxSize"], WITH_STARTS).with(CHANGING),
         "Clock" => branch(CLOCK, &["Annotations", "Alias"]),
-        other if VARIABLES.contains(&other) => branch(
-            &["initial", "intermediateUpdate", "previous", "quantity", "min", "max", "start"],
-            INITIALIZED,
-        ),
+        other if VARIABLES.contains(&other) => {
+            branch(&["start"], INITIALIZED).with(INTEGER).with(CHANGING)
+        }
         _ => return None,
     };
     Some(shape.with(VARIABLE))
