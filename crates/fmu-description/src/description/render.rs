@@ -7,11 +7,19 @@ use quick_xml::events::{BytesDecl, BytesEnd, Event};
 use quick_xml::writer::Writer;
 
 use super::{
-    CoSimulation, DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription,
-    ModelExchange, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown, Version,
+    DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription, ModelStructure, RealType,
+    ScalarVariable, SimpleType, Unknown, Version,
 };
 use crate::unit::{BaseUnit, Unit};
 use tag::Tag;
+
+/// Adds flags and numbers of an interface to its tag, unless they are false or zero: attribute and field.
+macro_rules! flags {
+    ($tag:ident, $flags:ident: $($name:literal $field:ident,)*) => {
+        $tag$(.unless_default($name, &$flags.$field))*
+    };
+}
+use flags;
 
 impl ModelDescription {
     /// Renders `modelDescription.xml` in the order of the schema of its version, FMI 2.0.5 or 3.0.2.
@@ -38,10 +46,7 @@ impl ModelDescription {
     pub fn to_xml(&self) -> String {
         let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
-        match self.version() {
-            Version::V3 => output.root_3(self),
-            Version::V1 | Version::V2 => output.root(self),
-        }
+        output.root(self);
         let mut bytes = output.writer.into_inner();
         bytes.push(b'\n');
         String::from_utf8_lossy(&bytes).into_owned()
@@ -80,12 +85,14 @@ impl Output {
     }
 
     fn root(&mut self, description: &ModelDescription) {
+        let third = description.version() == Version::V3;
         let naming = description.structured_names.then_some("structured");
         let date = description.generation_date_and_time.as_ref();
+        let indicators = description.number_of_event_indicators.as_ref().filter(|_| !third);
         let tag = Tag::new("fmiModelDescription")
             .with("fmiVersion", &description.fmi_version)
             .with("modelName", &description.model_name)
-            .with("guid", &description.guid)
+            .with(if third { "instantiationToken" } else { "guid" }, &description.guid)
             .maybe("description", description.description.as_ref())
             .maybe("author", description.author.as_ref())
             .maybe("version", description.version.as_ref())
@@ -94,44 +101,65 @@ impl Output {
             .maybe("generationTool", description.generation_tool.as_ref())
             .maybe("generationDateAndTime", date)
             .maybe("variableNamingConvention", naming)
-            .maybe("numberOfEventIndicators", description.number_of_event_indicators.as_ref());
+            .maybe("numberOfEventIndicators", indicators);
+        let simple_type = if third { Self::type_definition } else { Self::simple_type };
         self.around(tag, |output| {
-            if let Some(model_exchange) = &description.model_exchange {
-                output.model_exchange(model_exchange);
-            }
-            if let Some(co_simulation) = &description.co_simulation {
-                output.co_simulation(co_simulation);
+            if third {
+                output.interfaces_3(description);
+            } else {
+                output.interfaces(description);
             }
             output.list("UnitDefinitions", &description.units, Self::unit);
-            output.list("TypeDefinitions", &description.types, Self::simple_type);
+            output.list("TypeDefinitions", &description.types, simple_type);
             output.list("LogCategories", &description.log_categories, Self::category);
             if let Some(experiment) = &description.default_experiment {
                 output.experiment(experiment);
             }
             output.around(Tag::new("ModelVariables"), |output| {
-                description.variables.iter().for_each(|variable| output.variable(variable));
+                if third {
+                    output.variables_3(description);
+                } else {
+                    description.variables.iter().for_each(|variable| output.variable(variable));
+                }
             });
-            output.structure(&description.structure);
+            if third {
+                output.structure_3(description);
+            } else {
+                output.structure(&description.structure);
+            }
         });
     }
 
-    fn model_exchange(&mut self, flags: &ModelExchange) {
-        let no_completed_step = &flags.completed_integrator_step_not_needed;
-        let only_once = &flags.can_be_instantiated_only_once_per_process;
-        let own_memory = &flags.can_not_use_memory_management_functions;
-        let derivatives = &flags.provides_directional_derivative;
-        self.interface(
-            Tag::new("ModelExchange")
-                .with("modelIdentifier", &flags.model_identifier)
-                .unless_default("needsExecutionTool", &flags.needs_execution_tool)
-                .unless_default("completedIntegratorStepNotNeeded", no_completed_step)
-                .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-                .unless_default("canNotUseMemoryManagementFunctions", own_memory)
-                .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
-                .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
-                .unless_default("providesDirectionalDerivative", derivatives),
-            &flags.source_files,
-        );
+    fn interfaces(&mut self, description: &ModelDescription) {
+        if let Some(flags) = &description.model_exchange {
+            let tag = Tag::new("ModelExchange").with("modelIdentifier", &flags.model_identifier);
+            let tag = flags! { tag, flags:
+                "needsExecutionTool" needs_execution_tool,
+                "completedIntegratorStepNotNeeded" completed_integrator_step_not_needed,
+                "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+                "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
+                "canGetAndSetFMUstate" can_get_and_set_fmu_state,
+                "canSerializeFMUstate" can_serialize_fmu_state,
+                "providesDirectionalDerivative" provides_directional_derivative,
+            };
+            self.interface(tag, &flags.source_files);
+        }
+        if let Some(flags) = &description.co_simulation {
+            let tag = Tag::new("CoSimulation").with("modelIdentifier", &flags.model_identifier);
+            let tag = flags! { tag, flags:
+                "needsExecutionTool" needs_execution_tool,
+                "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+                "canInterpolateInputs" can_interpolate_inputs,
+                "maxOutputDerivativeOrder" max_output_derivative_order,
+                "canRunAsynchronuously" can_run_asynchronuously,
+                "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+                "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
+                "canGetAndSetFMUstate" can_get_and_set_fmu_state,
+                "canSerializeFMUstate" can_serialize_fmu_state,
+                "providesDirectionalDerivative" provides_directional_derivative,
+            };
+            self.interface(tag, &flags.source_files);
+        }
     }
 
     /// Writes an interface with its source files.
@@ -146,30 +174,6 @@ impl Output {
                 }
             });
         });
-    }
-
-    fn co_simulation(&mut self, flags: &CoSimulation) {
-        let variable_step = &flags.can_handle_variable_communication_step_size;
-        let only_once = &flags.can_be_instantiated_only_once_per_process;
-        let own_memory = &flags.can_not_use_memory_management_functions;
-        self.interface(
-            Tag::new("CoSimulation")
-                .with("modelIdentifier", &flags.model_identifier)
-                .unless_default("needsExecutionTool", &flags.needs_execution_tool)
-                .unless_default("canHandleVariableCommunicationStepSize", variable_step)
-                .unless_default("canInterpolateInputs", &flags.can_interpolate_inputs)
-                .unless_default("maxOutputDerivativeOrder", &flags.max_output_derivative_order)
-                .unless_default("canRunAsynchronuously", &flags.can_run_asynchronuously)
-                .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-                .unless_default("canNotUseMemoryManagementFunctions", own_memory)
-                .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
-                .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
-                .unless_default(
-                    "providesDirectionalDerivative",
-                    &flags.provides_directional_derivative,
-                ),
-            &flags.source_files,
-        );
     }
 
     fn unit(&mut self, unit: &Unit) {
@@ -204,7 +208,7 @@ impl Output {
         self.around(tag, |output| {
             let element = Tag::new(declared.kind.element());
             match &declared.kind {
-                Kind::Real(real) => output.empty(real_limits(element, real)),
+                Kind::Real(real) => output.empty(real_limits(element, real, number)),
                 Kind::Integer(integer) => output.empty(integer_limits(element, integer)),
                 Kind::Enumeration(integer) => {
                     let element = element.maybe("quantity", integer.quantity.as_ref());
@@ -250,7 +254,7 @@ impl Output {
             output.empty(match &variable.kind {
                 Kind::Real(real) => {
                     let element = element.maybe("declaredType", real.declared_type.as_ref());
-                    real_limits(element, real)
+                    real_limits(element, real, number)
                         .maybe("start", real.start.as_ref())
                         .maybe("derivative", real.derivative.as_ref())
                         .unless_default("reinit", &real.reinit)
@@ -283,15 +287,11 @@ impl Output {
             .dependencies
             .as_ref()
             .map(|indices| indices.iter().map(u32::to_string).collect::<Vec<_>>().join(" "));
-        let kinds = unknown
-            .kinds
-            .as_ref()
-            .map(|kinds| kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "));
         self.empty(
             Tag::new("Unknown")
                 .with("index", &unknown.index)
                 .maybe("dependencies", dependencies.as_ref())
-                .maybe("dependenciesKind", kinds.as_ref()),
+                .maybe("dependenciesKind", kinds(unknown).as_ref()),
         );
     }
 }
@@ -301,13 +301,24 @@ fn conversion(tag: Tag<'_>, factor: f64, offset: f64) -> Tag<'_> {
     tag.maybe("factor", other).unless_default("offset", &offset)
 }
 
-fn real_limits<'a>(tag: Tag<'a>, real: &RealType) -> Tag<'a> {
+/// Returns the attribute `dependenciesKind`.
+fn kinds(row: &Unknown) -> Option<String> {
+    let kinds = row.kinds.as_ref()?;
+    Some(kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "))
+}
+
+/// The shortest text of a number that reads back to the same bits.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn real_limits<'a>(tag: Tag<'a>, real: &RealType, text: fn(f64) -> String) -> Tag<'a> {
     tag.maybe("quantity", real.quantity.as_ref())
         .maybe("unit", real.unit.as_ref())
         .maybe("displayUnit", real.display_unit.as_ref())
-        .maybe("min", real.min.as_ref())
-        .maybe("max", real.max.as_ref())
-        .maybe("nominal", real.nominal.as_ref())
+        .maybe("min", real.min.map(text).as_ref())
+        .maybe("max", real.max.map(text).as_ref())
+        .maybe("nominal", real.nominal.map(text).as_ref())
 }
 
 fn integer_limits<'a>(tag: Tag<'a>, integer: &IntegerType) -> Tag<'a> {

@@ -3,50 +3,41 @@
 mod variables;
 
 use super::tag::Tag;
-use super::{Output, integer_limits};
+use super::{Output, flags, integer_limits, kinds, number, real_limits};
 use crate::description::{
-    CoSimulation, Kind, ModelDescription, ModelExchange, RealType, ScheduledExecution, SimpleType,
-    Unknown, Version,
+    CoSimulation, Kind, ModelDescription, ModelExchange, SimpleType, Unknown, Version,
 };
 
+/// Returns the tag of an interface with the attributes that all three have.
+macro_rules! interface {
+    ($name:literal, $flags:ident) => {{
+        let tag = Tag::new($name).with("modelIdentifier", &$flags.model_identifier);
+        flags! { tag, $flags:
+            "needsExecutionTool" needs_execution_tool,
+            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+            "canGetAndSetFMUState" can_get_and_set_fmu_state,
+            "canSerializeFMUState" can_serialize_fmu_state,
+            "providesDirectionalDerivatives" provides_directional_derivative,
+            "providesAdjointDerivatives" provides_adjoint_derivatives,
+            "providesPerElementDependencies" provides_per_element_dependencies,
+        }
+    }};
+}
+
 impl Output {
-    pub(super) fn root_3(&mut self, description: &ModelDescription) {
-        let naming = description.structured_names.then_some("structured");
-        let date = description.generation_date_and_time.as_ref();
-        let tag = Tag::new("fmiModelDescription")
-            .with("fmiVersion", &description.fmi_version)
-            .with("modelName", &description.model_name)
-            .with("instantiationToken", &description.guid)
-            .maybe("description", description.description.as_ref())
-            .maybe("author", description.author.as_ref())
-            .maybe("version", description.version.as_ref())
-            .maybe("copyright", description.copyright.as_ref())
-            .maybe("license", description.license.as_ref())
-            .maybe("generationTool", description.generation_tool.as_ref())
-            .maybe("generationDateAndTime", date)
-            .maybe("variableNamingConvention", naming);
-        self.around(tag, |output| {
-            if let Some(flags) = &description.model_exchange {
-                output.empty(model_exchange(flags));
-            }
-            if let Some(flags) = &description.co_simulation {
-                output.empty(co_simulation(flags));
-            }
-            if let Some(flags) = &description.scheduled_execution {
-                output.empty(scheduled_execution(flags));
-            }
-            output.list("UnitDefinitions", &description.units, Self::unit);
-            output.list("TypeDefinitions", &description.types, Self::type_definition);
-            output.list("LogCategories", &description.log_categories, Self::category);
-            if let Some(experiment) = &description.default_experiment {
-                output.experiment(experiment);
-            }
-            output.around(Tag::new("ModelVariables"), |output| output.variables_3(description));
-            output.structure_3(description);
-        });
+    pub(super) fn interfaces_3(&mut self, description: &ModelDescription) {
+        if let Some(flags) = &description.model_exchange {
+            self.empty(model_exchange(flags));
+        }
+        if let Some(flags) = &description.co_simulation {
+            self.empty(co_simulation(flags));
+        }
+        if let Some(flags) = &description.scheduled_execution {
+            self.empty(interface!("ScheduledExecution", flags));
+        }
     }
 
-    fn type_definition(&mut self, declared: &SimpleType) {
+    pub(super) fn type_definition(&mut self, declared: &SimpleType) {
         let element = format!("{}Type", declared.kind.element_in(Version::V3));
         let tag = Tag::new(&element)
             .with("name", &declared.name)
@@ -62,7 +53,7 @@ impl Output {
         });
     }
 
-    fn structure_3(&mut self, description: &ModelDescription) {
+    pub(super) fn structure_3(&mut self, description: &ModelDescription) {
         let structure = &description.structure;
         let rows = [
             ("Output", &structure.outputs),
@@ -96,20 +87,16 @@ fn references(description: &ModelDescription, indices: &[u32]) -> String {
 
 fn unknown<'a>(name: &'a str, row: &Unknown, description: &ModelDescription) -> Tag<'a> {
     let dependencies = row.dependencies.as_ref().map(|indices| references(description, indices));
-    let kinds = row
-        .kinds
-        .as_ref()
-        .map(|kinds| kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "));
     Tag::new(name)
         .with("valueReference", &reference(description, row.index))
         .maybe("dependencies", dependencies.as_ref())
-        .maybe("dependenciesKind", kinds.as_ref())
+        .maybe("dependenciesKind", kinds(row).as_ref())
 }
 
 /// Adds the attributes that a type and a variable have in common.
 fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
     match kind {
-        Kind::Real(real) => real_limits(tag, real, |value| format!("{value:?}")),
+        Kind::Real(real) => real_limits(tag, real, number),
         Kind::Float32(real) => real_limits(tag, real, single),
         Kind::Boolean(_) | Kind::String(_) => tag,
         Kind::Binary(binary) => tag
@@ -132,15 +119,6 @@ fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
     }
 }
 
-fn real_limits<'a>(tag: Tag<'a>, real: &RealType, text: fn(f64) -> String) -> Tag<'a> {
-    tag.maybe("quantity", real.quantity.as_ref())
-        .maybe("unit", real.unit.as_ref())
-        .maybe("displayUnit", real.display_unit.as_ref())
-        .maybe("min", real.min.map(text).as_ref())
-        .maybe("max", real.max.map(text).as_ref())
-        .maybe("nominal", real.nominal.map(text).as_ref())
-}
-
 /// The shortest text of a Float32 that reads back to the same bits.
 #[expect(clippy::cast_possible_truncation, reason = "the numbers of a Float32 are those of an f32")]
 fn single(value: f64) -> String {
@@ -148,57 +126,26 @@ fn single(value: f64) -> String {
 }
 
 fn model_exchange(flags: &ModelExchange) -> Tag<'_> {
-    let only_once = &flags.can_be_instantiated_only_once_per_process;
-    let elements = &flags.provides_per_element_dependencies;
-    Tag::new("ModelExchange")
-        .with("modelIdentifier", &flags.model_identifier)
-        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
-        .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
-        .unless_default("providesPerElementDependencies", elements)
-        .unless_default("needsCompletedIntegratorStep", &flags.needs_completed_integrator_step)
-        .unless_default("providesEvaluateDiscreteStates", &flags.provides_evaluate_discrete_states)
+    let tag = interface!("ModelExchange", flags);
+    flags! { tag, flags:
+        "needsCompletedIntegratorStep" needs_completed_integrator_step,
+        "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
+    }
 }
 
 fn co_simulation(flags: &CoSimulation) -> Tag<'_> {
-    let only_once = &flags.can_be_instantiated_only_once_per_process;
-    let elements = &flags.provides_per_element_dependencies;
-    let variable_step = &flags.can_handle_variable_communication_step_size;
-    let smoothness = &flags.recommended_intermediate_input_smoothness;
-    let after_update = &flags.can_return_early_after_intermediate_update;
-    Tag::new("CoSimulation")
-        .with("modelIdentifier", &flags.model_identifier)
-        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
-        .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
-        .unless_default("providesPerElementDependencies", elements)
-        .unless_default("canHandleVariableCommunicationStepSize", variable_step)
-        .maybe("fixedInternalStepSize", flags.fixed_internal_step_size.as_ref())
-        .unless_default("maxOutputDerivativeOrder", &flags.max_output_derivative_order)
-        .unless_default("recommendedIntermediateInputSmoothness", smoothness)
-        .unless_default("providesIntermediateUpdate", &flags.provides_intermediate_update)
-        .unless_default("mightReturnEarlyFromDoStep", &flags.might_return_early_from_do_step)
-        .unless_default("canReturnEarlyAfterIntermediateUpdate", after_update)
-        .unless_default("hasEventMode", &flags.has_event_mode)
-        .unless_default("providesEvaluateDiscreteStates", &flags.provides_evaluate_discrete_states)
-}
-
-fn scheduled_execution(flags: &ScheduledExecution) -> Tag<'_> {
-    let only_once = &flags.can_be_instantiated_only_once_per_process;
-    let elements = &flags.provides_per_element_dependencies;
-    Tag::new("ScheduledExecution")
-        .with("modelIdentifier", &flags.model_identifier)
-        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
-        .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
-        .unless_default("providesPerElementDependencies", elements)
+    let tag = interface!("CoSimulation", flags);
+    let tag = flags! { tag, flags:
+        "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+    };
+    let tag = tag.maybe("fixedInternalStepSize", flags.fixed_internal_step_size.as_ref());
+    flags! { tag, flags:
+        "maxOutputDerivativeOrder" max_output_derivative_order,
+        "recommendedIntermediateInputSmoothness" recommended_intermediate_input_smoothness,
+        "providesIntermediateUpdate" provides_intermediate_update,
+        "mightReturnEarlyFromDoStep" might_return_early_from_do_step,
+        "canReturnEarlyAfterIntermediateUpdate" can_return_early_after_intermediate_update,
+        "hasEventMode" has_event_mode,
+        "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
+    }
 }

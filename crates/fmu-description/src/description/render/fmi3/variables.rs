@@ -4,13 +4,13 @@ use super::{attributes, reference, references, single};
 use crate::description::render::Output;
 use crate::description::render::tag::Tag;
 use crate::description::{
-    Dimension, Elements, Initial, Kind, ModelDescription, ScalarVariable, Version,
+    Dimension, Elements, Initial, Kind, ModelDescription, ScalarVariable, Version, hexadecimal,
 };
 
 impl Output {
     /// Writes the variables with their aliases, the variables with the same value reference that name
     /// it as `alias_of`. Neither needs to follow the other.
-    pub(super) fn variables_3(&mut self, description: &ModelDescription) {
+    pub(in crate::description::render) fn variables_3(&mut self, description: &ModelDescription) {
         let mut aliases = std::collections::HashMap::<&str, Vec<&ScalarVariable>>::new();
         for alias in &description.variables {
             if let Some(of) = &alias.alias_of {
@@ -118,10 +118,7 @@ fn joined<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
 
 /// Returns the values of the elements `Start`, which a String and a Binary have.
 fn start_elements(variable: &ScalarVariable) -> Vec<String> {
-    let hexadecimal = |bytes: &Vec<u8>| {
-        let digits: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        digits.concat()
-    };
+    let hexadecimal = |bytes: &Vec<u8>| hexadecimal(bytes);
     match (&variable.start_elements, &variable.kind) {
         (Some(Elements::String(texts)), _) => texts.clone(),
         (Some(Elements::Binary(binaries)), _) => binaries.iter().map(hexadecimal).collect(),
