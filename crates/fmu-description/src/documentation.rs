@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::description::{
     CoSimulation, DefaultExperiment, Dimension, Elements, IntegerType, Kind, ModelDescription,
-    ModelExchange, ScalarVariable, SimpleType, Unknown, Version,
+    ModelExchange, ScalarVariable, SimpleType, Unknown, Version, hexadecimal,
 };
 
 const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
@@ -162,18 +162,15 @@ fn type_name(variable: &ScalarVariable, version: Version) -> String {
 /// Returns the start values of an array, the first ones of a long array.
 fn list(elements: &Elements) -> String {
     const SHOWN: usize = 20;
-    let texts: Vec<String> = match elements {
-        Elements::Real(values) => {
-            values.iter().take(SHOWN).map(|value| format!("{value:?}")).collect()
-        }
-        Elements::Integer(values) => values.iter().take(SHOWN).map(ToString::to_string).collect(),
-        Elements::Boolean(values) => values.iter().take(SHOWN).map(ToString::to_string).collect(),
-        Elements::String(values) => {
-            values.iter().take(SHOWN).map(|value| format!("{value:?}")).collect()
-        }
-        Elements::Binary(values) => {
-            values.iter().take(SHOWN).map(|value| format!("{} bytes", value.len())).collect()
-        }
+    fn first<T>(values: &[T], text: fn(&T) -> String) -> Vec<String> {
+        values.iter().take(SHOWN).map(text).collect()
+    }
+    let texts = match elements {
+        Elements::Real(values) => first(values, |value| format!("{value:?}")),
+        Elements::Integer(values) => first(values, i128::to_string),
+        Elements::Boolean(values) => first(values, bool::to_string),
+        Elements::String(values) => first(values, |value| format!("{value:?}")),
+        Elements::Binary(values) => first(values, |value| format!("{} bytes", value.len())),
     };
     let more = if elements.len() > SHOWN { ", ..." } else { "" };
     format!("{}{more}", texts.join(", "))
@@ -185,6 +182,7 @@ fn list(elements: &Elements) -> String {
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
+    let only = |start: Option<String>| (none(), [start.unwrap_or_default(), none(), none()]);
     match kind {
         Kind::Real(real) | Kind::Float32(real) => {
             let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
@@ -203,23 +201,12 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
             };
             (none(), [item(integer.start), item(integer.min), item(integer.max)])
         }
-        Kind::Boolean(start) => {
-            (none(), [start.map_or_else(none, |start| start.to_string()), none(), none()])
-        }
-        Kind::String(start) => {
-            let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
-            (none(), [text, none(), none()])
-        }
-        Kind::Binary(binary) => {
-            let bytes = binary.start.as_ref();
-            let hex = bytes.map_or_else(none, |bytes| {
-                bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
-            });
-            (none(), [hex, none(), none()])
-        }
+        Kind::Boolean(start) => only(start.map(|start| start.to_string())),
+        Kind::String(start) => only(start.as_ref().map(|start| format!("\"{start}\""))),
+        Kind::Binary(binary) => only(binary.start.as_deref().map(hexadecimal)),
         Kind::Clock(clock) => {
-            let interval = clock.interval_decimal.map_or_else(none, |value| format!("{value:?}"));
-            ("s".to_owned(), [interval, none(), none()])
+            let (_, interval) = only(clock.interval_decimal.map(|value| format!("{value:?}")));
+            ("s".to_owned(), interval)
         }
         other => {
             let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
@@ -262,47 +249,75 @@ fn flag(value: bool) -> &'static str {
     if value { "yes" } else { "no" }
 }
 
-fn attributes(rows: &[(&str, &str)]) -> String {
+/// Renders the attributes of an interface.
+fn attributes(parts: &[&[(&str, &str)]]) -> String {
     let row = |(name, value): &(&str, &str)| vec![code(name), escaped(value).into_owned()];
-    table(&[], &rows.iter().map(row).collect::<Vec<_>>())
+    table(&[], &parts.iter().copied().flatten().map(row).collect::<Vec<_>>())
+}
+
+/// The flags of an interface: attribute and field.
+macro_rules! flags {
+    ($flags:ident: $($name:literal $field:ident,)*) => {
+        &[$(($name, flag($flags.$field)),)*][..]
+    };
+}
+
+/// The flags of both interfaces in FMI 2.0.
+macro_rules! common {
+    ($flags:ident) => {
+        flags! { $flags:
+            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+            "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
+            "canGetAndSetFMUstate" can_get_and_set_fmu_state,
+            "canSerializeFMUstate" can_serialize_fmu_state,
+            "providesDirectionalDerivative" provides_directional_derivative,
+        }
+    };
+}
+
+/// The flags of both interfaces in FMI 3.0.
+macro_rules! common_3 {
+    ($flags:ident) => {
+        flags! { $flags:
+            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+            "canGetAndSetFMUState" can_get_and_set_fmu_state,
+            "canSerializeFMUState" can_serialize_fmu_state,
+            "providesDirectionalDerivatives" provides_directional_derivative,
+            "providesAdjointDerivatives" provides_adjoint_derivatives,
+            "providesPerElementDependencies" provides_per_element_dependencies,
+            "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
+        }
+    };
 }
 
 fn co_simulation(flags: &CoSimulation) -> String {
-    let order = flags.max_output_derivative_order.to_string();
-    let variable_step = flag(flags.can_handle_variable_communication_step_size);
-    let only_once = flag(flags.can_be_instantiated_only_once_per_process);
-    let own_memory = flag(flags.can_not_use_memory_management_functions);
     attributes(&[
-        ("modelIdentifier", flags.model_identifier.as_str()),
-        ("needsExecutionTool", flag(flags.needs_execution_tool)),
-        ("canHandleVariableCommunicationStepSize", variable_step),
-        ("canInterpolateInputs", flag(flags.can_interpolate_inputs)),
-        ("maxOutputDerivativeOrder", &order),
-        ("canRunAsynchronuously", flag(flags.can_run_asynchronuously)),
-        ("canBeInstantiatedOnlyOncePerProcess", only_once),
-        ("canNotUseMemoryManagementFunctions", own_memory),
-        ("canGetAndSetFMUstate", flag(flags.can_get_and_set_fmu_state)),
-        ("canSerializeFMUstate", flag(flags.can_serialize_fmu_state)),
-        ("providesDirectionalDerivative", flag(flags.provides_directional_derivative)),
+        &[("modelIdentifier", flags.model_identifier.as_str())],
+        flags! { flags:
+            "needsExecutionTool" needs_execution_tool,
+            "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+            "canInterpolateInputs" can_interpolate_inputs,
+        },
+        &[("maxOutputDerivativeOrder", &flags.max_output_derivative_order.to_string())],
+        flags! { flags: "canRunAsynchronuously" can_run_asynchronuously, },
+        common!(flags),
     ])
 }
 
 fn model_exchange(flags: &ModelExchange, description: &ModelDescription) -> String {
     let states = description.structure.derivatives.len().to_string();
     let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
-    let only_once = flag(flags.can_be_instantiated_only_once_per_process);
-    let own_memory = flag(flags.can_not_use_memory_management_functions);
     attributes(&[
-        ("modelIdentifier", flags.model_identifier.as_str()),
-        ("continuous states", &states),
-        ("numberOfEventIndicators", &indicators),
-        ("needsExecutionTool", flag(flags.needs_execution_tool)),
-        ("completedIntegratorStepNotNeeded", flag(flags.completed_integrator_step_not_needed)),
-        ("canBeInstantiatedOnlyOncePerProcess", only_once),
-        ("canNotUseMemoryManagementFunctions", own_memory),
-        ("canGetAndSetFMUstate", flag(flags.can_get_and_set_fmu_state)),
-        ("canSerializeFMUstate", flag(flags.can_serialize_fmu_state)),
-        ("providesDirectionalDerivative", flag(flags.provides_directional_derivative)),
+        &[
+            ("modelIdentifier", flags.model_identifier.as_str()),
+            ("continuous states", &states),
+            ("numberOfEventIndicators", &indicators),
+        ],
+        flags! { flags:
+            "needsExecutionTool" needs_execution_tool,
+            "completedIntegratorStepNotNeeded" completed_integrator_step_not_needed,
+        },
+        common!(flags),
     ])
 }
 
@@ -310,31 +325,22 @@ fn co_simulation_3(flags: &CoSimulation) -> String {
     let order = flags.max_output_derivative_order.to_string();
     let step = flags.fixed_internal_step_size.map(|step| format!("{step:?} s"));
     attributes(&[
-        ("modelIdentifier", flags.model_identifier.as_str()),
-        ("needsExecutionTool", flag(flags.needs_execution_tool)),
-        (
-            "canHandleVariableCommunicationStepSize",
-            flag(flags.can_handle_variable_communication_step_size),
-        ),
-        ("fixedInternalStepSize", step.as_deref().unwrap_or("none")),
-        ("maxOutputDerivativeOrder", &order),
-        ("hasEventMode", flag(flags.has_event_mode)),
-        ("mightReturnEarlyFromDoStep", flag(flags.might_return_early_from_do_step)),
-        (
-            "canReturnEarlyAfterIntermediateUpdate",
-            flag(flags.can_return_early_after_intermediate_update),
-        ),
-        ("providesIntermediateUpdate", flag(flags.provides_intermediate_update)),
-        (
-            "canBeInstantiatedOnlyOncePerProcess",
-            flag(flags.can_be_instantiated_only_once_per_process),
-        ),
-        ("canGetAndSetFMUState", flag(flags.can_get_and_set_fmu_state)),
-        ("canSerializeFMUState", flag(flags.can_serialize_fmu_state)),
-        ("providesDirectionalDerivatives", flag(flags.provides_directional_derivative)),
-        ("providesAdjointDerivatives", flag(flags.provides_adjoint_derivatives)),
-        ("providesPerElementDependencies", flag(flags.provides_per_element_dependencies)),
-        ("providesEvaluateDiscreteStates", flag(flags.provides_evaluate_discrete_states)),
+        &[("modelIdentifier", flags.model_identifier.as_str())],
+        flags! { flags:
+            "needsExecutionTool" needs_execution_tool,
+            "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+        },
+        &[
+            ("fixedInternalStepSize", step.as_deref().unwrap_or("none")),
+            ("maxOutputDerivativeOrder", &order),
+        ],
+        flags! { flags:
+            "hasEventMode" has_event_mode,
+            "mightReturnEarlyFromDoStep" might_return_early_from_do_step,
+            "canReturnEarlyAfterIntermediateUpdate" can_return_early_after_intermediate_update,
+            "providesIntermediateUpdate" provides_intermediate_update,
+        },
+        common_3!(flags),
     ])
 }
 
@@ -347,21 +353,16 @@ fn model_exchange_3(flags: &ModelExchange, description: &ModelDescription) -> St
     let states = size(&description.structure.derivatives);
     let indicators = size(&description.structure.event_indicators);
     attributes(&[
-        ("modelIdentifier", flags.model_identifier.as_str()),
-        ("continuous states", &states),
-        ("event indicators", &indicators),
-        ("needsExecutionTool", flag(flags.needs_execution_tool)),
-        ("needsCompletedIntegratorStep", flag(flags.needs_completed_integrator_step)),
-        (
-            "canBeInstantiatedOnlyOncePerProcess",
-            flag(flags.can_be_instantiated_only_once_per_process),
-        ),
-        ("canGetAndSetFMUState", flag(flags.can_get_and_set_fmu_state)),
-        ("canSerializeFMUState", flag(flags.can_serialize_fmu_state)),
-        ("providesDirectionalDerivatives", flag(flags.provides_directional_derivative)),
-        ("providesAdjointDerivatives", flag(flags.provides_adjoint_derivatives)),
-        ("providesPerElementDependencies", flag(flags.provides_per_element_dependencies)),
-        ("providesEvaluateDiscreteStates", flag(flags.provides_evaluate_discrete_states)),
+        &[
+            ("modelIdentifier", flags.model_identifier.as_str()),
+            ("continuous states", &states),
+            ("event indicators", &indicators),
+        ],
+        flags! { flags:
+            "needsExecutionTool" needs_execution_tool,
+            "needsCompletedIntegratorStep" needs_completed_integrator_step,
+        },
+        common_3!(flags),
     ])
 }
 
