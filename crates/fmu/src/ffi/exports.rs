@@ -77,122 +77,118 @@ macro_rules! export {
             $crate::entry_points! { $model;
                 fmi2GetTypesPlatform = types_platform() -> fmi2String;
                 fmi2GetVersion = version() -> fmi2String;
-                fmuDescribe = describe(fmi2_resources: fmi2String,
-                    fmi2_context: fmi2ComponentEnvironment, fmi2_sink: DescribeSink) -> fmi2Integer;
-                fmi2Instantiate = instantiate(fmi2_name: fmi2String, fmi2_fmu_type: fmi2Type,
-                    fmi2_guid: fmi2String, fmi2_resource_location: fmi2String,
-                    fmi2_functions: *const fmi2CallbackFunctions, fmi2_visible: fmi2Boolean,
-                    fmi2_logging_on: fmi2Boolean) -> fmi2Component;
-                fmi2FreeInstance = free_instance(fmi2_c: fmi2Component) -> void;
-                fmi2SetDebugLogging = set_debug_logging(fmi2_c: fmi2Component, fmi2_on: fmi2Boolean,
-                    fmi2_n: size_t, fmi2_categories: *const fmi2String) -> fmi2Status;
-                fmi2SetupExperiment = setup_experiment(fmi2_c: fmi2Component,
-                    fmi2_tolerance_defined: fmi2Boolean, fmi2_tolerance: fmi2Real,
-                    fmi2_start_time: fmi2Real, fmi2_stop_time_defined: fmi2Boolean,
-                    fmi2_stop_time: fmi2Real) -> fmi2Status;
-                fmi2EnterInitializationMode = enter_initialization_mode(
-                    fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2ExitInitializationMode = exit_initialization_mode(
-                    fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2Terminate = terminate(fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2Reset = reset(fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2GetReal = get_real(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *mut fmi2Real) -> fmi2Status;
-                fmi2GetInteger = get_integer(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBoolean = get_boolean(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetString = get_string(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *mut fmi2String) -> fmi2Status;
-                fmi2SetReal = set_real(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *const fmi2Real) -> fmi2Status;
-                fmi2SetInteger = set_integer(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *const fmi2Integer) -> fmi2Status;
-                fmi2SetBoolean = set_boolean(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *const fmi2Boolean) -> fmi2Status;
-                fmi2SetString = set_string(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
-                    fmi2_n: size_t, fmi2_value: *const fmi2String) -> fmi2Status;
-                fmi2GetFMUstate = get_fmu_state(fmi2_c: fmi2Component,
-                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
-                fmi2SetFMUstate = set_fmu_state(fmi2_c: fmi2Component,
-                    fmi2_state: fmi2FMUstate) -> fmi2Status;
-                fmi2FreeFMUstate = free_fmu_state(fmi2_c: fmi2Component,
-                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
-                fmi2SerializedFMUstateSize = serialized_fmu_state_size(fmi2_c: fmi2Component,
-                    fmi2_state: fmi2FMUstate, fmi2_size: *mut size_t) -> fmi2Status;
-                fmi2SerializeFMUstate = serialize_fmu_state(fmi2_c: fmi2Component,
-                    fmi2_state: fmi2FMUstate, fmi2_bytes: *mut fmi2Byte,
-                    fmi2_size: size_t) -> fmi2Status;
-                fmi2DeSerializeFMUstate = de_serialize_fmu_state(fmi2_c: fmi2Component,
-                    fmi2_bytes: *const fmi2Byte, fmi2_size: size_t,
-                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
-                fmi2GetDirectionalDerivative = get_directional_derivative(fmi2_c: fmi2Component,
-                    fmi2_unknown: *const fmi2ValueReference, fmi2_n_unknown: size_t,
-                    fmi2_known: *const fmi2ValueReference, fmi2_n_known: size_t,
-                    fmi2_known_delta: *const fmi2Real, fmi2_unknown_delta: *mut fmi2Real) -> fmi2Status;
-                fmi2EnterEventMode = enter_event_mode(fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2NewDiscreteStates = new_discrete_states(fmi2_c: fmi2Component,
-                    fmi2_info: *mut fmi2EventInfo) -> fmi2Status;
-                fmi2EnterContinuousTimeMode = enter_continuous_time_mode(
-                    fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2CompletedIntegratorStep = completed_integrator_step(fmi2_c: fmi2Component,
-                    fmi2_no_set_fmu_state: fmi2Boolean, fmi2_enter_event_mode: *mut fmi2Boolean,
-                    fmi2_terminate_simulation: *mut fmi2Boolean) -> fmi2Status;
-                fmi2SetTime = set_time(fmi2_c: fmi2Component, fmi2_time: fmi2Real) -> fmi2Status;
-                fmi2SetContinuousStates = set_continuous_states(fmi2_c: fmi2Component,
-                    fmi2_x: *const fmi2Real, fmi2_n: size_t) -> fmi2Status;
-                fmi2GetEventIndicators = get_event_indicators(fmi2_c: fmi2Component,
-                    fmi2_z: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
-                fmi2GetContinuousStates = get_continuous_states(fmi2_c: fmi2Component,
-                    fmi2_x: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
-                fmi2GetDerivatives = get_derivatives(fmi2_c: fmi2Component,
-                    fmi2_derivatives: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
-                fmi2GetNominalsOfContinuousStates = get_nominals(fmi2_c: fmi2Component,
-                    fmi2_nominals: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
-                fmi2SetRealInputDerivatives = set_real_input_derivatives(fmi2_c: fmi2Component,
-                    fmi2_vr: *const fmi2ValueReference, fmi2_n: size_t, fmi2_order: *const fmi2Integer,
-                    fmi2_value: *const fmi2Real) -> fmi2Status;
-                fmi2GetRealOutputDerivatives = get_real_output_derivatives(fmi2_c: fmi2Component,
-                    fmi2_vr: *const fmi2ValueReference, fmi2_n: size_t, fmi2_order: *const fmi2Integer,
-                    fmi2_value: *mut fmi2Real) -> fmi2Status;
-                fmi2DoStep = do_step(fmi2_c: fmi2Component, fmi2_start: fmi2Real, fmi2_size: fmi2Real,
-                    fmi2_no_set_fmu_state: fmi2Boolean) -> fmi2Status;
-                fmi2CancelStep = cancel_step(fmi2_c: fmi2Component) -> fmi2Status;
-                fmi2GetStatus = get_status(fmi2_c: fmi2Component, fmi2_kind: fmi2StatusKind,
-                    fmi2_value: *mut fmi2Status) -> fmi2Status;
-                fmi2GetRealStatus = get_real_status(fmi2_c: fmi2Component, fmi2_kind: fmi2StatusKind,
-                    fmi2_value: *mut fmi2Real) -> fmi2Status;
-                fmi2GetIntegerStatus = get_integer_status(fmi2_c: fmi2Component,
-                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBooleanStatus = get_boolean_status(fmi2_c: fmi2Component,
-                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetStringStatus = get_string_status(fmi2_c: fmi2Component,
-                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2String) -> fmi2Status;
+                fmuDescribe = describe(fmi2String, fmi2ComponentEnvironment,
+                    DescribeSink) -> fmi2Integer;
+                fmi2Instantiate = instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
+                    *const fmi2CallbackFunctions, fmi2Boolean, fmi2Boolean) -> fmi2Component;
+                fmi2FreeInstance = free_instance(fmi2Component) -> void;
+                fmi2SetDebugLogging = set_debug_logging(fmi2Component, fmi2Boolean, size_t,
+                    *const fmi2String) -> fmi2Status;
+                fmi2SetupExperiment = setup_experiment(fmi2Component, fmi2Boolean, fmi2Real,
+                    fmi2Real, fmi2Boolean, fmi2Real) -> fmi2Status;
+                fmi2EnterInitializationMode = enter_initialization_mode(fmi2Component) -> fmi2Status;
+                fmi2ExitInitializationMode = exit_initialization_mode(fmi2Component) -> fmi2Status;
+                fmi2Terminate = terminate(fmi2Component) -> fmi2Status;
+                fmi2Reset = reset(fmi2Component) -> fmi2Status;
+                fmi2GetReal = get_real(fmi2Component, *const fmi2ValueReference, size_t,
+                    *mut fmi2Real) -> fmi2Status;
+                fmi2GetInteger = get_integer(fmi2Component, *const fmi2ValueReference, size_t,
+                    *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBoolean = get_boolean(fmi2Component, *const fmi2ValueReference, size_t,
+                    *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetString = get_string(fmi2Component, *const fmi2ValueReference, size_t,
+                    *mut fmi2String) -> fmi2Status;
+                fmi2SetReal = set_real(fmi2Component, *const fmi2ValueReference, size_t,
+                    *const fmi2Real) -> fmi2Status;
+                fmi2SetInteger = set_integer(fmi2Component, *const fmi2ValueReference, size_t,
+                    *const fmi2Integer) -> fmi2Status;
+                fmi2SetBoolean = set_boolean(fmi2Component, *const fmi2ValueReference, size_t,
+                    *const fmi2Boolean) -> fmi2Status;
+                fmi2SetString = set_string(fmi2Component, *const fmi2ValueReference, size_t,
+                    *const fmi2String) -> fmi2Status;
+                fmi2GetFMUstate = get_fmu_state(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
+                fmi2SetFMUstate = set_fmu_state(fmi2Component, fmi2FMUstate) -> fmi2Status;
+                fmi2FreeFMUstate = free_fmu_state(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
+                fmi2SerializedFMUstateSize = serialized_fmu_state_size(fmi2Component, fmi2FMUstate,
+                    *mut size_t) -> fmi2Status;
+                fmi2SerializeFMUstate = serialize_fmu_state(fmi2Component, fmi2FMUstate,
+                    *mut fmi2Byte, size_t) -> fmi2Status;
+                fmi2DeSerializeFMUstate = de_serialize_fmu_state(fmi2Component, *const fmi2Byte,
+                    size_t, *mut fmi2FMUstate) -> fmi2Status;
+                fmi2GetDirectionalDerivative = get_directional_derivative(fmi2Component,
+                    *const fmi2ValueReference, size_t, *const fmi2ValueReference, size_t,
+                    *const fmi2Real, *mut fmi2Real) -> fmi2Status;
+                fmi2EnterEventMode = enter_event_mode(fmi2Component) -> fmi2Status;
+                fmi2NewDiscreteStates = new_discrete_states(fmi2Component,
+                    *mut fmi2EventInfo) -> fmi2Status;
+                fmi2EnterContinuousTimeMode = enter_continuous_time_mode(fmi2Component) -> fmi2Status;
+                fmi2CompletedIntegratorStep = completed_integrator_step(fmi2Component, fmi2Boolean,
+                    *mut fmi2Boolean, *mut fmi2Boolean) -> fmi2Status;
+                fmi2SetTime = set_time(fmi2Component, fmi2Real) -> fmi2Status;
+                fmi2SetContinuousStates = set_continuous_states(fmi2Component, *const fmi2Real,
+                    size_t) -> fmi2Status;
+                fmi2GetEventIndicators = get_event_indicators(fmi2Component, *mut fmi2Real,
+                    size_t) -> fmi2Status;
+                fmi2GetContinuousStates = get_continuous_states(fmi2Component, *mut fmi2Real,
+                    size_t) -> fmi2Status;
+                fmi2GetDerivatives = get_derivatives(fmi2Component, *mut fmi2Real,
+                    size_t) -> fmi2Status;
+                fmi2GetNominalsOfContinuousStates = get_nominals(fmi2Component, *mut fmi2Real,
+                    size_t) -> fmi2Status;
+                fmi2SetRealInputDerivatives = set_real_input_derivatives(fmi2Component,
+                    *const fmi2ValueReference, size_t, *const fmi2Integer,
+                    *const fmi2Real) -> fmi2Status;
+                fmi2GetRealOutputDerivatives = get_real_output_derivatives(fmi2Component,
+                    *const fmi2ValueReference, size_t, *const fmi2Integer,
+                    *mut fmi2Real) -> fmi2Status;
+                fmi2DoStep = do_step(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
+                fmi2CancelStep = cancel_step(fmi2Component) -> fmi2Status;
+                fmi2GetStatus = get_status(fmi2Component, fmi2StatusKind,
+                    *mut fmi2Status) -> fmi2Status;
+                fmi2GetRealStatus = get_real_status(fmi2Component, fmi2StatusKind,
+                    *mut fmi2Real) -> fmi2Status;
+                fmi2GetIntegerStatus = get_integer_status(fmi2Component, fmi2StatusKind,
+                    *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBooleanStatus = get_boolean_status(fmi2Component, fmi2StatusKind,
+                    *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetStringStatus = get_string_status(fmi2Component, fmi2StatusKind,
+                    *mut fmi2String) -> fmi2Status;
             }
             $crate::entry_points_of_fmi3! { $model }
         };
     };
 }
 
-/// Defines one exported C function per line, which calls the generic function for the model.
+/// Defines exported C functions, which call the generic functions for the model, from the types of their
+/// arguments.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! entry_points {
+    ($model:ty; $($name:ident = $($function:ident)::+ ($($types:tt)*) -> $result:ident;)*) => {
+        $($crate::entry_point! { $model; $name = [$($function)::+] -> $result;
+            [fmi_1 fmi_2 fmi_3 fmi_4 fmi_5 fmi_6 fmi_7 fmi_8 fmi_9 fmi_10 fmi_11 fmi_12] []; $($types)* })*
+    };
+}
+
+/// Defines one exported C function: gives each argument a name, and then writes the function.
 ///
 /// The names of the arguments have a prefix, because a constant `n` of the model would turn an
 /// argument `n` into a pattern.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! entry_points {
-    ($model:ty; $($name:ident =
-        $($function:ident)::+ ($($argument:ident: $(*$access:tt)? $type:ident),*)
-            -> $result:ident;)*) => {
-        $(
-            #[unsafe(no_mangle)]
-            unsafe extern "C" fn $name(
-                $($argument: $(*$access)? $crate::ffi::signature::$type),*
-            ) -> $crate::ffi::signature::$result {
-                // SAFETY: the arguments are passed on unchanged from the importer.
-                unsafe { $crate::ffi::$($function)::+::<$model>($($argument),*) }
-            }
-        )*
+macro_rules! entry_point {
+    ($model:ty; $name:ident = [$($function:tt)*] -> $result:ident;
+        [$($unused:ident)*] [$(($argument:ident $($type:tt)*))*];) => {
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name($($argument: $($type)*),*) -> $crate::ffi::signature::$result {
+            // SAFETY: the arguments are passed on unchanged from the importer.
+            unsafe { $crate::ffi::$($function)*::<$model>($($argument),*) }
+        }
+    };
+    ($model:ty; $name:ident = $function:tt -> $result:ident;
+        [$next:ident $($unused:ident)*] [$($done:tt)*]; $(*$access:tt)? $type:ident $(, $($types:tt)*)?) => {
+        $crate::entry_point! { $model; $name = $function -> $result;
+            [$($unused)*] [$($done)* ($next $(*$access)? $crate::ffi::signature::$type)]; $($($types)*)? }
     };
 }
 
