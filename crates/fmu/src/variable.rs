@@ -23,6 +23,12 @@ pub(crate) enum Access<M> {
     Alias,
 }
 
+impl<M> From<TypedField<M>> for Access<M> {
+    fn from(field: TypedField<M>) -> Self {
+        Access::Typed(field)
+    }
+}
+
 impl<M> Access<M> {
     fn base(&self) -> Base {
         match self {
@@ -86,13 +92,35 @@ pub(crate) struct Fields<M> {
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
+/// Defines constructors of local variables, each with the value in the field that `field` borrows.
+macro_rules! constructors {
+    ($($(#[$documentation:meta])*
+        $constructor:ident($access:ident::$variant:ident($native:ty), $variability:ident);)*) => {
+        $($(#[$documentation])*
+        pub fn $constructor<F>(
+            name: impl Into<String>,
+            description: impl Into<String>,
+            field: F,
+        ) -> Self
+        where
+            F: for<'a> Fn(&'a mut M) -> &'a mut $native + Send + Sync + 'static,
+        {
+            let access = $access::$variant(Box::new(field)).into();
+            Self::local(name, description, Variability::$variability, access)
+        })*
+    };
+}
+
 impl<M> Variable<M> {
-    /// Creates a `Real` variable with the value in the field that `field` borrows.
-    pub fn real<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
-    where
-        F: for<'a> Fn(&'a mut M) -> &'a mut f64 + Send + Sync + 'static,
-    {
-        Self::local(name, description, Variability::Continuous, Access::Real(Box::new(field)))
+    constructors! {
+        /// Creates a `Real` variable with the value in the field that `field` borrows.
+        real(Access::Real(f64), Continuous);
+        /// Creates an `Integer` variable.
+        integer(Access::Integer(i32), Discrete);
+        /// Creates a `Boolean` variable.
+        boolean(Access::Boolean(bool), Discrete);
+        /// Creates a `String` variable.
+        string(Access::String(String), Discrete);
     }
 
     /// Creates the elements of a vector or matrix as Real variables, in row-major order: `name[1,1]`,
@@ -126,30 +154,6 @@ impl<M> Variable<M> {
             let name = element_name(&name, &extents, position);
             Self::real(name, description.clone(), move |model: &mut M| &mut field(model)[position])
         })
-    }
-
-    /// Creates an `Integer` variable.
-    pub fn integer<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
-    where
-        F: for<'a> Fn(&'a mut M) -> &'a mut i32 + Send + Sync + 'static,
-    {
-        Self::local(name, description, Variability::Discrete, Access::Integer(Box::new(field)))
-    }
-
-    /// Creates a `Boolean` variable.
-    pub fn boolean<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
-    where
-        F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
-    {
-        Self::local(name, description, Variability::Discrete, Access::Boolean(Box::new(field)))
-    }
-
-    /// Creates a `String` variable.
-    pub fn string<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
-    where
-        F: for<'a> Fn(&'a mut M) -> &'a mut String + Send + Sync + 'static,
-    {
-        Self::local(name, description, Variability::Discrete, Access::String(Box::new(field)))
     }
 
     /// Creates an `Enumeration` variable. The field holds the value of an item.
@@ -243,8 +247,8 @@ impl<M> Variable<M> {
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
     {
-        let field = TypedField::Clock(Box::new(field));
-        let mut clock = Self::typed(name, description, Variability::Discrete, field);
+        let access = TypedField::Clock(Box::new(field)).into();
+        let mut clock = Self::local(name, description, Variability::Discrete, access);
         clock.declaration.initial = None;
         clock
     }
@@ -259,15 +263,6 @@ impl<M> Variable<M> {
         let mut alias = Self::local(name, description, Variability::Continuous, Access::Alias);
         alias.declaration.base = Base::Alias(of.into());
         alias
-    }
-
-    fn typed(
-        name: impl Into<String>,
-        description: impl Into<String>,
-        variability: Variability,
-        field: TypedField<M>,
-    ) -> Self {
-        Self::local(name, description, variability, Access::Typed(field))
     }
 
     fn local(
@@ -497,6 +492,31 @@ impl<M> Variable<M> {
     {
         self.fields.derivatives.push(Box::new(field));
         self
+    }
+}
+
+/// Variables of the types that FMI 2.0 does not have. A model with one of them leaves as FMI 3.0
+/// only: `aso-ftc pack --fmi 3`.
+impl<M> Variable<M> {
+    constructors! {
+        /// Creates a `Float32` variable (FMI 3.0 only).
+        float32(TypedField::Float32(f32), Continuous);
+        /// Creates an `Int8` variable (FMI 3.0 only).
+        int8(TypedField::Int8(i8), Discrete);
+        /// Creates a `UInt8` variable (FMI 3.0 only).
+        uint8(TypedField::UInt8(u8), Discrete);
+        /// Creates an `Int16` variable (FMI 3.0 only).
+        int16(TypedField::Int16(i16), Discrete);
+        /// Creates a `UInt16` variable (FMI 3.0 only).
+        uint16(TypedField::UInt16(u16), Discrete);
+        /// Creates a `UInt32` variable (FMI 3.0 only).
+        uint32(TypedField::UInt32(u32), Discrete);
+        /// Creates an `Int64` variable (FMI 3.0 only).
+        int64(TypedField::Int64(i64), Discrete);
+        /// Creates a `UInt64` variable (FMI 3.0 only).
+        uint64(TypedField::UInt64(u64), Discrete);
+        /// Creates a `Binary` variable, which may be empty (FMI 3.0 only).
+        binary(TypedField::Binary(Vec<u8>), Discrete);
     }
 }
 
