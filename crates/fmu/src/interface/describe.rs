@@ -112,10 +112,12 @@ pub(super) fn describe_aliases(aliases: Vec<(usize, String)>, description: &mut 
     for (index, of) in aliases {
         let target =
             description.variable(&of).map(|target| (target.kind.clone(), target.value_reference));
-        let Some((kind, value_reference)) = target else { continue };
+        let Some((mut kind, value_reference)) = target else { continue };
         let alias = &mut description.variables[index];
-        let constant = alias.variability == Variability::Constant;
-        keep_derivative(&mut alias.kind, if constant { kind } else { without_start(kind) });
+        if alias.variability != Variability::Constant {
+            kind.clear_start();
+        }
+        keep_derivative(&mut alias.kind, kind);
         alias.value_reference = value_reference;
     }
 }
@@ -126,18 +128,4 @@ pub(super) fn keep_derivative(place: &mut Kind, mut kind: Kind) {
         new.derivative = *derivative;
     }
     *place = kind;
-}
-
-fn without_start(kind: Kind) -> Kind {
-    match kind {
-        Kind::Real(real) => Kind::Real(RealType { start: None, reinit: false, ..real }),
-        Kind::Integer(integer) => Kind::Integer(IntegerType { start: None, ..integer }),
-        Kind::Enumeration(integer) => Kind::Enumeration(IntegerType { start: None, ..integer }),
-        Kind::Boolean(_) => Kind::Boolean(None),
-        Kind::String(_) => Kind::String(None),
-        mut other => {
-            other.clear_start();
-            other
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! Arrays: scalars of FMI 2.0 that are one array in FMI 3.0.
 
+use super::describe::without_start;
 use fmu_description::{Elements, Kind, RealType, ScalarVariable};
 
 /// Scalars that are an array, or one scalar.
@@ -126,19 +127,9 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
             let alike = RealType { start: two.start, derivative: two.derivative, ..one.clone() };
             alike == *two && shifted == two.derivative && one.start.is_some() == two.start.is_some()
         }
-        (Kind::Integer(one), Kind::Integer(two)) => {
-            let alike = fmu_description::IntegerType { start: two.start, ..one.clone() };
-            alike == *two && one.start.is_some() == two.start.is_some()
-        }
-        (Kind::Boolean(one), Kind::Boolean(two)) => one.is_some() == two.is_some(),
         (Kind::String(_) | Kind::Binary(_), _) => false,
         (one, two) => {
-            let bare = |kind: &Kind| {
-                let mut kind = kind.clone();
-                kind.clear_start();
-                kind
-            };
-            bare(one) == bare(two) && one.has_start() == two.has_start()
+            without_start(one) == without_start(two) && one.has_start() == two.has_start()
         }
     };
     let alike = ScalarVariable {
@@ -159,22 +150,16 @@ pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
         Kind::Boolean(start) => start,
         _ => None,
     };
-    match elements.first()?.kind {
-        Kind::Real(_) | Kind::Float32(_) => {
-            elements.iter().map(real).collect::<Option<_>>().map(Elements::Real)
-        }
-        Kind::Integer(_)
-        | Kind::Int8(_)
-        | Kind::UInt8(_)
-        | Kind::Int16(_)
-        | Kind::UInt16(_)
-        | Kind::UInt32(_)
-        | Kind::Int64(_)
-        | Kind::UInt64(_) => {
-            elements.iter().map(integer).collect::<Option<_>>().map(Elements::Integer)
-        }
+    match &elements.first()?.kind {
         Kind::Boolean(_) => {
             elements.iter().map(boolean).collect::<Option<_>>().map(Elements::Boolean)
+        }
+        kind if kind.as_real().is_some() => {
+            elements.iter().map(real).collect::<Option<_>>().map(Elements::Real)
+        }
+        Kind::Enumeration(_) => None,
+        kind if kind.as_integer().is_some() => {
+            elements.iter().map(integer).collect::<Option<_>>().map(Elements::Integer)
         }
         _ => None,
     }

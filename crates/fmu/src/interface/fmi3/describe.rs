@@ -5,9 +5,8 @@ use std::collections::HashMap;
 use super::arrays::{Block, blocks, starts};
 use super::{Entry, INDICATOR, INT64, Table};
 use fmu_description::{
-    Causality, CoSimulation, DependencyKind, Dimension, Initial, IntegerType, Kind,
-    ModelDescription, ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown,
-    Variability,
+    Causality, CoSimulation, DependencyKind, Dimension, Initial, Kind, ModelDescription,
+    ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown, Variability,
 };
 
 /// The new variables with the places of the old ones.
@@ -81,30 +80,16 @@ fn is_early(variable: &ScalarVariable) -> bool {
 }
 
 fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
-    let kind = |variable: &ScalarVariable| match without_start(&variable.kind) {
-        Kind::Real(real) => Kind::Real(RealType { reinit: false, ..real }),
-        other => other,
-    };
     alias.causality == of.causality
         && alias.variability == of.variability
-        && kind(alias) == kind(of)
+        && without_start(&alias.kind) == without_start(&of.kind)
 }
 
-fn without_start(kind: &Kind) -> Kind {
-    match kind {
-        Kind::Real(real) => Kind::Real(RealType { start: None, ..real.clone() }),
-        Kind::Integer(integer) => Kind::Integer(IntegerType { start: None, ..integer.clone() }),
-        Kind::Enumeration(integer) => {
-            Kind::Enumeration(IntegerType { start: None, ..integer.clone() })
-        }
-        Kind::Boolean(_) => Kind::Boolean(None),
-        Kind::String(_) => Kind::String(None),
-        other => {
-            let mut kind = other.clone();
-            kind.clear_start();
-            kind
-        }
-    }
+/// Returns the type without start value and `reinit`.
+pub(super) fn without_start(kind: &Kind) -> Kind {
+    let mut kind = kind.clone();
+    kind.clear_start();
+    kind
 }
 
 /// Returns the place of the first element of a variable.
@@ -169,8 +154,11 @@ impl Builder {
             is_calculated,
         });
         let start_elements = starts(elements).filter(|_| block.count > 1);
-        let stated = start_elements.is_some();
-        let kind = if stated { without_start(&first.kind) } else { first.kind.clone() };
+        let kind = match &first.kind {
+            kind if start_elements.is_none() => kind.clone(),
+            Kind::Real(real) => Kind::Real(RealType { start: None, ..real.clone() }),
+            kind => without_start(kind),
+        };
         self.variables.push(ScalarVariable {
             name: block.name.clone(),
             value_reference: reference,
