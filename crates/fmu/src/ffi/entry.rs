@@ -1,13 +1,15 @@
 //! The C functions with an instance, one entry each.
 
+use std::ffi::c_void;
+
 use super::{
     borrow_output, borrow_state, dispatch, free_state, read, snapshot, store, texts, write_one,
 };
 use crate::Experiment;
 use crate::model::{Failure, Model};
 use fmu_description::abi::{
-    StatusKind, fmi2Boolean, fmi2Byte, fmi2Component, fmi2EventInfo, fmi2FMUstate, fmi2Integer,
-    fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2ValueReference,
+    StatusKind, fmi2Boolean, fmi2Byte, fmi2Component, fmi2EventInfo, fmi2Integer, fmi2Real,
+    fmi2Status, fmi2StatusKind, fmi2String, fmi2ValueReference,
 };
 use fmu_description::call_order::Function;
 
@@ -19,6 +21,60 @@ macro_rules! entry_points {
             unsafe { dispatch::<M, _>(component, Function::$function, |$instance| $body) }
         })*
     };
+}
+
+/// Defines with `entry_points` the functions that are the same in FMI 2.0 and 3.0, but for the names of some.
+macro_rules! common_entry_points {
+    ($entry_points:ident: $boolean:ty, $byte:ty, $get:ident $set:ident $free:ident $size:ident $serialize:ident
+        $deserialize:ident, $de_serialize_fmu_state:ident $get_nominals:ident) => {
+        $entry_points! {
+            terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
+            reset = Reset(), instance => instance.reset();
+            get_fmu_state = $get(state: *mut *mut c_void), instance => {
+                let place = borrow_state(state)?;
+                store(place, instance.snapshot());
+                Ok(())
+            };
+            set_fmu_state = $set(state: *mut c_void), instance => instance.restore(snapshot(state)?);
+            free_fmu_state = $free(state: *mut *mut c_void), _instance => {
+                free_state::<M>(borrow_state(state)?);
+                Ok(())
+            };
+            serialized_fmu_state_size = $size(state: *mut c_void, size: *mut usize),
+                _instance => write_one(size, snapshot::<M>(state)?.size()?);
+            serialize_fmu_state = $serialize(state: *mut c_void, bytes: *mut $byte, size: usize),
+                _instance => snapshot::<M>(state)?.write(borrow_output(bytes.cast::<u8>(), size)?);
+            $de_serialize_fmu_state = $deserialize(
+                bytes: *const $byte, size: usize, state: *mut *mut c_void
+            ), instance => {
+                let snapshot = instance.read_snapshot(read(bytes.cast::<u8>(), size)?)?;
+                store(borrow_state(state)?, snapshot);
+                Ok(())
+            };
+            completed_integrator_step = CompletedIntegratorStep(
+                _no_set_fmu_state: $boolean, enter: *mut $boolean, terminate: *mut $boolean
+            ), instance => {
+                instance.completed_integrator_step()?;
+                write_one(enter, 0)?;
+                write_one(terminate, 0)
+            };
+            set_time = SetTime(time: f64), instance => instance.set_time(time);
+            set_continuous_states = SetContinuousStates(x: *const f64, n: usize),
+                instance => instance.set_continuous_states(read(x, n)?);
+            get_continuous_states = GetContinuousStates(x: *mut f64, n: usize),
+                instance => instance.get_continuous_states(borrow_output(x, n)?);
+            $get_nominals = GetNominalsOfContinuousStates(x: *mut f64, n: usize),
+                instance => instance.get_nominals(borrow_output(x, n)?);
+            get_event_indicators = GetEventIndicators(z: *mut f64, n: usize),
+                instance => instance.get_event_indicators(borrow_output(z, n)?);
+        }
+    };
+}
+pub(super) use common_entry_points;
+
+common_entry_points! {
+    entry_points: fmi2Boolean, fmi2Byte, GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize
+    SerializeFMUstate DeSerializeFMUstate, de_serialize_fmu_state get_nominals
 }
 
 entry_points! {
@@ -40,8 +96,6 @@ entry_points! {
         instance => instance.enter_initialization_mode();
     exit_initialization_mode = ExitInitializationMode(),
         instance => instance.exit_initialization_mode();
-    terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
-    reset = Reset(), instance => instance.reset();
     get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
         instance => instance.get_real(read(vr, n)?, borrow_output(value, n)?);
     get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),
@@ -88,46 +142,8 @@ entry_points! {
         instance.enter_continuous_time_mode();
         Ok(())
     };
-    completed_integrator_step = CompletedIntegratorStep(
-        _no_set_fmu_state: fmi2Boolean, enter: *mut fmi2Boolean, terminate: *mut fmi2Boolean
-    ), instance => {
-        instance.completed_integrator_step()?;
-        write_one(enter, 0)?;
-        write_one(terminate, 0)
-    };
-    set_time = SetTime(time: fmi2Real), instance => instance.set_time(time);
-    set_continuous_states = SetContinuousStates(x: *const fmi2Real, n: usize),
-        instance => instance.set_continuous_states(read(x, n)?);
-    get_event_indicators = GetEventIndicators(z: *mut fmi2Real, n: usize),
-        instance => instance.get_event_indicators(borrow_output(z, n)?);
-    get_continuous_states = GetContinuousStates(x: *mut fmi2Real, n: usize),
-        instance => instance.get_continuous_states(borrow_output(x, n)?);
     get_derivatives = GetDerivatives(derivatives: *mut fmi2Real, n: usize),
         instance => instance.get_derivatives(borrow_output(derivatives, n)?);
-    get_nominals = GetNominalsOfContinuousStates(nominals: *mut fmi2Real, n: usize),
-        instance => instance.get_nominals(borrow_output(nominals, n)?);
-    get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
-        let place = borrow_state(state)?;
-        store(place, instance.snapshot());
-        Ok(())
-    };
-    set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
-        instance.restore(snapshot(state)?);
-    free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
-        free_state::<M>(borrow_state(state)?);
-        Ok(())
-    };
-    serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
-        _instance => write_one(size, snapshot::<M>(state)?.size()?);
-    serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
-        _instance => snapshot::<M>(state)?.write(borrow_output(bytes.cast::<u8>(), size)?);
-    de_serialize_fmu_state = DeSerializeFMUstate(
-        bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
-    ), instance => {
-        let snapshot = instance.read_snapshot(read(bytes.cast::<u8>(), size)?)?;
-        store(borrow_state(state)?, snapshot);
-        Ok(())
-    };
     get_status = GetStatus(kind: fmi2StatusKind, _value: *mut fmi2Status),
         _instance => Err(unavailable(kind));
     get_real_status = GetRealStatus(kind: fmi2StatusKind, value: *mut fmi2Real), instance =>

@@ -1,5 +1,8 @@
 //! The functions with an instance, except those for values and clocks.
 
+use std::ffi::c_void;
+
+use super::super::entry::common_entry_points;
 use super::super::{
     ask_for_inputs, borrow_output, borrow_state, dispatch, free_state, read, snapshot, store,
     texts, write_one,
@@ -9,10 +12,15 @@ use crate::Experiment;
 use crate::instance::Jacobian;
 use crate::model::{Failure, Model};
 use fmu_description::abi3::{
-    DependencyKind, fmi3Boolean, fmi3Byte, fmi3DependencyKind, fmi3FMUState, fmi3Float64,
-    fmi3Instance, fmi3Int32, fmi3Status, fmi3String, fmi3ValueReference,
+    DependencyKind, fmi3Boolean, fmi3Byte, fmi3DependencyKind, fmi3Float64, fmi3Instance,
+    fmi3Int32, fmi3Status, fmi3String, fmi3ValueReference,
 };
 use fmu_description::call_order3::Function;
+
+common_entry_points! {
+    entry_points_3: fmi3Boolean, fmi3Byte, GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize
+    SerializeFMUState DeserializeFMUState, deserialize_fmu_state get_nominals_of_continuous_states
+}
 
 entry_points_3! {
     set_debug_logging = SetDebugLogging(on: fmi3Boolean, n: usize, categories: *const fmi3String),
@@ -31,8 +39,6 @@ entry_points_3! {
     exit_initialization_mode = ExitInitializationMode(),
         instance => instance.exit_initialization_mode_3();
     enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode_3();
-    terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
-    reset = Reset(), instance => instance.reset();
     get_number_of_variable_dependencies = GetNumberOfVariableDependencies(
         reference: fmi3ValueReference, n: *mut usize
     ), instance => write_one(n, instance.dependencies(reference)?.len());
@@ -55,28 +61,6 @@ entry_points_3! {
             of_independents[k].write(element_of_known);
             kinds[k].write(to_c(kind) as fmi3DependencyKind);
         }
-        Ok(())
-    };
-    get_fmu_state = GetFMUState(state: *mut fmi3FMUState), instance => {
-        let place = borrow_state(state)?;
-        store(place, instance.snapshot());
-        Ok(())
-    };
-    set_fmu_state = SetFMUState(state: fmi3FMUState),
-        instance => instance.restore(snapshot(state)?);
-    free_fmu_state = FreeFMUState(state: *mut fmi3FMUState), _instance => {
-        free_state::<M>(borrow_state(state)?);
-        Ok(())
-    };
-    serialized_fmu_state_size = SerializedFMUStateSize(state: fmi3FMUState, size: *mut usize),
-        _instance => write_one(size, snapshot::<M>(state)?.size()?);
-    serialize_fmu_state = SerializeFMUState(state: fmi3FMUState, bytes: *mut fmi3Byte, size: usize),
-        _instance => snapshot::<M>(state)?.write(borrow_output(bytes, size)?);
-    deserialize_fmu_state = DeserializeFMUState(
-        bytes: *const fmi3Byte, size: usize, state: *mut fmi3FMUState
-    ), instance => {
-        let snapshot = instance.read_snapshot(read(bytes, size)?)?;
-        store(borrow_state(state)?, snapshot);
         Ok(())
     };
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
@@ -134,24 +118,8 @@ entry_points_3! {
         instance.enter_continuous_time_mode_3();
         Ok(())
     };
-    completed_integrator_step = CompletedIntegratorStep(
-        _no_set_fmu_state: fmi3Boolean, enter: *mut fmi3Boolean, terminate: *mut fmi3Boolean
-    ), instance => {
-        instance.completed_integrator_step()?;
-        write_one(enter, 0)?;
-        write_one(terminate, 0)
-    };
-    set_time = SetTime(time: fmi3Float64), instance => instance.set_time(time);
-    set_continuous_states = SetContinuousStates(x: *const fmi3Float64, n: usize),
-        instance => instance.set_continuous_states(read(x, n)?);
     get_continuous_state_derivatives = GetContinuousStateDerivatives(x: *mut fmi3Float64, n: usize),
         instance => instance.get_derivatives(borrow_output(x, n)?);
-    get_event_indicators = GetEventIndicators(z: *mut fmi3Float64, n: usize),
-        instance => instance.get_event_indicators(borrow_output(z, n)?);
-    get_continuous_states = GetContinuousStates(x: *mut fmi3Float64, n: usize),
-        instance => instance.get_continuous_states(borrow_output(x, n)?);
-    get_nominals_of_continuous_states = GetNominalsOfContinuousStates(x: *mut fmi3Float64, n: usize),
-        instance => instance.get_nominals(borrow_output(x, n)?);
     get_number_of_event_indicators = GetNumberOfEventIndicators(n: *mut usize),
         instance => write_one(n, instance.indicator_count());
     get_number_of_continuous_states = GetNumberOfContinuousStates(n: *mut usize),
