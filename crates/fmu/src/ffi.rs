@@ -231,23 +231,27 @@ pub unsafe fn instantiate<M: Model>(
         };
         // SAFETY: strings as the standard demands them.
         let (guid, folder) = unsafe { (text(guid, "fmuGUID")?, resources(resource_location)?) };
-        Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())
+        let mut instance = Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())?;
+        instance.set_logging_on(logging_on != 0);
+        Ok(instance)
     });
-    match instance {
-        Ok(mut instance) => {
-            instance.set_logging_on(logging_on != 0);
-            instance.send_messages();
-            into_component(instance)
-        }
-        Err(failure) => {
-            let message = format!("fmi2Instantiate: {failure}");
-            callbacks.log(Status::Error, "logStatusError", &message);
-            std::ptr::null_mut()
-        }
-    }
+    into_component("fmi2Instantiate", instance, &callbacks)
 }
 
-fn into_component<M: Model>(instance: Instance<M>) -> fmi2Component {
+/// Hands an instance over to the importer, or logs why `function` made none and returns null.
+fn into_component<M: Model>(
+    function: &str,
+    instance: Result<Instance<M>, Failure>,
+    callbacks: &Callbacks,
+) -> fmi2Component {
+    let mut instance = match instance {
+        Ok(instance) => instance,
+        Err(failure) => {
+            callbacks.log(Status::Error, "logStatusError", &format!("{function}: {failure}"));
+            return std::ptr::null_mut();
+        }
+    };
+    instance.send_messages();
     let instance = UnsafeCell::new(instance);
     Box::into_raw(Box::new(Component {
         busy: AtomicBool::new(false),

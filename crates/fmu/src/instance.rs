@@ -316,15 +316,21 @@ impl<M: Model> Instance<M> {
     /// `fmi2SetDebugLogging`. Messages that explain a status are sent even if debug logging is off
     /// (section 2.1.3). If categories are given, only their messages are sent.
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
-        let known = &self.interface.log_categories;
-        if let Some(unknown) = categories.iter().find(|name| !known.contains(name)) {
-            return Err(Failure::Error(format!(
-                "{unknown} is not a log category of this FMU, expected one of {}",
-                known.join(", ")
-            )));
-        }
+        self.check_categories(&categories)?;
         self.categories = (!categories.is_empty()).then_some(categories);
         Ok(())
+    }
+
+    /// Checks that the FMU has these log categories.
+    fn check_categories(&self, categories: &[String]) -> Result<(), Failure> {
+        let known = &self.interface.log_categories;
+        match categories.iter().find(|name| !known.contains(name)) {
+            None => Ok(()),
+            Some(unknown) => Err(Failure::Error(format!(
+                "{unknown} is not a log category of this FMU, expected one of {}",
+                known.join(", ")
+            ))),
+        }
     }
 
     /// `fmi2SetupExperiment`.
@@ -398,14 +404,22 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2DoStep`.
-    pub(crate) fn do_step(&mut self, start: f64, size: f64) -> Result<(), Failure> {
+    /// Returns the step from the present time, and the time of its end, if the model may make it.
+    #[inline]
+    fn begin_step(&mut self, start: f64, size: f64) -> Result<(Step, f64), Failure> {
         let core = &mut self.core;
         let step = communication_step(core.time, start, size)?;
         let end = start + size;
         core.before_stop(end)?;
         self.stepper.check_size(step.size)?;
         core.check()?;
+        Ok((step, end))
+    }
+
+    /// `fmi2DoStep`.
+    pub(crate) fn do_step(&mut self, start: f64, size: f64) -> Result<(), Failure> {
+        let (step, end) = self.begin_step(start, size)?;
+        let core = &mut self.core;
         match core.model.step(&step) {
             Ok(()) => {}
             Err(Failure::Unsolved) => {

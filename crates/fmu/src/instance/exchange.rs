@@ -110,9 +110,7 @@ impl<M: Model> Instance<M> {
                 )));
             }
         }
-        for (state, value) in states.iter().zip(values) {
-            *(self.interface.reals[state.state].field)(&mut self.core.model) = *value;
-        }
+        self.interface.write_states(&mut self.core.model, values);
         self.core.stale = true;
         Ok(())
     }

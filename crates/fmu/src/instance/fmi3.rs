@@ -131,14 +131,9 @@ impl<M: Model> Instance<M> {
         on: bool,
         categories: &[String],
     ) -> Result<(), Failure> {
-        let known = self.interface.log_categories.clone();
-        if let Some(unknown) = categories.iter().find(|name| !known.contains(name)) {
-            return Err(Failure::Error(format!(
-                "{unknown} is not a log category of this FMU, expected one of {}",
-                known.join(", ")
-            )));
-        }
-        let mut selected = self.categories.take().unwrap_or(known);
+        self.check_categories(categories)?;
+        let known = &self.interface.log_categories;
+        let mut selected = self.categories.take().unwrap_or_else(|| known.clone());
         if categories.is_empty() {
             self.categories = (!on).then(Vec::new);
             return Ok(());

@@ -57,16 +57,7 @@ unsafe fn instantiate<M: Model>(
             Instantiation { token: &token, resources: &resources, required, ..*instantiation };
         Instance::<M>::new_3(&complete, callbacks.clone())
     });
-    match instance {
-        Ok(mut instance) => {
-            instance.send_messages();
-            into_component(instance)
-        }
-        Err(failure) => {
-            callbacks.log(Status::Error, "logStatusError", &format!("{function}: {failure}"));
-            std::ptr::null_mut()
-        }
-    }
+    into_component(function, instance, callbacks)
 }
 
 fn instantiation(interface_type: InterfaceType, logging_on: fmi3Boolean) -> Instantiation<'static> {

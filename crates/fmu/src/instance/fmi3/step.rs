@@ -1,6 +1,6 @@
 //! `fmi3DoStep`.
 
-use super::super::{Instance, communication_step};
+use super::super::Instance;
 use crate::model::{Failure, Model};
 use crate::stepper::Stop;
 use fmu_description::abi::Status;
@@ -26,10 +26,8 @@ impl<M: Model> Instance<M> {
     /// The failures of the model. [`Failure::Incomplete`] is an error, because `earlyReturn` must not
     /// signal one.
     pub(crate) fn do_step_3(&mut self, start: f64, size: f64) -> Result<StepResult, Failure> {
-        let (events, may_return) = {
-            let session = self.session()?;
-            (session.event_mode_used, session.early_return_allowed)
-        };
+        let session = self.session()?;
+        let (events, may_return) = (session.event_mode_used, session.early_return_allowed);
         let end = start + size;
         let mut stop = Stop { time: end, is_event: false };
         let done = if events && may_return {
@@ -59,12 +57,8 @@ impl<M: Model> Instance<M> {
 
     /// Advances to the end of the step or to the first event, which event mode will handle.
     fn step_to_event(&mut self, start: f64, size: f64) -> Result<Stop, Failure> {
+        let (step, end) = self.begin_step(start, size)?;
         let core = &mut self.core;
-        let step = communication_step(core.time, start, size)?;
-        let end = start + size;
-        core.before_stop(end)?;
-        self.stepper.check_size(step.size)?;
-        core.check()?;
         let stop = match core.model.step_to_event(&step) {
             Ok(None) => Stop { time: end, is_event: false },
             Ok(Some(time)) if time > step.start && time <= step.end() => {
