@@ -184,13 +184,8 @@ impl Kind {
             Kind::String(start) => *start = None,
             Kind::Binary(binary) => binary.start = None,
             Kind::Clock(_) => {}
-            other => {
-                if let Some(real) = other.as_real_mut() {
-                    (real.start, real.reinit) = (None, false);
-                } else if let Some(integer) = other.as_integer_mut() {
-                    integer.start = None;
-                }
-            }
+            Kind::Real(real) | Kind::Float32(real) => (real.start, real.reinit) = (None, false),
+            integers!(integer) => integer.start = None,
         }
     }
 
@@ -200,10 +195,9 @@ impl Kind {
         match self {
             Kind::Binary(binary) => binary.declared_type.as_deref(),
             Kind::Clock(clock) => clock.declared_type.as_deref(),
-            other => match (other.as_real(), other.as_integer()) {
-                (Some(real), _) => real.declared_type.as_deref(),
-                (_, integer) => integer?.declared_type.as_deref(),
-            },
+            Kind::Real(real) | Kind::Float32(real) => real.declared_type.as_deref(),
+            integers!(integer) => integer.declared_type.as_deref(),
+            Kind::Boolean(_) | Kind::String(_) => None,
         }
     }
 
@@ -215,10 +209,8 @@ impl Kind {
             Kind::String(start) => start.is_some(),
             Kind::Binary(binary) => binary.start.is_some(),
             Kind::Clock(_) => false,
-            other => {
-                other.as_real().is_some_and(|real| real.start.is_some())
-                    || other.as_integer().is_some_and(|integer| integer.start.is_some())
-            }
+            Kind::Real(real) | Kind::Float32(real) => real.start.is_some(),
+            integers!(integer) => integer.start.is_some(),
         }
     }
 }
