@@ -2,10 +2,7 @@
 
 mod read;
 
-use quick_xml::Writer;
-use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
-
-use crate::description::{Causality, Kind, ModelDescription};
+use crate::description::{Causality, Kind, ModelDescription, Output, Tag};
 pub use crate::terminal::{Terminal, TerminalMember};
 pub use read::read;
 
@@ -27,69 +24,49 @@ pub const PATH: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 /// ```
 #[must_use]
 pub fn render(description: &ModelDescription) -> String {
-    let mut output = Output(Writer::new_with_indent(Vec::new(), b' ', 2));
-    output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
-    output.within("fmiTerminalsAndIcons", &[("fmiVersion", "3.0")], |output| {
-        let square = [("x1", "-100"), ("y1", "-100"), ("x2", "100"), ("y2", "100")];
-        output.within("GraphicalRepresentation", &[], |output| {
-            let scale = [("suggestedScalingFactorTo_mm", "0.1")];
-            output.empty("CoordinateSystem", &[&square[..], &scale[..]].concat());
-            output.empty("Icon", &square);
+    Output::file(|output| {
+        output.around(Tag::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0"), |output| {
+            output.around(Tag::new("GraphicalRepresentation"), |output| {
+                let system = square(Tag::new("CoordinateSystem"));
+                output.empty(system.with("suggestedScalingFactorTo_mm", "0.1"));
+                output.empty(square(Tag::new("Icon")));
+            });
+            signals(output, description);
         });
-        output.signals(description);
-    });
-    let mut bytes = output.0.into_inner();
-    bytes.push(b'\n');
-    String::from_utf8_lossy(&bytes).into_owned()
+    })
 }
 
-struct Output(Writer<Vec<u8>>);
+fn square(tag: Tag<'_>) -> Tag<'_> {
+    tag.with("x1", "-100").with("y1", "-100").with("x2", "100").with("y2", "100")
+}
 
-impl Output {
-    fn event(&mut self, event: Event<'_>) {
-        self.0.write_event(event).expect("a vector takes all bytes");
+/// Writes the terminal with all inputs and outputs; none if there are none.
+fn signals(output: &mut Output, description: &ModelDescription) {
+    let is_signal = |causality| matches!(causality, Causality::Input | Causality::Output);
+    let signals: Vec<_> = description
+        .variables
+        .iter()
+        .filter(|variable| {
+            is_signal(variable.causality) && !matches!(variable.kind, Kind::Clock(_))
+        })
+        .collect();
+    if signals.is_empty() {
+        return;
     }
-
-    fn empty(&mut self, name: &str, attributes: &[(&str, &str)]) {
-        let element = BytesStart::new(name).with_attributes(attributes.iter().copied());
-        self.event(Event::Empty(element));
-    }
-
-    fn within(&mut self, name: &str, attributes: &[(&str, &str)], body: impl FnOnce(&mut Self)) {
-        let element = BytesStart::new(name).with_attributes(attributes.iter().copied());
-        self.event(Event::Start(element));
-        body(self);
-        self.event(Event::End(BytesEnd::new(name)));
-    }
-
-    /// The terminal with all inputs and outputs; none if there are none.
-    fn signals(&mut self, description: &ModelDescription) {
-        let is_signal = |causality| matches!(causality, Causality::Input | Causality::Output);
-        let signals: Vec<_> = description
-            .variables
-            .iter()
-            .filter(|variable| {
-                is_signal(variable.causality) && !matches!(variable.kind, Kind::Clock(_))
-            })
-            .collect();
-        if signals.is_empty() {
-            return;
-        }
-        let text = "Inputs and outputs, connected by name";
-        let terminal = [("name", "signals"), ("matchingRule", "bus"), ("description", text)];
-        self.within("Terminals", &[], |output| {
-            output.within("Terminal", &terminal, |output| {
-                for signal in &signals {
-                    output.empty(
-                        "TerminalMemberVariable",
-                        &[
-                            ("variableName", &signal.name),
-                            ("memberName", &signal.name),
-                            ("variableKind", "signal"),
-                        ],
-                    );
-                }
-            });
+    let terminal = Tag::new("Terminal")
+        .with("name", "signals")
+        .with("matchingRule", "bus")
+        .with("description", "Inputs and outputs, connected by name");
+    output.around(Tag::new("Terminals"), |output| {
+        output.around(terminal, |output| {
+            for signal in signals {
+                output.empty(
+                    Tag::new("TerminalMemberVariable")
+                        .with("variableName", &signal.name)
+                        .with("memberName", &signal.name)
+                        .with("variableKind", "signal"),
+                );
+            }
         });
-    }
+    });
 }

@@ -11,7 +11,7 @@ use super::{
     ScalarVariable, SimpleType, Unknown, Version,
 };
 use crate::unit::{BaseUnit, Unit};
-use tag::Tag;
+pub(crate) use tag::Tag;
 
 /// Adds flags and numbers of an interface to its tag, unless they are false or zero: attribute and field.
 macro_rules! flags {
@@ -44,29 +44,35 @@ impl ModelDescription {
     /// ```
     #[must_use]
     pub fn to_xml(&self) -> String {
-        let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
-        output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
-        output.root(self);
-        let mut bytes = output.writer.into_inner();
-        bytes.push(b'\n');
-        String::from_utf8_lossy(&bytes).into_owned()
+        Output::file(|output| output.root(self))
     }
 }
 
-struct Output {
+/// An XML file that is being written.
+pub(crate) struct Output {
     writer: Writer<Vec<u8>>,
 }
 
 impl Output {
+    /// Returns the text of a file with this content.
+    pub(crate) fn file(content: impl FnOnce(&mut Self)) -> String {
+        let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
+        output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
+        content(&mut output);
+        let mut bytes = output.writer.into_inner();
+        bytes.push(b'\n');
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
     fn event(&mut self, event: Event<'_>) {
         self.writer.write_event(event).expect("a vector takes all bytes");
     }
 
-    fn empty(&mut self, tag: Tag<'_>) {
+    pub(crate) fn empty(&mut self, tag: Tag<'_>) {
         self.event(Event::Empty(tag.0));
     }
 
-    fn around(&mut self, tag: Tag<'_>, content: impl FnOnce(&mut Self)) {
+    pub(crate) fn around(&mut self, tag: Tag<'_>, content: impl FnOnce(&mut Self)) {
         let end = BytesEnd::new(tag.0.name().as_ref().to_owned());
         self.event(Event::Start(tag.0));
         content(self);

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use quick_xml::events::BytesStart;
 
 /// A value of an attribute.
-pub(super) trait Value {
+pub(crate) trait Value {
     fn text(&self) -> Cow<'_, str>;
 }
 
@@ -41,14 +41,14 @@ macro_rules! displayed {
 displayed!(i32, i64, i128, u32, u64, bool);
 
 /// A start tag under construction.
-pub(super) struct Tag<'a>(pub(super) BytesStart<'a>);
+pub(crate) struct Tag<'a>(pub(super) BytesStart<'a>);
 
 impl<'a> Tag<'a> {
-    pub(super) fn new(name: &'a str) -> Self {
+    pub(crate) fn new(name: &'a str) -> Self {
         Tag(BytesStart::new(name))
     }
 
-    pub(super) fn with(mut self, name: &str, value: &(impl Value + ?Sized)) -> Self {
+    pub(crate) fn with(mut self, name: &str, value: &(impl Value + ?Sized)) -> Self {
         self.0.push_attribute((name, value.text()));
         self
     }
