@@ -40,6 +40,7 @@ struct Sections {
     /// Limits and start values.
     limits: &'static str,
     names: &'static str,
+    structure: &'static str,
 }
 
 const SECTIONS_OF_2: Sections = Sections {
@@ -51,6 +52,7 @@ const SECTIONS_OF_2: Sections = Sections {
     variables: "2.2.7",
     limits: "2.2.7",
     names: "2.2.9",
+    structure: "2.2.8",
 };
 const SECTIONS_OF_3: Sections = Sections {
     root: "2.4.1",
@@ -61,6 +63,7 @@ const SECTIONS_OF_3: Sections = Sections {
     variables: "2.4.7.4",
     limits: "2.4.7.5",
     names: "2.4.7.5.1",
+    structure: "2.4.8",
 };
 
 /// Collects problems.
@@ -170,36 +173,52 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     });
     problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
     date(description, problems);
-    let co_simulation = description.co_simulation.as_ref();
-    let identifiers = description
-        .model_exchange
-        .iter()
-        .map(|flags| ("3.3.1", &flags.model_identifier))
-        .chain(co_simulation.map(|flags| ("4.3.1", &flags.model_identifier)));
-    let mut interfaces = 0;
-    for (section, identifier) in identifiers {
-        interfaces += 1;
+    let interfaces: Vec<_> =
+        interfaces(description).filter(|interface| !interface.section.is_empty()).collect();
+    for Interface { section, identifier, .. } in &interfaces {
         problems.demand(is_c_identifier(identifier), section, || {
             format!("modelIdentifier {identifier:?} is no C identifier")
         });
     }
-    problems.demand(interfaces > 0, "2.2.1", || {
+    problems.demand(!interfaces.is_empty(), "2.2.1", || {
         "neither ModelExchange nor CoSimulation is there".to_owned()
     });
-    let exchange = description.model_exchange.as_ref();
-    for (section, serializes, keeps) in [
-        exchange
-            .map(|flags| ("3.3.1", flags.can_serialize_fmu_state, flags.can_get_and_set_fmu_state)),
-        co_simulation
-            .map(|flags| ("4.3.1", flags.can_serialize_fmu_state, flags.can_get_and_set_fmu_state)),
-    ]
-    .into_iter()
-    .flatten()
-    {
+    for Interface { section, keeps, serializes, .. } in interfaces {
         problems.demand(keeps || !serializes, section, || {
             "canSerializeFMUstate is true without canGetAndSetFMUstate".to_owned()
         });
     }
+}
+
+/// What the rules on each interface need.
+struct Interface<'a> {
+    name: &'static str,
+    /// Section of FMI 2.0.5; empty for an interface that only FMI 3.0 has.
+    section: &'static str,
+    identifier: &'a str,
+    keeps: bool,
+    serializes: bool,
+}
+
+/// The interfaces of an FMU.
+fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<'_>> {
+    macro_rules! interface {
+        ($field:ident, $name:literal, $section:literal) => {
+            description.$field.as_ref().map(|flags| Interface {
+                name: $name,
+                section: $section,
+                identifier: &flags.model_identifier,
+                keeps: flags.can_get_and_set_fmu_state,
+                serializes: flags.can_serialize_fmu_state,
+            })
+        };
+    }
+    let interfaces = [
+        interface!(model_exchange, "ModelExchange", "3.3.1"),
+        interface!(co_simulation, "CoSimulation", "4.3.1"),
+        interface!(scheduled_execution, "ScheduledExecution", ""),
+    ];
+    interfaces.into_iter().flatten()
 }
 
 fn date(description: &ModelDescription, problems: &mut Problems) {

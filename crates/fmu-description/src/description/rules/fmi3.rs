@@ -5,7 +5,7 @@ mod clocks;
 mod structure;
 mod variables;
 
-use super::{Problems, date, is_c_identifier};
+use super::{Interface, Problems, date, interfaces, is_c_identifier};
 use crate::description::{CoSimulation, Kind, ModelDescription};
 
 pub(super) use structure::check as check_structure;
@@ -20,11 +20,11 @@ pub(super) fn check_identity(description: &ModelDescription, problems: &mut Prob
     let token = &description.guid;
     problems.demand(!token.is_empty(), ROOT, || "instantiationToken is empty".to_owned());
     date(description, problems);
-    let interfaces = interfaces(description);
+    let interfaces: Vec<_> = interfaces(description).collect();
     problems.demand(!interfaces.is_empty(), ROOT, || {
         "none of ModelExchange, CoSimulation and ScheduledExecution is there".to_owned()
     });
-    for Interface { name, identifier, keeps, serializes } in interfaces {
+    for Interface { name, identifier, keeps, serializes, .. } in interfaces {
         problems.demand(is_c_identifier(identifier), "2.4.2", || {
             format!("{name}: modelIdentifier {identifier:?} is no C identifier")
         });
@@ -35,36 +35,6 @@ pub(super) fn check_identity(description: &ModelDescription, problems: &mut Prob
     if let Some(flags) = &description.co_simulation {
         check_co_simulation(flags, description, problems);
     }
-}
-
-/// What the rules on each interface need.
-struct Interface<'a> {
-    name: &'static str,
-    identifier: &'a str,
-    keeps: bool,
-    serializes: bool,
-}
-
-fn interfaces(description: &ModelDescription) -> Vec<Interface<'_>> {
-    let exchange = description.model_exchange.as_ref().map(|flags| Interface {
-        name: "ModelExchange",
-        identifier: &flags.model_identifier,
-        keeps: flags.can_get_and_set_fmu_state,
-        serializes: flags.can_serialize_fmu_state,
-    });
-    let simulation = description.co_simulation.as_ref().map(|flags| Interface {
-        name: "CoSimulation",
-        identifier: &flags.model_identifier,
-        keeps: flags.can_get_and_set_fmu_state,
-        serializes: flags.can_serialize_fmu_state,
-    });
-    let scheduled = description.scheduled_execution.as_ref().map(|flags| Interface {
-        name: "ScheduledExecution",
-        identifier: &flags.model_identifier,
-        keeps: flags.can_get_and_set_fmu_state,
-        serializes: flags.can_serialize_fmu_state,
-    });
-    [exchange, simulation, scheduled].into_iter().flatten().collect()
 }
 
 fn check_co_simulation(

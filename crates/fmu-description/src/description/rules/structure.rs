@@ -1,11 +1,11 @@
-//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8).
+//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), and those that both versions have.
 
 use std::collections::{BTreeSet, HashSet};
 
 use super::Problems;
 use crate::description::{
-    Causality, DependencyKind, Initial, Kind, ModelDescription, RealType, ScalarVariable, Unknown,
-    Variability,
+    Causality, DependencyKind, Initial, Kind, ModelDescription, ScalarVariable, Unknown,
+    Variability, Version,
 };
 
 const SECTION: &str = "2.2.8";
@@ -24,14 +24,12 @@ impl ModelDescription {
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let structure = &description.structure;
-    let states = states(description, problems);
+    let states = states(["Derivatives", "attribute derivative"], description, problems);
     let outputs = description.indices_of(|variable| variable.causality == Causality::Output);
-    let list = List { name: "Outputs", section: SECTION, rows: &structure.outputs };
-    check_members(&list, &outputs, description, problems);
+    check_members("Outputs", &structure.outputs, &outputs, description, problems);
     let unknowns = initial_unknowns(description, &states);
     let rows = &structure.initial_unknowns;
-    let list = List { name: "InitialUnknowns", section: SECTION, rows };
-    check_members(&list, &unknowns, description, problems);
+    check_members("InitialUnknowns", rows, &unknowns, description, problems);
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
     problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
@@ -50,43 +48,59 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     };
     for row in rows {
         check_dependencies("InitialUnknowns", row, description, known_at_start, problems);
-        check_initial_kinds(row, description, problems);
+        check_initial_kinds("InitialUnknowns", row, description, problems);
     }
 }
 
 /// Checks that a dependency at initialization is general or has a constant factor.
-fn check_initial_kinds(row: &Unknown, description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check_initial_kinds(
+    list: &str,
+    row: &Unknown,
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
     let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
     let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
-    problems.demand(holds, SECTION, || {
+    problems.demand(holds, problems.sections.structure, || {
         let name = description.name_of(row.index);
-        format!("InitialUnknowns, {name}: dependenciesKind may be dependent or constant only")
+        format!("{list}, {name}: dependenciesKind may be dependent or constant only")
     });
 }
 
-/// Returns the continuous states, whose derivatives are the rows of `Derivatives`.
-fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u32> {
+/// Whether the variable is of a floating-point type of its version.
+fn is_real(variable: &ScalarVariable, description: &ModelDescription) -> bool {
+    match variable.kind {
+        Kind::Float32(_) => description.version() == Version::V3,
+        _ => variable.kind.as_real().is_some(),
+    }
+}
+
+/// Returns the continuous states, whose derivatives are the rows of `list`; `needed` is what these have.
+pub(super) fn states(
+    [list, needed]: [&str; 2],
+    description: &ModelDescription,
+    problems: &mut Problems,
+) -> HashSet<u32> {
+    let section = problems.sections.structure;
     let mut states = HashSet::new();
     for row in &description.structure.derivatives {
         let name = description.name_of(row.index);
-        let derivative = description.at(row.index).and_then(|variable| match variable.kind {
-            Kind::Real(RealType { derivative, .. }) => derivative,
-            _ => None,
-        });
+        let variable = description.at(row.index).filter(|variable| is_real(variable, description));
+        let derivative = variable.and_then(|variable| variable.kind.as_real()?.derivative);
         let Some(state) = derivative else {
-            problems.add(SECTION, format!("Derivatives, {name}: it has no attribute derivative"));
+            problems.add(section, format!("{list}, {name}: it has no {needed}"));
             continue;
         };
-        problems.demand(states.insert(state), SECTION, || {
-            format!("Derivatives, {name}: its state has another derivative in the list")
+        problems.demand(states.insert(state), section, || {
+            format!("{list}, {name}: its state has another derivative in the list")
         });
         let is_state = |variable: &ScalarVariable| {
             matches!(variable.causality, Causality::Local | Causality::Output)
                 && variable.variability == Variability::Continuous
         };
-        problems.demand(description.at(state).is_some_and(is_state), SECTION, || {
+        problems.demand(description.at(state).is_some_and(is_state), section, || {
             let state = description.name_of(state);
-            format!("Derivatives, {name}: its state {state} is not a continuous local or output")
+            format!("{list}, {name}: its state {state} is not a continuous local or output")
         });
     }
     states
@@ -108,21 +122,15 @@ fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BT
     indices
 }
 
-/// A list of `ModelStructure`, with the section of the standard that says what belongs there.
-pub(super) struct List<'a> {
-    pub(super) name: &'static str,
-    pub(super) section: &'static str,
-    pub(super) rows: &'a [Unknown],
-}
-
 /// Checks that a list has exactly the required members, each once.
 pub(super) fn check_members(
-    list: &List<'_>,
+    list: &str,
+    rows: &[Unknown],
     required: &BTreeSet<u32>,
     description: &ModelDescription,
     problems: &mut Problems,
 ) {
-    let List { name: list, section, rows } = *list;
+    let section = problems.sections.structure;
     let mut members = BTreeSet::new();
     for row in rows {
         problems.demand(members.insert(row.index), section, || {
@@ -138,36 +146,44 @@ pub(super) fn check_members(
     }
 }
 
-/// Checks that dependencies ascend, are known quantities, and have one allowed kind each.
-fn check_dependencies(
+/// Checks that dependencies are unique (in FMI 2.0 also ascending) known quantities, with one allowed kind each.
+pub(super) fn check_dependencies(
     list: &str,
     row: &Unknown,
     description: &ModelDescription,
     is_known: impl Fn(u32, &ScalarVariable) -> bool,
     problems: &mut Problems,
 ) {
+    let section = problems.sections.structure;
+    let third = description.version() == Version::V3;
     let name = description.name_of(row.index);
     let dependencies = row.dependencies.as_deref().unwrap_or_default();
-    problems.demand(dependencies.windows(2).all(|pair| pair[0] < pair[1]), SECTION, || {
-        format!("{list}, {name}: dependencies are not ascending and unique")
-    });
+    if third {
+        let unique: HashSet<&u32> = dependencies.iter().collect();
+        problems.demand(unique.len() == dependencies.len(), section, || {
+            format!("{list}, {name}: a dependency is there twice")
+        });
+    } else {
+        problems.demand(dependencies.windows(2).all(|pair| pair[0] < pair[1]), section, || {
+            format!("{list}, {name}: dependencies are not ascending and unique")
+        });
+    }
     for index in dependencies {
         let known = description.at(*index).is_some_and(|variable| is_known(*index, variable));
-        problems.demand(known, SECTION, || {
+        problems.demand(known, section, || {
             let other = description.name_of(*index);
             format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
         });
     }
     let Some(kinds) = &row.kinds else { return };
-    problems.demand(
-        row.dependencies.is_some() && kinds.len() == dependencies.len(),
-        SECTION,
-        || format!("{list}, {name}: dependenciesKind is not as long as dependencies"),
-    );
-    let real =
-        description.at(row.index).is_some_and(|variable| matches!(variable.kind, Kind::Real(_)));
+    let paired = row.dependencies.is_some() && kinds.len() == dependencies.len();
+    problems.demand(paired, section, || {
+        format!("{list}, {name}: dependenciesKind is not as long as dependencies")
+    });
+    let real = description.at(row.index).is_some_and(|variable| is_real(variable, description));
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
-    problems.demand(real || plain, SECTION, || {
-        format!("{list}, {name}: only for a Real may dependenciesKind be other than dependent")
+    problems.demand(real || plain, section, || {
+        let kind = if third { "float" } else { "Real" };
+        format!("{list}, {name}: only for a {kind} may dependenciesKind be other than dependent")
     });
 }

@@ -18,7 +18,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
         description.types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     for variable in &description.variables {
         check_table(variable, problems);
-        check_start(variable, problems);
+        check_start(variable, false, problems);
         check_declared_type(variable, &types, problems);
         check_derivative(variable, description, problems);
         let who = format!("variable {}", variable.name);
@@ -85,17 +85,20 @@ fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
+/// Checks that the variable has a start value where it needs one, and no other. A clock of FMI 3.0 has none.
+pub(super) fn check_start(variable: &ScalarVariable, is_clock: bool, problems: &mut Problems) {
     let name = &variable.name;
+    let section = problems.sections.limits;
     let needed = match (variable.causality, variable.initial_in_force()) {
+        _ if is_clock => false,
         (Causality::Independent, _) => false,
         (Causality::Input, _) => true,
         (_, initial) => initial != Some(Initial::Calculated),
     };
     match (needed, variable.has_start()) {
-        (true, false) => problems.add(SECTION, format!("variable {name} needs a start value")),
+        (true, false) => problems.add(section, format!("variable {name} needs a start value")),
         (false, true) => problems.add(
-            SECTION,
+            section,
             format!("variable {name} has a start value, which calculated and independent forbid"),
         ),
         _ => {}

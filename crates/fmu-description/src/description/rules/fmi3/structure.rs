@@ -3,11 +3,10 @@
 use std::collections::{BTreeSet, HashSet};
 
 use crate::description::rules::Problems;
-use crate::description::rules::structure::{List, check_members};
-use crate::description::{
-    Causality, DependencyKind, Initial, Kind, ModelDescription, ScalarVariable, Unknown,
-    Variability,
+use crate::description::rules::structure::{
+    check_dependencies, check_initial_kinds, check_members, states,
 };
+use crate::description::{Causality, Initial, Kind, ModelDescription, ScalarVariable, Variability};
 
 const SECTION: &str = "2.4.8";
 
@@ -16,19 +15,17 @@ pub(in crate::description::rules) fn check(
     problems: &mut Problems,
 ) {
     let structure = &description.structure;
-    let states = states(description, problems);
+    let states = states(["ContinuousStateDerivative", "derivative"], description, problems);
+    check_reinit(&states, description, problems);
     let outputs = description.indices_of(|variable| {
         variable.causality == Causality::Output && variable.alias_of.is_none()
     });
-    let list = List { name: "Output", section: SECTION, rows: &structure.outputs };
-    check_members(&list, &outputs, description, problems);
+    check_members("Output", &structure.outputs, &outputs, description, problems);
     check_initial_unknowns(description, &states, problems);
     check_indicators(description, problems);
     let clocked = description
         .indices_of(|variable| variable.previous.is_some() && variable.alias_of.is_none());
-    let rows = &structure.clocked_states;
-    let list = List { name: "ClockedState", section: SECTION, rows };
-    check_members(&list, &clocked, description, problems);
+    check_members("ClockedState", &structure.clocked_states, &clocked, description, problems);
 
     let known = |index: u32, variable: &ScalarVariable| {
         is_given(variable)
@@ -54,12 +51,7 @@ pub(in crate::description::rules) fn check(
     };
     for row in &structure.initial_unknowns {
         check_dependencies("InitialUnknown", row, description, known_at_start, problems);
-        let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
-        let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
-        problems.demand(holds, SECTION, || {
-            let name = description.name_of(row.index);
-            format!("InitialUnknown, {name}: dependenciesKind may be dependent or constant only")
-        });
+        check_initial_kinds("InitialUnknown", row, description, problems);
     }
 }
 
@@ -68,35 +60,8 @@ fn is_given(variable: &ScalarVariable) -> bool {
         || matches!(variable.kind, Kind::Clock(_))
 }
 
-/// Returns the continuous states, whose derivatives are the rows of `ContinuousStateDerivative`.
-fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u32> {
-    let mut states = HashSet::new();
-    for row in &description.structure.derivatives {
-        let name = description.name_of(row.index);
-        let derivative =
-            description.at(row.index).and_then(|variable| variable.kind.as_real()?.derivative);
-        let Some(state) = derivative else {
-            let text = format!("ContinuousStateDerivative, {name}: it has no derivative");
-            problems.add(SECTION, text);
-            continue;
-        };
-        problems.demand(states.insert(state), SECTION, || {
-            format!(
-                "ContinuousStateDerivative, {name}: its state has another derivative in the list"
-            )
-        });
-        let is_state = |variable: &ScalarVariable| {
-            matches!(variable.causality, Causality::Local | Causality::Output)
-                && variable.variability == Variability::Continuous
-        };
-        problems.demand(description.at(state).is_some_and(is_state), SECTION, || {
-            let state = description.name_of(state);
-            format!(
-                "ContinuousStateDerivative, {name}: its state {state} is not a continuous local or \
-                 output"
-            )
-        });
-    }
+/// Checks that only continuous states have `reinit`.
+fn check_reinit(states: &HashSet<u32>, description: &ModelDescription, problems: &mut Problems) {
     for (index, variable) in (1..).zip(&description.variables) {
         let reinit = variable.kind.as_real().is_some_and(|real| real.reinit);
         let reinit = reinit && variable.alias_of.is_none();
@@ -104,7 +69,6 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
             format!("variable {}: only a continuous-time state can have reinit", variable.name)
         });
     }
-    states
 }
 
 /// Checks that `InitialUnknown` has all that it must have, and nothing else but clocked variables.
@@ -136,8 +100,7 @@ fn check_initial_unknowns(
         })
     });
     let allowed: BTreeSet<u32> = required.iter().chain(optional).copied().collect();
-    let list = List { name: "InitialUnknown", section: SECTION, rows };
-    check_members(&list, &allowed, description, problems);
+    check_members("InitialUnknown", rows, &allowed, description, problems);
 }
 
 fn check_indicators(description: &ModelDescription, problems: &mut Problems) {
@@ -156,37 +119,4 @@ fn check_indicators(description: &ModelDescription, problems: &mut Problems) {
             format!("EventIndicator has variable {name} twice")
         });
     }
-}
-
-/// Checks that dependencies are unique known quantities with one allowed kind each.
-fn check_dependencies(
-    list: &str,
-    row: &Unknown,
-    description: &ModelDescription,
-    is_known: impl Fn(u32, &ScalarVariable) -> bool,
-    problems: &mut Problems,
-) {
-    let name = description.name_of(row.index);
-    let dependencies = row.dependencies.as_deref().unwrap_or_default();
-    let unique: HashSet<&u32> = dependencies.iter().collect();
-    problems.demand(unique.len() == dependencies.len(), SECTION, || {
-        format!("{list}, {name}: a dependency is there twice")
-    });
-    for index in dependencies {
-        let known = description.at(*index).is_some_and(|variable| is_known(*index, variable));
-        problems.demand(known, SECTION, || {
-            let other = description.name_of(*index);
-            format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
-        });
-    }
-    let Some(kinds) = &row.kinds else { return };
-    let paired = row.dependencies.is_some() && kinds.len() == dependencies.len();
-    problems.demand(paired, SECTION, || {
-        format!("{list}, {name}: dependenciesKind is not as long as dependencies")
-    });
-    let float = description.at(row.index).is_some_and(|variable| variable.kind.as_real().is_some());
-    let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
-    problems.demand(float || plain, SECTION, || {
-        format!("{list}, {name}: only for a float may dependenciesKind be other than dependent")
-    });
 }

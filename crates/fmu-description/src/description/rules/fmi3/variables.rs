@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::{arrays, clocks};
 use crate::description::rules::Problems;
-use crate::description::rules::variables::{check_integer, check_order, check_real};
+use crate::description::rules::variables::{check_integer, check_order, check_real, check_start};
 use crate::description::{
     Causality, Elements, Initial, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
     Version,
@@ -29,7 +29,7 @@ pub(in crate::description::rules) fn check(
         if variable.alias_of.is_none() {
             check_table(variable, problems);
             check_flags(variable, problems);
-            check_start(variable, problems);
+            check_start(variable, matches!(variable.kind, Kind::Clock(_)), problems);
             check_numbers(variable, problems);
             check_declared_type(variable, &types, problems);
             check_derivative(variable, description, problems);
@@ -109,24 +109,6 @@ fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
     problems.demand(continuous || !variable.intermediate_update, ATTRIBUTES, || {
         format!("variable {name}: only continuous variables can have intermediateUpdate")
     });
-}
-
-fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
-    let name = &variable.name;
-    let needed = match (variable.causality, variable.initial_in_force()) {
-        _ if matches!(variable.kind, Kind::Clock(_)) => false,
-        (Causality::Independent, _) => false,
-        (Causality::Input, _) => true,
-        (_, initial) => initial != Some(Initial::Calculated),
-    };
-    match (needed, variable.has_start()) {
-        (true, false) => problems.add(TYPED, format!("variable {name} needs a start value")),
-        (false, true) => problems.add(
-            TYPED,
-            format!("variable {name} has a start value, which calculated and independent forbid"),
-        ),
-        _ => {}
-    }
 }
 
 /// Checks limits and start values, which must be numbers of the type.
