@@ -26,7 +26,10 @@ pub(crate) fn check(variables: &mut [Variable<'_>]) -> Result<()> {
     all.map_or(Ok(()), Err)
 }
 
-fn find<'a, 'b>(variables: &'b [Variable<'a>], field: &Ident) -> Option<&'b Variable<'a>> {
+pub(crate) fn find<'a, 'b>(
+    variables: &'b [Variable<'a>],
+    field: &Ident,
+) -> Option<&'b Variable<'a>> {
     variables.iter().find(|variable| variable.field == field)
 }
 

@@ -72,57 +72,47 @@ fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
     let experiment: Vec<_> =
         arguments.0.iter().filter(|argument| !is_indicators(argument)).collect();
     let fields = experiment.iter().map(|(name, value)| quote!(#name: #value));
-    let exchange: ImplItem = match indicators {
-        Some((_, count)) => parse_quote! {
-            fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {
-                ::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count })
-            }
+    let interface = match indicators {
+        Some((_, count)) => quote! {
+            ::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count })
         },
-        None => parse_quote! {
-            fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {
-                <Self as ::fmu::Variables>::HAS_STATES.then(::core::default::Default::default)
-            }
+        None => quote! {
+            <Self as ::fmu::Variables>::HAS_STATES.then(::core::default::Default::default)
         },
     };
-    vec![
-        (
-            parse_quote! {
-                const IDENTIFIER: &'static str = <Self as ::fmu::Variables>::IDENTIFIER;
-            },
-            None,
-        ),
-        (
-            parse_quote! {
-                fn about(&self) -> ::fmu::About {
-                    ::fmu::about!(#(#fields),*)
-                }
-            },
-            experiment.first().map(|(name, _)| name.clone()),
-        ),
-        (
-            parse_quote! {
-                fn new(_: &::std::path::Path) -> ::core::result::Result<Self, ::fmu::Failure> {
-                    ::core::result::Result::Ok(<Self as ::core::default::Default>::default())
-                }
-            },
-            None,
-        ),
-        (
-            parse_quote! {
-                fn variables(&self) -> ::std::vec::Vec<::fmu::Variable<Self>> {
-                    <Self as ::fmu::Variables>::table()
-                }
-            },
-            None,
-        ),
+    let exchange = parse_quote! {
+        fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {
+            #interface
+        }
+    };
+    let about = parse_quote! {
+        fn about(&self) -> ::fmu::About {
+            ::fmu::about!(#(#fields),*)
+        }
+    };
+    let others: [ImplItem; 4] = [
+        parse_quote! {
+            const IDENTIFIER: &'static str = <Self as ::fmu::Variables>::IDENTIFIER;
+        },
+        parse_quote! {
+            fn new(_: &::std::path::Path) -> ::core::result::Result<Self, ::fmu::Failure> {
+                ::core::result::Result::Ok(<Self as ::core::default::Default>::default())
+            }
+        },
+        parse_quote! {
+            fn variables(&self) -> ::std::vec::Vec<::fmu::Variable<Self>> {
+                <Self as ::fmu::Variables>::table()
+            }
+        },
+        parse_quote! {
+            fn log(&mut self) -> ::core::option::Option<&mut ::fmu::Log> {
+                <Self as ::fmu::Variables>::log_field(self)
+            }
+        },
+    ];
+    let from_arguments = [
+        (about, experiment.first().map(|(name, _)| name.clone())),
         (exchange, indicators.map(|(name, _)| name.clone())),
-        (
-            parse_quote! {
-                fn log(&mut self) -> ::core::option::Option<&mut ::fmu::Log> {
-                    <Self as ::fmu::Variables>::log_field(self)
-                }
-            },
-            None,
-        ),
-    ]
+    ];
+    from_arguments.into_iter().chain(others.map(|item| (item, None))).collect()
 }

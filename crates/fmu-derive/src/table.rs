@@ -6,7 +6,7 @@ use syn::{Data, DeriveInput, Error, Expr, Fields, Ident, Result};
 
 use crate::array;
 use crate::attributes::Role;
-use crate::check::check;
+use crate::check::{check, find};
 use crate::field::{Base, Part, Variable, read};
 
 /// The parts of a struct.
@@ -88,23 +88,16 @@ fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
 /// Generates `Default` if a field has a start value.
 fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     model.starts.iter().any(|(_, start)| start.is_some()).then_some(())?;
-    let dimensions = |field: &Ident| {
-        let variable = model.variables.iter().find(|known| known.field == field);
-        variable.map_or(0, |known| known.extents.len())
-    };
-    let base = |field: &Ident| {
-        let variable = model.variables.iter().find(|known| known.field == field);
-        variable.map(|known| known.base)
-    };
     let fields = model.starts.iter().map(|(field, start)| {
+        let variable = find(&model.variables, field);
         if let Some(value) = start {
             // A literal takes the type of such a field; it would be an i32 or f64 for `into`.
-            if base(field).is_some_and(Base::is_narrow) {
+            if variable.is_some_and(|variable| variable.base.is_narrow()) {
                 return quote!(#field: #value);
             }
             return quote!(#field: ::core::convert::Into::into(#value));
         }
-        let value = array::default_value(dimensions(field));
+        let value = array::default_value(variable.map_or(0, |variable| variable.extents.len()));
         quote_spanned!(field.span()=> #field: #value)
     });
     Some(quote! {
@@ -186,8 +179,7 @@ fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStrea
     }
     if let Some(state) = &attributes.derivative_of {
         let name = state.to_string();
-        let known = variables.iter().find(|variable| variable.field == state);
-        let name = known.map_or(&name, |known| &known.name);
+        let name = find(variables, state).map_or(&name, |known| &known.name);
         let name = array::element_name(name, variable.extents.len());
         calls.extend(quote!(.derivative_of(#name)));
     }
@@ -215,9 +207,8 @@ fn list<'a>(
     let mut names = quote!(let mut names = ::std::vec::Vec::<::std::string::String>::new(););
     for field in fields {
         let name = field.to_string();
-        let known = variables.iter().find(|variable| variable.field == field);
-        let (name, extents) =
-            known.map_or((&name, &[][..]), |known| (&known.name, &known.extents[..]));
+        let (name, extents) = find(variables, field)
+            .map_or((&name, &[][..]), |known| (&known.name, &known.extents[..]));
         let name = array::element_name(name, extents.len());
         names.extend(array::for_each(extents, quote!(names.push(#name.into());)));
     }
