@@ -16,7 +16,7 @@ pub(crate) const INDICATOR: u32 = 1 << 31;
 pub(crate) const INT64: u32 = 1 << 31;
 
 /// A variable of FMI 3.0: a scalar or an array.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) kind: NativeType,

@@ -31,8 +31,9 @@ pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, Mod
     builder.add_variables(&old.variables);
     let structure = builder.structure(old);
     builder.set_derivatives();
-    let table = builder.table(old);
-    let (table, variables, event_indicators) = add_indicators(table, builder.variables, indicators);
+    let mut table = builder.table(old);
+    let mut variables = builder.variables;
+    let event_indicators = add_indicators(&mut table, &mut variables, indicators);
     let description = ModelDescription {
         fmi_version: "3.0".to_owned(),
         guid: String::new(),
@@ -197,13 +198,11 @@ impl Builder {
 
     /// Replaces the indices of the states in derivatives.
     fn set_derivatives(&mut self) {
-        let places = std::mem::take(&mut self.places);
         for variable in &mut self.variables {
             if let Kind::Real(RealType { derivative: Some(state), .. }) = &mut variable.kind {
-                *state = places[*state as usize - 1].0;
+                *state = self.places[*state as usize - 1].0;
             }
         }
-        self.places = places;
     }
 
     fn structure(&self, old: &ModelDescription) -> ModelStructure {
@@ -261,13 +260,6 @@ impl Builder {
         let reference = |&(index, element): &(u32, usize)| {
             (self.variables[index as usize - 1].value_reference, element)
         };
-        let knowns = |is_known: &dyn Fn(&ScalarVariable) -> bool| {
-            let all = (1_u32..).zip(&old.variables);
-            all.filter(|(_, variable)| is_known(variable))
-                .map(|(index, _)| index)
-                .collect::<Vec<_>>()
-        };
-        let states = states(old);
         let initial = |variable: &ScalarVariable| match variable.causality {
             Causality::Input | Causality::Independent => true,
             _ => {
@@ -275,7 +267,7 @@ impl Builder {
                     && variable.variability != Variability::Constant
             }
         };
-        let mut later = knowns(&|variable| {
+        let mut later = indices(old, &|variable| {
             matches!(
                 variable.causality,
                 Causality::Input | Causality::Independent | Causality::Parameter
@@ -285,25 +277,24 @@ impl Builder {
         later.sort_unstable();
         Table {
             elements: self.places.iter().map(reference).collect(),
-            entries: self
-                .entries
-                .iter()
-                .map(|entry| Entry { name: entry.name.clone(), ..*entry })
-                .collect(),
+            entries: self.entries.clone(),
             scalars: old.structure.clone(),
             parameters: parameters(old),
-            states,
-            knowns: [knowns(&initial), later],
+            states: states(old),
+            knowns: [indices(old, &initial), later],
         }
     }
 }
 
+/// Returns the 1-based indices of the variables that `chosen` accepts.
+fn indices(old: &ModelDescription, chosen: &dyn Fn(&ScalarVariable) -> bool) -> Vec<u32> {
+    let all = (1..).zip(&old.variables);
+    all.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
+}
+
 /// Returns the indices of the parameters.
 fn parameters(old: &ModelDescription) -> Vec<u32> {
-    let all = (1..).zip(&old.variables);
-    all.filter(|(_, variable)| variable.causality == Causality::Parameter)
-        .map(|(index, _)| index)
-        .collect()
+    indices(old, &|variable| variable.causality == Causality::Parameter)
 }
 
 /// Returns the indices of the continuous states.
@@ -321,10 +312,7 @@ fn states(old: &ModelDescription) -> Vec<u32> {
         .into_iter()
         .map(|index| value_of(&old.variables[index as usize - 1]))
         .collect();
-    let all = (1..).zip(&old.variables);
-    all.filter(|(_, variable)| values.contains(&value_of(variable)))
-        .map(|(index, _)| index)
-        .collect()
+    indices(old, &|variable| values.contains(&value_of(variable)))
 }
 
 /// Returns the row with these dependencies. A known that occurs twice with different kinds has no
@@ -361,12 +349,12 @@ fn merge(row: &mut Unknown, other: &Unknown) {
     };
 }
 
-/// Adds the event indicators as local variables. Returns their rows as well.
+/// Adds the event indicators as local variables. Returns their rows.
 fn add_indicators(
-    mut table: Table,
-    mut variables: Vec<ScalarVariable>,
+    table: &mut Table,
+    variables: &mut Vec<ScalarVariable>,
     count: usize,
-) -> (Table, Vec<ScalarVariable>, Vec<Unknown>) {
+) -> Vec<Unknown> {
     let mut rows = Vec::new();
     for k in 0..count {
         let name = format!("event_indicator[{}]", k + 1);
@@ -391,5 +379,5 @@ fn add_indicators(
         let index = u32::try_from(variables.len()).unwrap_or(u32::MAX);
         rows.push(Unknown { index, dependencies: None, kinds: None });
     }
-    (table, variables, rows)
+    rows
 }
