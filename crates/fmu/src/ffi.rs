@@ -25,6 +25,7 @@ use crate::callbacks::Callbacks;
 use crate::fence::{HookGuard, guarded};
 use crate::instance::{Function, Instance, Snapshot};
 use crate::model::{Failure, Model};
+use crate::room::Room;
 use fmu_description::ModelDescription;
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::{NO_FOLDER, path_from_uri};
@@ -106,10 +107,7 @@ unsafe fn read<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], Failur
 
 /// Borrows memory for `count` elements, possibly uninitialised; the pointer may be null if `count` is
 /// 0.
-unsafe fn borrow_output<'a, T>(
-    pointer: *mut T,
-    count: usize,
-) -> Result<&'a mut [MaybeUninit<T>], Failure> {
+unsafe fn borrow_output<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut Room<T>, Failure> {
     if count == 0 {
         return Ok(&mut []);
     }

@@ -3,8 +3,11 @@
 
 use std::mem::MaybeUninit;
 
+/// Memory for output values.
+pub(crate) type Room<T> = [MaybeUninit<T>];
+
 /// Fills the memory with `value` and returns it as initialised.
-pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
+pub(crate) fn filled<T: Copy>(room: &mut Room<T>, value: T) -> &mut [T] {
     for place in &mut *room {
         place.write(value);
     }
@@ -13,7 +16,7 @@ pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T]
 }
 
 /// Converts values to memory for output values, which its user only writes.
-pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
+pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut Room<T> {
     // SAFETY: the functions of the instance that take this only write values.
-    unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
+    unsafe { &mut *(std::ptr::from_mut(values) as *mut Room<T>) }
 }

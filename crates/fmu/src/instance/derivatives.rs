@@ -1,10 +1,9 @@
 //! `fmi2GetDirectionalDerivative` of an instance (section 2.1.9).
 
-use std::mem::MaybeUninit;
-
 use super::Instance;
 use crate::interface::Slot;
 use crate::model::{At, Failure, Model};
+use crate::room::Room;
 use fmu_description::call_order::State;
 use fmu_description::{Causality, Initial, Variability};
 
@@ -25,7 +24,7 @@ impl<M: Model> Instance<M> {
         unknowns: &[u32],
         knowns: &[u32],
         delta: &[f64],
-        to: &mut [MaybeUninit<f64>],
+        to: &mut Room<f64>,
     ) -> Result<(), Failure> {
         let mut places = to.iter_mut();
         self.directional_derivative(unknowns, knowns, delta, |value| {

@@ -1,10 +1,8 @@
 //! The functions of model exchange (section 3.2).
 
-use std::mem::MaybeUninit;
-
 use super::{Instance, time_tolerance};
 use crate::model::{Event, Failure, Model};
-use crate::room::filled;
+use crate::room::{Room, filled};
 use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::{InterfaceType, State};
 
@@ -116,10 +114,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetContinuousStates`.
-    pub(crate) fn get_continuous_states(
-        &mut self,
-        values: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_continuous_states(&mut self, values: &mut Room<f64>) -> Result<(), Failure> {
         check_length("states", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
@@ -129,10 +124,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetDerivatives`.
-    pub(crate) fn get_derivatives(
-        &mut self,
-        values: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_derivatives(&mut self, values: &mut Room<f64>) -> Result<(), Failure> {
         check_length("derivatives", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
@@ -142,7 +134,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetNominalsOfContinuousStates`.
-    pub(crate) fn get_nominals(&self, values: &mut [MaybeUninit<f64>]) -> Result<(), Failure> {
+    pub(crate) fn get_nominals(&self, values: &mut Room<f64>) -> Result<(), Failure> {
         check_length("nominal values", values.len(), self.interface.states.len())?;
         for (state, value) in self.interface.states.iter().zip(values) {
             value.write(state.nominal);
@@ -151,10 +143,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetEventIndicators`.
-    pub(crate) fn get_event_indicators(
-        &mut self,
-        values: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_event_indicators(&mut self, values: &mut Room<f64>) -> Result<(), Failure> {
         let expected = self.interface.event_indicators.unwrap_or_default();
         check_length("event indicators", values.len(), expected)?;
         self.refresh()?;

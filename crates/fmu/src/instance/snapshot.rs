@@ -1,10 +1,9 @@
 //! FMU states: copies of an instance's core, and their serialised form.
 
-use std::mem::MaybeUninit;
-
 use super::layout::{Layout, layout};
 use super::{Core, Instance};
 use crate::model::{Failure, Model};
+use crate::room::Room;
 use fmu_description::Guid;
 use fmu_description::call_order::{InterfaceType, State};
 
@@ -77,7 +76,7 @@ impl<M: Model> Snapshot<M> {
     }
 
     /// Writes the state to the first bytes of `room`.
-    pub(crate) fn write(&self, room: &mut [MaybeUninit<u8>]) -> Result<(), Failure> {
+    pub(crate) fn write(&self, room: &mut Room<u8>) -> Result<(), Failure> {
         let bytes = self.to_bytes()?;
         let (available, needed) = (room.len(), bytes.len());
         if available < needed {

@@ -1,11 +1,11 @@
 //! `fmi2GetXXX` and `fmi2SetXXX` of an instance.
 
 use std::ffi::CString;
-use std::mem::MaybeUninit;
 
 use super::{Core, Instance};
 use crate::interface::{Interface, Slot};
 use crate::model::{Failure, Model};
+use crate::room::Room;
 use fmu_description::Causality;
 use fmu_description::abi::fmi2String;
 use fmu_description::call_order::State;
@@ -109,7 +109,7 @@ impl<M: Model> Core<M> {
         &mut self,
         slots: &[Slot<M, T>],
         references: &[u32],
-        values: &mut [MaybeUninit<V>],
+        values: &mut Room<V>,
         convert: impl Fn(&T) -> V,
         kind: &str,
     ) -> Result<(), Failure> {
@@ -142,11 +142,7 @@ impl<M: Model> Core<M> {
 
 impl<M: Model> Instance<M> {
     /// `fmi2GetReal`.
-    pub(crate) fn get_real(
-        &mut self,
-        from: &[u32],
-        to: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_real(&mut self, from: &[u32], to: &mut Room<f64>) -> Result<(), Failure> {
         self.refresh()?;
         for (&reference, value) in from.iter().zip(to) {
             value.write(match self.interface.real(reference)? {
@@ -158,21 +154,13 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetInteger`.
-    pub(crate) fn get_integer(
-        &mut self,
-        from: &[u32],
-        to: &mut [MaybeUninit<i32>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_integer(&mut self, from: &[u32], to: &mut Room<i32>) -> Result<(), Failure> {
         self.refresh()?;
         self.core.get(&self.interface.integers, from, to, |value| *value, "Integer")
     }
 
     /// `fmi2GetBoolean`.
-    pub(crate) fn get_boolean(
-        &mut self,
-        from: &[u32],
-        to: &mut [MaybeUninit<i32>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_boolean(&mut self, from: &[u32], to: &mut Room<i32>) -> Result<(), Failure> {
         self.refresh()?;
         self.core.get(&self.interface.booleans, from, to, |value| i32::from(*value), "Boolean")
     }
@@ -181,7 +169,7 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_string(
         &mut self,
         from: &[u32],
-        to: &mut [MaybeUninit<fmi2String>],
+        to: &mut Room<fmi2String>,
     ) -> Result<(), Failure> {
         self.refresh()?;
         self.strings.clear();
@@ -289,7 +277,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         from: &[u32],
         orders: &[i32],
-        values: &mut [MaybeUninit<f64>],
+        values: &mut Room<f64>,
     ) -> Result<(), Failure> {
         self.refresh()?;
         let highest = self.interface.max_output_derivative_order;

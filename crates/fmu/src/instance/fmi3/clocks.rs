@@ -1,11 +1,9 @@
 //! Clocks: which of them tick in an event, and their intervals (section 2.2.8).
 
-use std::mem::MaybeUninit;
-
 use super::super::Instance;
-use crate::interface::Native;
-use crate::interface::Slot;
+use crate::interface::{Native, Slot};
 use crate::model::{Failure, Model};
+use crate::room::Room;
 use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
 use fmu_description::{Causality, IntervalVariability as Variability};
 
@@ -47,7 +45,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi3GetClock`.
-    pub(crate) fn get_clock(&mut self, places: &[u32], to: &mut [MaybeUninit<fmi3Clock>]) {
+    pub(crate) fn get_clock(&mut self, places: &[u32], to: &mut Room<fmi3Clock>) {
         let clocks = bool::slots(&self.interface.typed);
         for (&place, value) in places.iter().zip(to) {
             let ticks =
@@ -83,8 +81,8 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_intervals(
         &mut self,
         places: &[u32],
-        intervals: &mut [MaybeUninit<f64>],
-        qualifiers: &mut [MaybeUninit<i32>],
+        intervals: &mut Room<f64>,
+        qualifiers: &mut Room<i32>,
     ) -> Result<(), Failure> {
         self.refresh()?;
         for ((&place, interval), qualifier) in places.iter().zip(intervals).zip(qualifiers) {
@@ -96,11 +94,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi3GetShiftDecimal`, of periodic clocks: the first tick of every periodic clock is at the start time.
-    pub(crate) fn get_shifts(
-        &self,
-        places: &[u32],
-        shifts: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_shifts(&self, places: &[u32], shifts: &mut Room<f64>) -> Result<(), Failure> {
         for (&place, shift) in places.iter().zip(shifts) {
             let clock = bool::slots(&self.interface.typed).get(place as usize);
             let is_periodic = |clock: &Slot<M, bool>| {

@@ -1,9 +1,8 @@
 //! Partial derivatives and output derivatives (sections 2.2.12 and 4.1.2).
 
-use std::mem::MaybeUninit;
-
 use super::super::Instance;
 use crate::model::{Failure, Model};
+use crate::room::Room;
 use fmu_description::NativeType;
 
 /// Unknowns, knowns and the lengths of both vectors of a partial derivative.
@@ -40,7 +39,7 @@ impl<M: Model> Instance<M> {
         unknowns: &[u32],
         seed: &[f64],
         knowns: &[u32],
-        to: &mut [MaybeUninit<f64>],
+        to: &mut Room<f64>,
     ) -> Result<(), Failure> {
         Self::provides_derivatives()?;
         for (&known, place) in knowns.iter().zip(to) {
@@ -58,7 +57,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         references: &[u32],
         orders: &[i32],
-        to: &mut [MaybeUninit<f64>],
+        to: &mut Room<f64>,
     ) -> Result<(), Failure> {
         let session = self.session_mut()?;
         let mut expanded = std::mem::take(&mut session.integers);

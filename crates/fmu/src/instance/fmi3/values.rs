@@ -1,19 +1,17 @@
 //! `fmi3GetXXX` and `fmi3SetXXX` by places: value references of FMI 2.0, or event indicators.
 
-use std::mem::MaybeUninit;
-
 use super::super::Instance;
-use crate::interface::Native;
-use crate::interface::Slot;
 use crate::interface::fmi3::{INDICATOR, INT64};
+use crate::interface::{Native, Slot};
 use crate::model::{Failure, Model};
+use crate::room::Room;
 
 /// Reads the values of located variables.
 fn copy<M, T, V>(
     slots: &[Slot<M, T>],
     model: &mut M,
     places: &[u32],
-    to: &mut [MaybeUninit<V>],
+    to: &mut Room<V>,
     read: impl Fn(&T) -> V,
 ) {
     for (&place, value) in places.iter().zip(to) {
@@ -40,7 +38,7 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_float64(
         &mut self,
         places: &[u32],
-        to: &mut [MaybeUninit<f64>],
+        to: &mut Room<f64>,
     ) -> Result<(), Failure> {
         if places.iter().any(|place| place & INDICATOR != 0) {
             return self.get_with_indicators(places, to);
@@ -50,11 +48,7 @@ impl<M: Model> Instance<M> {
 
     /// Reads variables of which some are event indicators.
     #[cold]
-    fn get_with_indicators(
-        &mut self,
-        places: &[u32],
-        to: &mut [MaybeUninit<f64>],
-    ) -> Result<(), Failure> {
+    fn get_with_indicators(&mut self, places: &[u32], to: &mut Room<f64>) -> Result<(), Failure> {
         self.refresh()?;
         let mut indicators = std::mem::take(&mut self.session_mut()?.indicators);
         self.core.model.event_indicators(self.core.time, &mut indicators);
@@ -71,11 +65,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi3GetInt64`: of `Int64` variables and enumerations.
-    pub(crate) fn get_int64(
-        &mut self,
-        places: &[u32],
-        to: &mut [MaybeUninit<i64>],
-    ) -> Result<(), Failure> {
+    pub(crate) fn get_int64(&mut self, places: &[u32], to: &mut Room<i64>) -> Result<(), Failure> {
         self.refresh()?;
         let model = &mut self.core.model;
         for (&place, value) in places.iter().zip(to) {
@@ -116,7 +106,7 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_typed<T: Native + Copy>(
         &mut self,
         places: &[u32],
-        to: &mut [MaybeUninit<T>],
+        to: &mut Room<T>,
     ) -> Result<(), Failure> {
         self.refresh()?;
         copy(T::slots(&self.interface.typed), &mut self.core.model, places, to, |value| *value);
@@ -158,7 +148,7 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_boolean_3(
         &mut self,
         places: &[u32],
-        to: &mut [MaybeUninit<u8>],
+        to: &mut Room<u8>,
     ) -> Result<(), Failure> {
         self.refresh()?;
         let read = |value: &bool| u8::from(*value);
