@@ -97,6 +97,17 @@ macro_rules! plain {
     };
 }
 
+/// Serialises the start of collections.
+macro_rules! collections {
+    ($($function:ident($($argument:ident: $type:ty),*), $walk:ident => $start:expr;)*) => {
+        $(fn $function(self, $($argument: $type),*) -> Result<Self, Refusal> {
+            let $walk = self;
+            $start;
+            Ok($walk)
+        })*
+    };
+}
+
 impl ser::Serializer for &mut LayoutHasher {
     type Ok = ();
     type Error = Refusal;
@@ -172,51 +183,19 @@ impl ser::Serializer for &mut LayoutHasher {
         value.serialize(self)
     }
 
-    fn serialize_seq(self, _: Option<usize>) -> Result<Self, Refusal> {
-        self.word("sequence");
-        Ok(self)
-    }
-
-    fn serialize_tuple(self, _: usize) -> Result<Self, Refusal> {
-        self.word("tuple");
-        Ok(self)
-    }
-
-    fn serialize_tuple_struct(self, name: &'static str, _: usize) -> Result<Self, Refusal> {
-        self.words(["tuple struct", name]);
-        Ok(self)
-    }
-
-    fn serialize_tuple_variant(
-        self,
-        name: &'static str,
-        k: u32,
-        variant: &'static str,
-        _: usize,
-    ) -> Result<Self, Refusal> {
-        self.variant("tuple variant", name, k, variant);
-        Ok(self)
-    }
-
-    fn serialize_map(self, _: Option<usize>) -> Result<Self, Refusal> {
-        self.word("map");
-        Ok(self)
-    }
-
-    fn serialize_struct(self, name: &'static str, _: usize) -> Result<Self, Refusal> {
-        self.words(["struct", name]);
-        Ok(self)
-    }
-
-    fn serialize_struct_variant(
-        self,
-        name: &'static str,
-        k: u32,
-        variant: &'static str,
-        _: usize,
-    ) -> Result<Self, Refusal> {
-        self.variant("struct variant", name, k, variant);
-        Ok(self)
+    collections! {
+        serialize_seq(_length: Option<usize>), walk => walk.word("sequence");
+        serialize_tuple(_length: usize), walk => walk.word("tuple");
+        serialize_tuple_struct(name: &'static str, _length: usize),
+            walk => walk.words(["tuple struct", name]);
+        serialize_tuple_variant(
+            name: &'static str, k: u32, variant: &'static str, _length: usize
+        ), walk => walk.variant("tuple variant", name, k, variant);
+        serialize_map(_length: Option<usize>), walk => walk.word("map");
+        serialize_struct(name: &'static str, _length: usize), walk => walk.words(["struct", name]);
+        serialize_struct_variant(
+            name: &'static str, k: u32, variant: &'static str, _length: usize
+        ), walk => walk.variant("struct variant", name, k, variant);
     }
 
     fn collect_str<T: ?Sized + Display>(self, _: &T) -> Hashed {
