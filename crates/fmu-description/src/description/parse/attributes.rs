@@ -17,6 +17,9 @@ const COUNTER: &str = "an integer from 0 to 18446744073709551615";
 const BOOLEAN: &str = "true, false, 1 or 0";
 const NOTHING: &str = "read as if it were not there";
 
+/// The result of reading a part of a file.
+pub(super) type Result<T, E = ParseError> = std::result::Result<T, E>;
+
 /// An element that is being read, with the list of warnings.
 #[derive(Clone, Copy)]
 pub(super) struct Node<'a> {
@@ -114,7 +117,7 @@ impl<'a> Node<'a> {
         self.attribute(name).map(str::to_owned)
     }
 
-    pub(super) fn required(&self, name: &'static str) -> Result<&'a str, ParseError> {
+    pub(super) fn required(&self, name: &'static str) -> Result<&'a str> {
         let value = self.attribute(name);
         value.ok_or_else(|| self.fault(name, "a value", "no such attribute".to_owned()))
     }
@@ -133,7 +136,7 @@ impl<'a> Node<'a> {
 
     /// Reads an `xs:double`. Infinity and NaN give a warning and count as missing; a number too
     /// large for a double is an error.
-    pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
+    pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>> {
         let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
         if is_not_finite(trimmed) {
             // The schema allows these spellings, the text of FMI does not.
@@ -148,7 +151,7 @@ impl<'a> Node<'a> {
     }
 
     /// Reads the `xs:double` of a limit. An infinite one of FMI 3.0 limits nothing.
-    pub(super) fn bound(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
+    pub(super) fn bound(&self, name: &'static str) -> Result<Option<f64>> {
         match self.attribute(name).map(|text| text.trim_matches(WHITE_SPACE)) {
             Some("INF" | "-INF") => Ok(None),
             _ => self.number(name),
@@ -156,14 +159,14 @@ impl<'a> Node<'a> {
     }
 
     /// Reads an `xs:double` of a conversion, which must be finite.
-    pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64, ParseError> {
+    pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64> {
         let Some(text) = self.attribute(name) else { return Ok(default) };
         let value = text.trim_matches(WHITE_SPACE).parse::<f64>().ok();
         value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(name, NUMBER, text))
     }
 
     /// Reads an `xs:int`. An integer written with a point (`1.0`) gives a warning.
-    pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>, ParseError> {
+    pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>> {
         let value = self.whole(name, &(i32::MIN.into()..=i32::MAX.into()), INTEGER)?;
         Ok(value.and_then(|value| i32::try_from(value).ok()))
     }
@@ -174,7 +177,7 @@ impl<'a> Node<'a> {
         &self,
         name: &'static str,
         range: &RangeInclusive<i128>,
-    ) -> Result<Option<i128>, ParseError> {
+    ) -> Result<Option<i128>> {
         self.whole(name, range, "an integer")
     }
 
@@ -184,7 +187,7 @@ impl<'a> Node<'a> {
         name: &'static str,
         range: &RangeInclusive<i128>,
         content: &str,
-    ) -> Result<Option<i128>, ParseError> {
+    ) -> Result<Option<i128>> {
         let expected = || format!("an integer from {} to {}", range.start(), range.end());
         let Some((text, trimmed)) = self.content(name, content) else { return Ok(None) };
         let inside = |value: &i128| range.contains(value);
@@ -204,7 +207,7 @@ impl<'a> Node<'a> {
     }
 
     /// Reads an `xs:unsignedInt`; any other value is an error.
-    pub(super) fn unsigned(&self, name: &'static str) -> Result<u32, ParseError> {
+    pub(super) fn unsigned(&self, name: &'static str) -> Result<u32> {
         let text = self.required(name)?;
         let value = text.trim_matches(WHITE_SPACE).parse();
         value.map_err(|_| self.wrong(name, UNSIGNED, text))
@@ -225,7 +228,7 @@ impl<'a> Node<'a> {
     }
 
     /// Reads an `xs:boolean`, in any case.
-    pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>, ParseError> {
+    pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>> {
         let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return Ok(None) };
         let value = self.truth(name, trimmed);
         value.map(Some).ok_or_else(|| self.wrong(name, BOOLEAN, text))
@@ -279,7 +282,7 @@ impl<'a> Node<'a> {
         named.map(move |element| Node { element, ..self })
     }
 
-    pub(super) fn optional_child(self, name: &'a str) -> Result<Option<Node<'a>>, ParseError> {
+    pub(super) fn optional_child(self, name: &'a str) -> Result<Option<Node<'a>>> {
         let mut children = self.children_named(name);
         let first = children.next();
         match children.next() {
@@ -295,12 +298,12 @@ impl<'a> Node<'a> {
     pub(super) fn optional<T>(
         self,
         name: &'a str,
-        read: impl FnOnce(Node<'a>) -> Result<T, ParseError>,
-    ) -> Result<Option<T>, ParseError> {
+        read: impl FnOnce(Node<'a>) -> Result<T>,
+    ) -> Result<Option<T>> {
         self.optional_child(name)?.map(read).transpose()
     }
 
-    pub(super) fn child(self, name: &'a str) -> Result<Node<'a>, ParseError> {
+    pub(super) fn child(self, name: &'a str) -> Result<Node<'a>> {
         let child = self.optional_child(name)?;
         child.ok_or_else(|| self.misses(format!("an element {name}"), "none".to_owned()))
     }
@@ -310,8 +313,8 @@ impl<'a> Node<'a> {
         self,
         name: &'a str,
         item: &'a str,
-        read: impl Fn(Node<'a>) -> Result<T, ParseError>,
-    ) -> Result<Vec<T>, ParseError> {
+        read: impl Fn(Node<'a>) -> Result<T>,
+    ) -> Result<Vec<T>> {
         let list = self.optional_child(name)?;
         list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
     }

@@ -1,8 +1,7 @@
 //! Reads what several versions of FMI write in the same way: the attributes of the root element, units, log
 //! categories, the default experiment.
 
-use super::attributes::Node;
-use crate::defect::ParseError;
+use super::attributes::{Node, Result};
 use crate::description::{DefaultExperiment, LogCategory, ModelDescription, Version};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 
@@ -40,7 +39,7 @@ fn structured_names(root: Node<'_>) -> bool {
     }
 }
 
-pub(super) fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
+pub(super) fn unit(element: Node<'_>) -> Result<Unit> {
     let display_units = element.children_named("DisplayUnit").map(|display| {
         Ok(DisplayUnit {
             name: display.required("name")?.to_owned(),
@@ -51,12 +50,12 @@ pub(super) fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
     });
     Ok(Unit {
         name: element.required("name")?.to_owned(),
-        display_units: display_units.collect::<Result<_, ParseError>>()?,
+        display_units: display_units.collect::<Result<_>>()?,
         base: element.optional("BaseUnit", base_unit)?,
     })
 }
 
-fn base_unit(element: Node<'_>) -> Result<BaseUnit, ParseError> {
+fn base_unit(element: Node<'_>) -> Result<BaseUnit> {
     let mut exponents = [0; 8];
     for (exponent, name) in exponents.iter_mut().zip(BaseUnit::EXPONENTS) {
         *exponent = element.integer(name)?.unwrap_or(0);
@@ -65,12 +64,12 @@ fn base_unit(element: Node<'_>) -> Result<BaseUnit, ParseError> {
     Ok(BaseUnit::from_exponents(exponents, factor, offset))
 }
 
-pub(super) fn category(element: Node<'_>) -> Result<LogCategory, ParseError> {
+pub(super) fn category(element: Node<'_>) -> Result<LogCategory> {
     let name = element.required("name")?.to_owned();
     Ok(LogCategory { name, description: element.text("description") })
 }
 
-pub(super) fn experiment(element: Node<'_>) -> Result<DefaultExperiment, ParseError> {
+pub(super) fn experiment(element: Node<'_>) -> Result<DefaultExperiment> {
     Ok(DefaultExperiment {
         start_time: element.number("startTime")?,
         stop_time: element.number("stopTime")?,

@@ -2,17 +2,16 @@
 
 mod variables;
 
-use super::attributes::Node;
+use super::attributes::{Node, Result};
 use super::definitions::{experiment, general};
 use super::schema;
 use super::variables::{integer_limits, real_limits};
-use crate::defect::ParseError;
 use crate::description::{
     CoSimulation, IntegerType, Kind, ModelDescription, ModelExchange, RealType, SimpleType, Version,
 };
 use crate::unit::{DisplayUnit, Unit};
 
-pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     schema::check(root, Version::V1);
     let identifier = root.required("modelIdentifier")?.to_owned();
     let types = root.list("TypeDefinitions", "Type", simple_type)?;
@@ -40,7 +39,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     })
 }
 
-fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
+fn unit(element: Node<'_>) -> Result<Unit> {
     let display_units = element.children_named("DisplayUnitDefinition").map(|display| {
         Ok(DisplayUnit {
             name: display.required("displayUnit")?.to_owned(),
@@ -51,12 +50,12 @@ fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
     });
     Ok(Unit {
         name: element.required("unit")?.to_owned(),
-        display_units: display_units.collect::<Result<_, ParseError>>()?,
+        display_units: display_units.collect::<Result<_>>()?,
         base: None,
     })
 }
 
-fn simple_type(element: Node<'_>) -> Result<SimpleType, ParseError> {
+fn simple_type(element: Node<'_>) -> Result<SimpleType> {
     let mut kinds = element.children().filter(|child| child.element.name.ends_with("Type"));
     let Some(element_of_kind) = kinds.next() else {
         let expected = "RealType, IntegerType, BooleanType, StringType or EnumerationType";
@@ -79,15 +78,12 @@ fn simple_type(element: Node<'_>) -> Result<SimpleType, ParseError> {
             }
             _ => Kind::Real(real_limits(element_of_kind, &RealType::default())?),
         },
-        items: items.collect::<Result<_, ParseError>>()?,
+        items: items.collect::<Result<_>>()?,
     })
 }
 
 /// Reads `Implementation`: the kind stand-alone, or the kind that needs a simulation tool.
-fn co_simulation(
-    implementation: Node<'_>,
-    model_identifier: String,
-) -> Result<CoSimulation, ParseError> {
+fn co_simulation(implementation: Node<'_>, model_identifier: String) -> Result<CoSimulation> {
     let stand_alone = implementation.optional_child("CoSimulation_StandAlone")?;
     let tool = implementation.optional_child("CoSimulation_Tool")?;
     let Some(interface) = stand_alone.or(tool) else {

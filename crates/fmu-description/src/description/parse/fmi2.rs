@@ -1,12 +1,11 @@
 //! Reads a model description of FMI 2.0.
 
-use super::attributes::Node;
+use super::attributes::{Node, Result};
 use super::definitions::{category, experiment, general, unit};
 use super::{schema, structure, variables};
-use crate::defect::ParseError;
 use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
 
-pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     version(root);
     schema::check(root, Version::V2);
     let types = variables::types(root)?;
@@ -40,11 +39,11 @@ fn version(root: Node<'_>) {
     }
 }
 
-fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
+fn source_files(element: Node<'_>) -> Result<Vec<String>> {
     element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
 }
 
-fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
+fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
     let flag = |name| element.flag(name);
     Ok(ModelExchange {
         model_identifier: element.required("modelIdentifier")?.to_owned(),
@@ -60,7 +59,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
     })
 }
 
-fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
+fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
     let flag = |name| element.flag(name);
     Ok(CoSimulation {
         model_identifier: element.required("modelIdentifier")?.to_owned(),

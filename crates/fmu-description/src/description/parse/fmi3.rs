@@ -5,15 +5,14 @@ mod start;
 mod structure;
 mod variables;
 
-use super::attributes::Node;
+use super::attributes::{Node, Result};
 use super::definitions::{category, experiment, general, unit};
 use super::schema;
-use crate::defect::ParseError;
 use crate::description::{
     CoSimulation, ModelDescription, ModelExchange, ScheduledExecution, Version,
 };
 
-pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     schema::check(root, Version::V3);
     let types = kinds::types(root)?;
     let (variables, references) = variables::read(root.child("ModelVariables")?, &types)?;
@@ -44,7 +43,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     })
 }
 
-fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
+fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
     let flag = |name| element.flag(name);
     let completed = flag("needsCompletedIntegratorStep");
     Ok(ModelExchange {
@@ -63,7 +62,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
     })
 }
 
-fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
+fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
     let flag = |name| element.flag(name);
     Ok(CoSimulation {
         model_identifier: element.required("modelIdentifier")?.to_owned(),
@@ -91,7 +90,7 @@ fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
     })
 }
 
-fn scheduled_execution(element: Node<'_>) -> Result<ScheduledExecution, ParseError> {
+fn scheduled_execution(element: Node<'_>) -> Result<ScheduledExecution> {
     let flag = |name| element.flag(name);
     Ok(ScheduledExecution {
         model_identifier: element.required("modelIdentifier")?.to_owned(),

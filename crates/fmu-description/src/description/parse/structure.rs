@@ -2,8 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::attributes::{Node, WHITE_SPACE};
-use crate::defect::ParseError;
+use super::attributes::{Node, Result, WHITE_SPACE};
 use crate::description::{Causality, DependencyKind, ModelStructure, ScalarVariable, Unknown};
 
 pub(super) const ANYTHING: &str = "read as depending on anything";
@@ -12,10 +11,7 @@ pub(super) const ANYTHING: &str = "read as depending on anything";
 ///
 /// If a list has an index that belongs to no variable, all of its rows are read as depending on
 /// anything. Outputs that are missing from `Outputs` are read in the same way.
-pub(super) fn read(
-    root: Node<'_>,
-    variables: &[ScalarVariable],
-) -> Result<ModelStructure, ParseError> {
+pub(super) fn read(root: Node<'_>, variables: &[ScalarVariable]) -> Result<ModelStructure> {
     let Some(element) = child(root)? else {
         let missing = missing_outputs(&[], variables).map(|(row, _)| row);
         return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
@@ -32,7 +28,7 @@ pub(super) fn read(
 }
 
 /// Returns the element `ModelStructure`, or warns that there is none.
-pub(super) fn child(root: Node<'_>) -> Result<Option<Node<'_>>, ParseError> {
+pub(super) fn child(root: Node<'_>) -> Result<Option<Node<'_>>> {
     let element = root.optional_child("ModelStructure")?;
     if element.is_none() {
         let place = "<fmiModelDescription>".to_owned();
@@ -73,7 +69,7 @@ pub(super) fn missing_outputs<'a>(
     })
 }
 
-fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unknown>, ParseError> {
+fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unknown>> {
     let Some(list) = element.optional_child(name)? else { return Ok(Vec::new()) };
     let mut trusted = true;
     let mut rows = Vec::new();
@@ -104,7 +100,7 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
 
 /// Reads `Derivatives`, which determine the states: an index that belongs to no variable is an
 /// error.
-fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>, ParseError> {
+fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>> {
     if let Some(list) = element.optional_child("Derivatives")? {
         for row in list.children_named("Unknown") {
             let text = row.required("index")?;

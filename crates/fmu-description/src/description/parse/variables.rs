@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::attributes::Node;
+use super::attributes::{Node, Result};
 use super::structure::{index, indices};
 use crate::defect::ParseError;
 use crate::description::{
@@ -21,7 +21,7 @@ pub(super) const VARIABLES: usize = 1_000_000;
 /// The types of `TypeDefinitions`, by name.
 pub(super) type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
-pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
+pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
     root.list("TypeDefinitions", "SimpleType", |element| {
         let typed = typed(element)?;
         if let Some(other) = typed.attribute("declaredType") {
@@ -43,17 +43,14 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     })
 }
 
-fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
+fn item(element: Node<'_>) -> Result<(String, i64)> {
     let text = element.required("value")?;
     let value = element.integer("value")?;
     let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
     Ok((element.required("name")?.to_owned(), value.into()))
 }
 
-pub(super) fn variables(
-    list: Node<'_>,
-    types: &[SimpleType],
-) -> Result<Vec<ScalarVariable>, ParseError> {
+pub(super) fn variables(list: Node<'_>, types: &[SimpleType]) -> Result<Vec<ScalarVariable>> {
     let (elements, variables) = scalar_variables(list, types, variable)?;
     check_names(&elements, &variables)?;
     check_references(&elements, &variables)?;
@@ -69,8 +66,8 @@ pub(super) fn by_name(types: &[SimpleType]) -> Types<'_> {
 pub(super) fn scalar_variables<'a>(
     list: Node<'a>,
     types: &[SimpleType],
-    variable: fn(Node<'_>, &Types<'_>, usize) -> Result<ScalarVariable, ParseError>,
-) -> Result<(Vec<Node<'a>>, Vec<ScalarVariable>), ParseError> {
+    variable: fn(Node<'_>, &Types<'_>, usize) -> Result<ScalarVariable>,
+) -> Result<(Vec<Node<'a>>, Vec<ScalarVariable>)> {
     let elements: Vec<Node<'a>> = list.children_named("ScalarVariable").collect();
     if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
@@ -83,10 +80,7 @@ pub(super) fn scalar_variables<'a>(
 }
 
 /// Refuses a name that two variables have, unless it does not matter which one is meant.
-pub(super) fn check_names(
-    elements: &[Node<'_>],
-    variables: &[ScalarVariable],
-) -> Result<(), ParseError> {
+pub(super) fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()> {
     let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
     for (element, variable) in elements.iter().zip(variables) {
         let Some(first) = names.get(variable.name.as_str()) else {
@@ -108,10 +102,7 @@ pub(super) fn check_names(
 }
 
 /// Two variables that are set from outside must not share a value reference.
-pub(super) fn check_references(
-    elements: &[Node<'_>],
-    variables: &[ScalarVariable],
-) -> Result<(), ParseError> {
+pub(super) fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()> {
     let mut settable: HashMap<(&str, u32), &str> = HashMap::new();
     for (element, variable) in elements.iter().zip(variables) {
         let set_from_outside =
@@ -130,11 +121,7 @@ pub(super) fn check_references(
     Ok(())
 }
 
-fn variable(
-    element: Node<'_>,
-    types: &Types<'_>,
-    count: usize,
-) -> Result<ScalarVariable, ParseError> {
+fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<ScalarVariable> {
     let name = element.required("name")?.to_owned();
     let value_reference = element.unsigned("valueReference")?;
     let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
@@ -172,7 +159,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
 }
 
 /// Returns the single child that gives the type of a variable or a type definition.
-pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
+pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
     let is_kind = |child: &&crate::xml::tree::Element<'_>| KINDS.contains(&child.name);
     let mut kinds = element.element.children.iter().filter(is_kind);
     match (kinds.next(), kinds.next()) {
@@ -185,7 +172,7 @@ pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     }
 }
 
-pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
+pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind> {
     let declared = declared(element, types);
     Ok(match element.element.name {
         "Real" => {
@@ -224,7 +211,7 @@ pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result
     })
 }
 
-fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>, ParseError> {
+fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>> {
     let Some(text) = element.attribute("derivative") else { return Ok(None) };
     let index = index(text, count);
     index.map(Some).ok_or_else(|| element.wrong("derivative", &indices(count), text))
@@ -257,7 +244,7 @@ pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(Stri
     }
 }
 
-pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
+pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
@@ -269,10 +256,7 @@ pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<Real
     })
 }
 
-pub(super) fn integer_limits(
-    element: Node<'_>,
-    defaults: &IntegerType,
-) -> Result<IntegerType, ParseError> {
+pub(super) fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType> {
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         min: element.integer("min")?.map(i128::from).or(defaults.min),

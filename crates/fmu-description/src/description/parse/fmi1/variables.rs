@@ -2,8 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::defect::ParseError;
-use crate::description::parse::attributes::Node;
+use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::ANYTHING;
 use crate::description::parse::variables::{
     Types, check_names, check_references, kind, scalar_variables, typed,
@@ -19,7 +18,7 @@ const CAUSALITIES: [&str; 4] = ["input", "output", "internal", "none"];
 pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
-) -> Result<(Vec<ScalarVariable>, ModelStructure), ParseError> {
+) -> Result<(Vec<ScalarVariable>, ModelStructure)> {
     let (elements, mut variables) = scalar_variables(list, types, variable)?;
     set_aliases(&elements, &mut variables);
     check_names(&elements, &variables)?;
@@ -28,11 +27,7 @@ pub(super) fn read(
     Ok((variables, ModelStructure { outputs, ..ModelStructure::default() }))
 }
 
-fn variable(
-    element: Node<'_>,
-    types: &Types<'_>,
-    count: usize,
-) -> Result<ScalarVariable, ParseError> {
+fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<ScalarVariable> {
     let value = typed(element)?;
     let kind = kind(value, types, count)?;
     let stated = element.one_of("variability", &VARIABILITIES);
@@ -104,10 +99,7 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
 
 /// Returns the outputs with their `DirectDependency`: without this element an output depends on all
 /// inputs.
-fn outputs(
-    elements: &[Node<'_>],
-    variables: &[ScalarVariable],
-) -> Result<Vec<Unknown>, ParseError> {
+fn outputs(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<Vec<Unknown>> {
     let inputs =
         (1..).zip(variables).filter(|(_, variable)| variable.causality == Causality::Input);
     let inputs: HashMap<&str, u32> =

@@ -2,15 +2,14 @@
 
 use std::ops::RangeInclusive;
 
-use crate::defect::ParseError;
-use crate::description::parse::attributes::Node;
+use crate::description::parse::attributes::{Node, Result};
 use crate::description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType, Version,
 };
 
 const INTERVALS: [&str; 6] = ["constant", "fixed", "tunable", "changing", "countdown", "triggered"];
 
-pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
+pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
     let Some(list) = root.optional_child("TypeDefinitions")? else { return Ok(Vec::new()) };
     let mut types = Vec::new();
     for element in list.children() {
@@ -33,7 +32,7 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     Ok(types)
 }
 
-fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
+fn item(element: Node<'_>) -> Result<(String, i64)> {
     let text = element.required("value")?;
     let value = element.integer_within("value", &(i64::MIN.into()..=i64::MAX.into()))?;
     let value = value.and_then(|value| i64::try_from(value).ok());
@@ -47,7 +46,7 @@ pub(super) fn attributes(
     element: Node<'_>,
     kind: &mut Kind,
     defaults: Option<&Kind>,
-) -> Result<(), ParseError> {
+) -> Result<()> {
     let range = kind.integer_range(Version::V3);
     if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
         *integer_type = integer(element, &range, defaults.and_then(Kind::as_integer))?;
@@ -94,11 +93,7 @@ impl Precision {
     }
 }
 
-fn real(
-    element: Node<'_>,
-    precision: Precision,
-    defaults: Option<&RealType>,
-) -> Result<RealType, ParseError> {
+fn real(element: Node<'_>, precision: Precision, defaults: Option<&RealType>) -> Result<RealType> {
     let defaults = defaults.cloned().unwrap_or_default();
     let round = |value: Option<f64>| value.map(|value| precision.round(value));
     Ok(RealType {
@@ -116,7 +111,7 @@ fn integer(
     element: Node<'_>,
     range: &RangeInclusive<i128>,
     defaults: Option<&IntegerType>,
-) -> Result<IntegerType, ParseError> {
+) -> Result<IntegerType> {
     let defaults = defaults.cloned().unwrap_or_default();
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity),
@@ -134,7 +129,7 @@ fn binary(element: Node<'_>, defaults: &BinaryType) -> BinaryType {
     }
 }
 
-fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType, ParseError> {
+fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
     let has_defaults = defaults.is_some();
     let defaults = defaults.cloned().unwrap_or_default();
     let flag = |name, default| if element.has(name) { element.flag(name) } else { default };

@@ -3,14 +3,13 @@
 use std::ops::RangeInclusive;
 
 use super::kinds::Precision;
-use crate::defect::ParseError;
-use crate::description::parse::attributes::Node;
+use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
 
 /// Reads `start`, or the elements `Start` of a String or Binary. A single value becomes the start of
 /// `kind`; a list is returned.
-pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements>, ParseError> {
+pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements>> {
     let range = kind.integer_range(Version::V3);
     if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
         let values = list(
@@ -39,7 +38,7 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
         Kind::Binary(binary_type) => {
             let wrong = |text| element.wrong("value", "pairs of hexadecimal digits", text);
             let bytes = texts(element).map(|text| hexadecimal(text).ok_or_else(|| wrong(text)));
-            let values = bytes.collect::<Result<_, ParseError>>()?;
+            let values = bytes.collect::<Result<_>>()?;
             single(values, |value| binary_type.start = Some(value)).map(Elements::Binary)
         }
         _ => None,
@@ -60,7 +59,7 @@ fn list<T>(
     element: Node<'_>,
     value: impl Fn(&str) -> Option<T>,
     expected: impl Fn() -> String,
-) -> Result<Vec<T>, ParseError> {
+) -> Result<Vec<T>> {
     let Some(text) = element.attribute("start") else { return Ok(Vec::new()) };
     let wrong = |word| element.wrong("start", &expected(), word);
     let values = words(text).map(|word| value(word).ok_or_else(|| wrong(word)));

@@ -3,8 +3,7 @@
 use std::collections::HashSet;
 
 use super::variables::{A_REFERENCE, References};
-use crate::defect::ParseError;
-use crate::description::parse::attributes::Node;
+use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::{
     ANYTHING, add_outputs, child, kinds, missing_outputs, words,
 };
@@ -18,7 +17,7 @@ pub(super) fn read(
     root: Node<'_>,
     variables: &[ScalarVariable],
     references: &References,
-) -> Result<ModelStructure, ParseError> {
+) -> Result<ModelStructure> {
     let Some(element) = child(root)? else {
         let missing = missing(&[], variables, references).map(|(row, _)| row);
         return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
@@ -53,15 +52,11 @@ fn missing<'a>(
     missing_outputs(rows, variables).filter(move |(row, _)| meant.contains(&row.index))
 }
 
-fn index(row: Node<'_>, references: &References) -> Result<Option<u32>, ParseError> {
+fn index(row: Node<'_>, references: &References) -> Result<Option<u32>> {
     Ok(references.get(&row.unsigned("valueReference")?).copied())
 }
 
-fn list(
-    element: Node<'_>,
-    name: &'static str,
-    references: &References,
-) -> Result<Vec<Unknown>, ParseError> {
+fn list(element: Node<'_>, name: &'static str, references: &References) -> Result<Vec<Unknown>> {
     let mut rows = Vec::new();
     for row in element.children_named(name) {
         let Some(index) = index(row, references)? else {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::kinds::attributes;
 use super::start;
 use crate::defect::ParseError;
-use crate::description::parse::attributes::Node;
+use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::words;
 use crate::description::parse::variables::{
     Types, VARIABILITIES, VARIABLES, by_name, check_names, check_references, declared,
@@ -36,7 +36,7 @@ pub(super) type References = HashMap<u32, u32>;
 pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
-) -> Result<(Vec<ScalarVariable>, References), ParseError> {
+) -> Result<(Vec<ScalarVariable>, References)> {
     let types = by_name(types);
     let (mut elements, mut variables) = (Vec::new(), Vec::new());
     // A few bytes of the file may name an alias of a variable with long texts and lists.
@@ -91,11 +91,7 @@ fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References
     references
 }
 
-fn variable(
-    element: Node<'_>,
-    mut kind: Kind,
-    types: &Types<'_>,
-) -> Result<ScalarVariable, ParseError> {
+fn variable(element: Node<'_>, mut kind: Kind, types: &Types<'_>) -> Result<ScalarVariable> {
     let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
     let (declared_type, defaults) = declared(element, types).unzip();
     attributes(element, &mut kind, defaults)?;
@@ -140,7 +136,7 @@ fn set_declared_type(kind: &mut Kind, name: Option<String>) {
 }
 
 /// Reads an `Alias`: a variable with the value of the one that contains it.
-fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable, ParseError> {
+fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable> {
     let mut kind = of.kind.clone();
     kind.clear_start();
     let mut alias = ScalarVariable {
@@ -202,7 +198,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     stated
 }
 
-fn dimension(element: Node<'_>) -> Result<Dimension, ParseError> {
+fn dimension(element: Node<'_>) -> Result<Dimension> {
     let start = element.optional_counter("start").map(Dimension::Fixed);
     let reference = reference(element, "valueReference")?.map(Dimension::Variable);
     if start.is_some() && reference.is_some() {
@@ -214,12 +210,12 @@ fn dimension(element: Node<'_>) -> Result<Dimension, ParseError> {
     start.or(reference).ok_or_else(missing)
 }
 
-fn reference(element: Node<'_>, name: &'static str) -> Result<Option<u32>, ParseError> {
+fn reference(element: Node<'_>, name: &'static str) -> Result<Option<u32>> {
     if element.has(name) { element.unsigned(name).map(Some) } else { Ok(None) }
 }
 
 /// Reads the attribute `clocks` as value references.
-fn clocks(element: Node<'_>) -> Result<Vec<u32>, ParseError> {
+fn clocks(element: Node<'_>) -> Result<Vec<u32>> {
     let text = element.attribute("clocks").unwrap_or_default();
     let wrong = |word| element.wrong("clocks", "value references of clocks", word);
     words(text).map(|word| word.parse().map_err(|_| wrong(word))).collect()
@@ -231,7 +227,7 @@ fn check_dimensions(
     elements: &[Node<'_>],
     variables: &mut [ScalarVariable],
     references: &References,
-) -> Result<(), ParseError> {
+) -> Result<()> {
     let extent = |reference: u32, variables: &[ScalarVariable]| {
         let index = usize::try_from(*references.get(&reference)?).ok()?;
         let start = variables.get(index.checked_sub(1)?)?.kind.as_integer()?.start?;
@@ -272,7 +268,7 @@ fn resolve(
     element: Node<'_>,
     variable: &mut ScalarVariable,
     references: &References,
-) -> Result<(), ParseError> {
+) -> Result<()> {
     let index = |name, reference: u32| {
         let position = references.get(&reference).copied();
         position.ok_or_else(|| element.wrong(name, A_REFERENCE, &reference.to_string()))
