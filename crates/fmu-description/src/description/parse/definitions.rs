@@ -27,6 +27,18 @@ pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
     }
 }
 
+/// Reads what the root elements of FMI 2.0 and 3.0 have in common.
+pub(super) fn common(root: Node<'_>, model_name: String) -> Result<ModelDescription> {
+    Ok(ModelDescription {
+        copyright: root.text("copyright"),
+        license: root.text("license"),
+        units: root.list("UnitDefinitions", "Unit", unit)?,
+        log_categories: root.list("LogCategories", "Category", category)?,
+        default_experiment: root.optional("DefaultExperiment", experiment)?,
+        ..general(root, model_name)
+    })
+}
+
 fn structured_names(root: Node<'_>) -> bool {
     const NAME: &str = "variableNamingConvention";
     match root.attribute(NAME) {
@@ -39,7 +51,7 @@ fn structured_names(root: Node<'_>) -> bool {
     }
 }
 
-pub(super) fn unit(element: Node<'_>) -> Result<Unit> {
+fn unit(element: Node<'_>) -> Result<Unit> {
     let display_units = element.children_named("DisplayUnit").map(|display| {
         Ok(DisplayUnit {
             name: display.required("name")?.to_owned(),
@@ -64,7 +76,7 @@ fn base_unit(element: Node<'_>) -> Result<BaseUnit> {
     Ok(BaseUnit::from_exponents(exponents, factor, offset))
 }
 
-pub(super) fn category(element: Node<'_>) -> Result<LogCategory> {
+fn category(element: Node<'_>) -> Result<LogCategory> {
     let name = element.required("name")?.to_owned();
     Ok(LogCategory { name, description: element.text("description") })
 }

@@ -5,10 +5,8 @@ mod variables;
 use super::attributes::{Node, Result};
 use super::definitions::{experiment, general};
 use super::schema;
-use super::variables::{integer_limits, real_limits};
-use crate::description::{
-    CoSimulation, IntegerType, Kind, ModelDescription, ModelExchange, RealType, SimpleType, Version,
-};
+use super::variables::kind_of_type;
+use crate::description::{CoSimulation, ModelDescription, ModelExchange, SimpleType, Version};
 use crate::unit::{DisplayUnit, Unit};
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
@@ -61,23 +59,14 @@ fn simple_type(element: Node<'_>) -> Result<SimpleType> {
         let expected = "RealType, IntegerType, BooleanType, StringType or EnumerationType";
         return Err(element.misses(expected, "none".to_owned()));
     };
+    let name = element_of_kind.element.name.strip_suffix("Type").unwrap_or_default();
     // The items of an enumeration are numbered from 1.
     let items = (1..).zip(element_of_kind.children_named("Item"));
     let items = items.map(|(value, item)| Ok((item.required("name")?.to_owned(), value)));
     Ok(SimpleType {
         name: element.required("name")?.to_owned(),
         description: element.text("description"),
-        kind: match element_of_kind.element.name {
-            "IntegerType" => {
-                Kind::Integer(integer_limits(element_of_kind, &IntegerType::default())?)
-            }
-            "BooleanType" => Kind::Boolean(None),
-            "StringType" => Kind::String(None),
-            "EnumerationType" => {
-                Kind::Enumeration(integer_limits(element_of_kind, &IntegerType::default())?)
-            }
-            _ => Kind::Real(real_limits(element_of_kind, &RealType::default())?),
-        },
+        kind: kind_of_type(element_of_kind, name)?,
         items: items.collect::<Result<_>>()?,
     })
 }

@@ -1,7 +1,7 @@
 //! Reads a model description of FMI 2.0.
 
 use super::attributes::{Node, Result};
-use super::definitions::{category, experiment, general, unit};
+use super::definitions::common;
 use super::{schema, structure, variables};
 use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
 
@@ -18,17 +18,12 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     let identifier = identifier.cloned().unwrap_or_default();
     Ok(ModelDescription {
         guid: root.required("guid")?.to_owned(),
-        copyright: root.text("copyright"),
-        license: root.text("license"),
         model_exchange,
         co_simulation,
-        units: root.list("UnitDefinitions", "Unit", unit)?,
         types,
-        log_categories: root.list("LogCategories", "Category", category)?,
-        default_experiment: root.optional("DefaultExperiment", experiment)?,
         variables,
         structure,
-        ..general(root, identifier)
+        ..common(root, identifier)?
     })
 }
 

@@ -6,7 +6,7 @@ mod structure;
 mod variables;
 
 use super::attributes::{Node, Result};
-use super::definitions::{category, experiment, general, unit};
+use super::definitions::common;
 use super::schema;
 use crate::description::{
     CoSimulation, ModelDescription, ModelExchange, ScheduledExecution, Version,
@@ -28,18 +28,13 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     let identifier = identifiers.into_iter().flatten().next().cloned().unwrap_or_default();
     Ok(ModelDescription {
         guid: root.required("instantiationToken")?.to_owned(),
-        copyright: root.text("copyright"),
-        license: root.text("license"),
         model_exchange,
         co_simulation,
-        units: root.list("UnitDefinitions", "Unit", unit)?,
         types,
-        log_categories: root.list("LogCategories", "Category", category)?,
-        default_experiment: root.optional("DefaultExperiment", experiment)?,
         variables,
         structure,
         scheduled_execution,
-        ..general(root, identifier)
+        ..common(root, identifier)?
     })
 }
 

@@ -31,15 +31,20 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
         Ok(SimpleType {
             name: element.required("name")?.to_owned(),
             description: element.text("description"),
-            kind: match typed.element.name {
-                "Real" => Kind::Real(real_limits(typed, &RealType::default())?),
-                "Integer" => Kind::Integer(integer_limits(typed, &IntegerType::default())?),
-                "Boolean" => Kind::Boolean(None),
-                "String" => Kind::String(None),
-                _ => Kind::Enumeration(integer_limits(typed, &IntegerType::default())?),
-            },
+            kind: kind_of_type(typed, typed.element.name)?,
             items: typed.children_named("Item").map(item).collect::<Result<_, _>>()?,
         })
+    })
+}
+
+/// Reads the kind of a type definition of FMI 1.0 or 2.0; any other name than those of the standard is a Real.
+pub(super) fn kind_of_type(element: Node<'_>, name: &str) -> Result<Kind> {
+    Ok(match name {
+        "Integer" => Kind::Integer(integer_limits(element, &IntegerType::default())?),
+        "Boolean" => Kind::Boolean(None),
+        "String" => Kind::String(None),
+        "Enumeration" => Kind::Enumeration(integer_limits(element, &IntegerType::default())?),
+        _ => Kind::Real(real_limits(element, &RealType::default())?),
     })
 }
 
@@ -244,7 +249,7 @@ pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(Stri
     }
 }
 
-pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
+fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
@@ -256,7 +261,7 @@ pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<Real
     })
 }
 
-pub(super) fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType> {
+fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType> {
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         min: element.integer("min")?.map(i128::from).or(defaults.min),
