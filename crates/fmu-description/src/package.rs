@@ -112,19 +112,13 @@ pub fn platforms_of(version: Version) -> &'static [&'static str] {
     platforms()
 }
 
+/// The folder whose name is a platform tuple. FMI 2.0 has no libraries for 32-bit ARM.
 fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
-    match (system, processor) {
-        ("linux", "x86_64") => &["x86_64-linux"],
-        ("linux", "x86") => &["x86-linux"],
-        ("linux", "aarch64") => &["aarch64-linux"],
-        ("linux", "arm") => &["aarch32-linux"],
-        ("windows", "x86_64") => &["x86_64-windows"],
-        ("windows", "x86") => &["x86-windows"],
-        ("windows", "aarch64") => &["aarch64-windows"],
-        ("macos", "x86_64") => &["x86_64-darwin"],
-        ("macos", "aarch64") => &["aarch64-darwin"],
-        _ => &[],
+    if (system, processor) == ("linux", "arm") {
+        return &["aarch32-linux"];
     }
+    let tuple = folders(system, processor).iter().find(|folder| folder.contains('-'));
+    tuple.map_or(&[], std::slice::from_ref)
 }
 
 fn folders(system: &str, processor: &str) -> &'static [&'static str] {

@@ -36,7 +36,7 @@ pub(crate) struct Element<'a> {
 }
 
 impl Element<'_> {
-    /// Compares two elements including their texts; the reader limits the depth of the recursion.
+    /// Copies an element; the reader limits the depth of the recursion.
     pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
         super::Element {
