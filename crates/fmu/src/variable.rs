@@ -521,7 +521,7 @@ impl<M> Variable<M> {
 }
 
 /// Returns the name of the element at a position in row-major order.
-fn element_name(name: &str, extents: &[usize], position: usize) -> String {
+pub(crate) fn element_name(name: &str, extents: &[usize], position: usize) -> String {
     let mut left = position;
     let mut indices: Vec<_> = extents
         .iter()

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::model::Failure;
-use crate::variable::Declaration;
+use crate::variable::{Declaration, element_name};
 use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariable};
 
 /// The structural parameters of a model.
@@ -36,10 +36,8 @@ impl Sizes {
         let mut used = 0;
         for variable in &mut description.variables {
             let extents: Vec<u64> = variable.dimensions.iter().map(extent).collect();
-            let Some(names) = self.by_element.get(&first_element(&variable.name, extents.len()))
-            else {
-                continue;
-            };
+            let first = element_name(&variable.name, &vec![1; extents.len()], 0);
+            let Some(names) = self.by_element.get(&first) else { continue };
             variable.dimensions = references(&variable.name, &extents, names, &parameters)?;
             used += usize::try_from(extents.iter().product::<u64>()).unwrap_or(usize::MAX);
         }
@@ -71,15 +69,6 @@ fn extent(dimension: &Dimension) -> u64 {
     match dimension {
         Dimension::Fixed(extent) => *extent,
         Dimension::Variable(_) => 0,
-    }
-}
-
-/// Returns the name of the first element of an array: `A[1,1]`, `der(x[1])`.
-fn first_element(array: &str, dimensions: usize) -> String {
-    let ones = vec!["1"; dimensions].join(",");
-    match array.strip_prefix("der(").and_then(|state| state.strip_suffix(')')) {
-        Some(state) => format!("der({state}[{ones}])"),
-        None => format!("{array}[{ones}]"),
     }
 }
 

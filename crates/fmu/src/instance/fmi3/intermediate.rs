@@ -4,6 +4,7 @@
 //! model then follows the parabola through start, middle and end, as with the derivatives of FMI 2.0.
 
 use super::super::Instance;
+use super::Session;
 use crate::callbacks::IntermediateUpdate;
 use crate::model::Model;
 use fmu_description::call_order::{InterfaceType, State};
@@ -32,12 +33,16 @@ impl Intermediate {
     }
 }
 
+fn intermediate(session: &mut Option<Box<Session>>) -> Option<&mut Intermediate> {
+    session.as_mut()?.intermediate.as_deref_mut()
+}
+
 impl<M: Model> Instance<M> {
     /// Enters intermediate update mode for a step of `size` s. Returns the callback to call, if the
     /// importer has one and may step.
     pub(crate) fn begin_intermediate(&mut self, size: f64) -> Option<IntermediateUpdate> {
         let core = &mut self.core;
-        let intermediate = self.session.as_mut()?.intermediate.as_mut()?;
+        let intermediate = intermediate(&mut self.session)?;
         intermediate.asked = false;
         if core.state != State::StepComplete
             || core.interface_type != InterfaceType::CoSimulation
@@ -53,19 +58,14 @@ impl<M: Model> Instance<M> {
 
     /// Records the inputs in the middle (1) or at the end (2) of the step.
     pub(crate) fn record_intermediate(&mut self, place: usize) {
-        let intermediate = self.session.as_mut().and_then(|session| session.intermediate.as_mut());
-        if let Some(intermediate) = intermediate {
+        if let Some(intermediate) = intermediate(&mut self.session) {
             self.interface.read_interpolated(&mut self.core.model, &mut intermediate.values[place]);
         }
     }
 
     /// Leaves intermediate update mode, unless a call in it failed, with the inputs at the start.
     pub(crate) fn end_intermediate(&mut self, size: f64) {
-        let Some(intermediate) =
-            self.session.as_mut().and_then(|session| session.intermediate.as_mut())
-        else {
-            return;
-        };
+        let Some(intermediate) = intermediate(&mut self.session) else { return };
         let core = &mut self.core;
         let [start, middle, end] = &intermediate.values;
         self.interface.write_interpolated(&mut core.model, start);
@@ -80,10 +80,7 @@ impl<M: Model> Instance<M> {
     /// importer has been asked for them.
     pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
         let Self { core, interface, session, .. } = self;
-        let Some(intermediate) = session.as_mut().and_then(|session| session.intermediate.as_mut())
-        else {
-            return;
-        };
+        let Some(intermediate) = intermediate(session) else { return };
         if !std::mem::take(&mut intermediate.asked) {
             return;
         }
