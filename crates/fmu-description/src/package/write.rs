@@ -88,13 +88,8 @@ impl Package {
     /// `index.html`, in FMI 3.0 `sources` without `buildDescription.xml` and `documentation/licenses`
     /// without a license), is too large, or the file cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
-        if target.extension().is_none_or(|extension| extension != "fmu") {
-            let actual = target.display().to_string();
-            return Err(PackageError::Missing {
-                expected: "a file name ending in .fmu".into(),
-                actual,
-            });
-        }
+        let is_named = target.extension().is_some_and(|extension| extension == "fmu");
+        demand(is_named, "a file name ending in .fmu", &target.display().to_string())?;
         self.check(target)?;
         let bytes = self.archive().map_err(archive_error(target))?;
         let folder = match target.parent() {
@@ -129,17 +124,11 @@ impl Package {
                 return Err(PackageError::Entry { entry, expected });
             }
         }
-        let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
-        for (holds, expected, actual) in [
-            (has_folder("binaries/") || has_folder("sources/"), "binaries or sources", "neither"),
-            (
-                !has_folder("documentation/") || earlier.contains("documentation/index.html"),
-                "documentation/index.html",
-                "documentation without it",
-            ),
-        ] {
-            demand(holds, expected, actual)?;
-        }
+        let library = self.has_folder("binaries/") || self.has_folder("sources/");
+        demand(library, "binaries or sources", "neither")?;
+        let documented =
+            !self.has_folder("documentation/") || earlier.contains("documentation/index.html");
+        demand(documented, "documentation/index.html", "documentation without it")?;
         if self.version == Version::V3 {
             self.check_folders_of_3()?;
         }
@@ -155,16 +144,19 @@ impl Package {
         Ok(())
     }
 
+    fn has_folder(&self, name: &str) -> bool {
+        self.entries.iter().any(|(path, _)| path.starts_with(name))
+    }
+
     /// Checks what FMI 3.0 demands of single folders (sections 2.4.10, 2.5.1.1, 2.5.1.2).
     fn check_folders_of_3(&self) -> Result<(), PackageError> {
         let has = |name: &str| self.entries.iter().any(|(path, _)| path == name);
-        let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
-        let described = !has_folder("sources/") || has("sources/buildDescription.xml");
+        let described = !self.has_folder("sources/") || has("sources/buildDescription.xml");
         demand(described, "sources/buildDescription.xml", "sources without it")?;
         let license = ["txt", "html", "spdx"]
             .iter()
             .any(|extension| has(&format!("documentation/licenses/license.{extension}")));
-        let licensed = !has_folder("documentation/licenses/") || license;
+        let licensed = !self.has_folder("documentation/licenses/") || license;
         let expected = "documentation/licenses/license.txt, .html or .spdx";
         demand(licensed, expected, "documentation/licenses without it")?;
         let pictured = !has("terminalsAndIcons/icon.svg") || has("terminalsAndIcons/icon.png");

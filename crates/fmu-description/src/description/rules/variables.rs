@@ -201,14 +201,8 @@ fn within<T: Copy + PartialOrd>(
     inner: (Option<T>, Option<T>),
     outer: (Option<T>, Option<T>),
 ) -> bool {
-    let below = match (&inner.0, &outer.0) {
-        (Some(inner), Some(outer)) => inner < outer,
-        _ => false,
-    };
-    let above = match (&inner.1, &outer.1) {
-        (Some(inner), Some(outer)) => inner > outer,
-        _ => false,
-    };
+    let below = inner.0.zip(outer.0).is_some_and(|(inner, outer)| inner < outer);
+    let above = inner.1.zip(outer.1).is_some_and(|(inner, outer)| inner > outer);
     !below && !above
 }
 
