@@ -42,8 +42,8 @@ impl Instance {
     /// limit. FMI 3.0 has no pending steps.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         match &mut self.inner {
-            Inner::V1(fmu) => fmu.component.time_limit = limit,
-            Inner::V2(fmu) => fmu.component.time_limit = limit,
+            Inner::V1(fmu) => fmu.component.base.time_limit = limit,
+            Inner::V2(fmu) => fmu.component.base.time_limit = limit,
             Inner::V3(_) => {}
         }
     }
@@ -318,7 +318,7 @@ impl Slave for Instance {
         match &mut self.inner {
             Inner::V1(_) | Inner::V2(_) => false,
             Inner::V3(instance) => {
-                instance.log_calls(sink);
+                instance.component.base.log_calls(sink);
                 true
             }
         }
@@ -326,17 +326,17 @@ impl Slave for Instance {
 
     fn guard_arrays(&mut self) {
         match &mut self.inner {
-            Inner::V1(instance) => instance.component.guard_arrays(),
+            Inner::V1(instance) => instance.component.base.guards = true,
             Inner::V2(instance) => instance.component.guard_arrays(),
-            Inner::V3(instance) => instance.guard_arrays(),
+            Inner::V3(instance) => instance.component.base.guards = true,
         }
     }
 
     fn take_warning(&mut self) -> bool {
         match &mut self.inner {
-            Inner::V1(instance) => instance.component.take_warning(),
+            Inner::V1(instance) => instance.component.base.take_warning(),
             Inner::V2(instance) => instance.component.take_warning(),
-            Inner::V3(instance) => instance.take_warning(),
+            Inner::V3(instance) => instance.component.base.take_warning(),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! functions of an FMU and passes pointers to them.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+mod base;
 mod calls;
 mod canary;
 mod foreign;
@@ -19,30 +20,25 @@ mod unresolved;
 pub(crate) mod v1;
 pub(crate) mod v3;
 
-use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use fmu_description::Version;
 use fmu_description::abi::{
-    CO_SIMULATION, DESCRIBE, DESCRIBE_3, DescribeSink, MODEL_EXCHANGE, Status,
-    fmi2CallbackFunctions, fmi2Component, fmi2FMUstate, fmi2Status,
+    CO_SIMULATION, DESCRIBE, DESCRIBE_3, DescribeSink, MODEL_EXCHANGE, fmi2CallbackFunctions,
+    fmi2Component,
 };
 
-use crate::crash::{self, Place, Slot};
+use crate::crash::{Place, Slot};
 use crate::error::LoadError;
-use canary::Guarded;
+use base::{Base, Loaded};
 pub(crate) use canary::check_number;
 use functions::Functions;
-use load::Handle;
 pub use load::preload;
 pub(crate) use load::{Binding, Loading};
 pub(crate) use log::Names;
 use log::Sink;
-use slave::{CallError, Failure};
 #[cfg(target_os = "linux")]
 pub(crate) use surroundings::Surroundings;
 
@@ -149,24 +145,16 @@ impl Interface {
 }
 
 /// A loaded library with the functions of FMI 2.0.
-pub(crate) struct Library {
-    functions: Functions,
-    path: PathBuf,
-    /// An instance returned `fmi2Fatal`: no function of any instance may be called (section 2.1.3).
-    corrupted: AtomicBool,
-    _handle: Handle,
-}
+pub(crate) type Library = Loaded<Functions>;
 
 impl Library {
     /// Loads the library and checks that it has the functions of `interface`.
     pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
-        let path = loading.path;
         let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
-        check_version(path, functions.get_version, "fmi2GetVersion", "2.0")?;
-        functions.require(interface, path)?;
-        let corrupted = AtomicBool::new(false);
-        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
+        check_version(loading.path, functions.get_version, "fmi2GetVersion", "2.0")?;
+        functions.require(loading.path, "", &functions::required(interface))?;
+        Ok(Self::new(functions, loading.path, handle))
     }
 
     /// Calls `fmi2Instantiate` for `interface`.
@@ -178,16 +166,13 @@ impl Library {
         resources: &str,
         names: Names,
     ) -> Result<Component, LoadError> {
-        let functions = match interface {
-            Interface::CoSimulation => self.functions,
-            Interface::ModelExchange => self.functions.without_co_simulation(),
-        };
+        const NAME: &str = "fmi2Instantiate";
         let place = Place::new(name);
         let sink = Sink::new(&place, Some(names));
         let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         let kind = interface.to_c();
-        place.enter(&"fmi2Instantiate");
+        place.enter(&NAME);
         // SAFETY: terminated strings, callbacks that outlive the instance.
         let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
             function(
@@ -201,40 +186,14 @@ impl Library {
             )
         });
         place.leave();
-        let component = Component {
-            hot: Hot {
-                pointer,
-                set_real: functions.set_real,
-                do_step: functions.do_step,
-                get_real: functions.get_real,
-                place: place.slot(),
-            },
-            place,
-            pointer,
-            functions,
-            sink,
-            saved: Vec::new(),
-            time_limit: None,
-            abandoned: false,
-            warned: Cell::new(false),
-            guards: false,
-            callbacks,
-            library: self.clone(),
-        };
-        if pointer.is_null() {
-            Err(self.instantiation_error(name, &component))
-        } else {
-            Ok(component)
+        let slot = place.slot();
+        let mut base = Base::new(self, pointer, NAME, place, sink, Version::V2)?;
+        base.callbacks = Some(callbacks);
+        if interface == Interface::ModelExchange {
+            base.functions = self.functions.without_co_simulation();
         }
-    }
-
-    /// Returns the error of `fmi2Instantiate`, with the messages of the FMU.
-    fn instantiation_error(&self, name: &str, component: &Component) -> LoadError {
-        let messages = component.sink.take();
-        let reason =
-            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
-        let (path, instance) = (self.path.clone(), name.to_owned());
-        LoadError::Instantiate { path, function: "fmi2Instantiate", instance, reason }
+        let Functions { set_real, do_step, get_real, .. } = base.functions;
+        Ok(Component { hot: Hot { pointer, set_real, do_step, get_real, place: slot }, base })
     }
 }
 
@@ -267,28 +226,13 @@ struct Hot {
 
 /// An FMU instance and its C functions. Dropping it calls `fmi2FreeInstance`; the library stays
 /// loaded until then.
+///
+/// Each call returns a [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+/// `fmi2Warning`.
 pub struct Component {
     /// The pointers that [`Component::pass`] needs.
     hot: Hot,
-    /// The current function and time of the instance, for crash reports.
-    place: Arc<Place>,
-    pointer: fmi2Component,
-    /// A copy of the library's function table.
-    functions: Functions,
-    /// Receives messages; the FMU holds its address.
-    sink: Arc<Sink>,
-    /// FMU states by slot; null in an empty slot.
-    saved: Vec<fmi2FMUstate>,
-    /// How long a step that returned `fmi2Pending` may take; `None`: no limit.
-    pub(crate) time_limit: Option<Duration>,
-    /// The instance still computes a step that could not be canceled, and must not be freed.
-    abandoned: bool,
-    /// Whether a call has returned `fmi2Warning`.
-    warned: Cell<bool>,
-    /// Whether calls get copies of arrays, with canaries.
-    guards: bool,
-    callbacks: Arc<fmi2CallbackFunctions>,
-    library: Arc<Library>,
+    pub(crate) base: Base<Functions>,
 }
 
 // SAFETY: any thread may use an instance, one at a time (FMI 2.0.5, section 2.1); the pointers lead to
@@ -297,81 +241,28 @@ unsafe impl Send for Component {}
 
 impl Drop for Component {
     fn drop(&mut self) {
-        if self.pointer.is_null() {
+        if !self.base.may_be_freed() {
             return;
         }
-        crash::check_returned(&self.place);
-        if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
-            // The instance may still use the library, the callbacks and the sink: they are leaked.
-            std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
-            return;
-        }
-        for mut state in std::mem::take(&mut self.saved) {
-            self.free_state(&mut state);
-        }
-        if let Some(free_instance) = self.functions.free_instance {
-            self.place.enter(&"fmi2FreeInstance");
+        self.free_states();
+        if let Some(free_instance) = self.base.functions.free_instance {
+            self.base.place.enter(&"fmi2FreeInstance");
             // SAFETY: the instance is alive and not used again.
-            unsafe { free_instance(self.pointer) };
-            self.place.leave();
+            unsafe { free_instance(self.base.pointer) };
+            self.base.place.leave();
         }
     }
 }
 
 impl Component {
-    /// Marks the call as returned and converts its status to a result.
-    #[inline]
-    fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
-        self.place.leave();
-        if status == Status::OK as fmi2Status || self.is_warning(status) {
-            return Ok(());
-        }
-        if status == Status::Fatal as fmi2Status {
-            self.library.corrupted.store(true, Ordering::Relaxed);
-        }
-        let failure =
-            Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
-        Err(self.failed(function, failure))
-    }
-
-    /// Returns whether `status` is `fmi2Warning`, and records it for [`Component::take_warning`].
-    #[inline]
-    fn is_warning(&self, status: fmi2Status) -> bool {
-        let warning = status == Status::Warning as fmi2Status;
-        if warning {
-            self.warned.set(true);
-        }
-        warning
-    }
-
     /// Returns whether a call has returned `fmi2Warning` since the last call of this function.
     /// Calls by [`Component::pass`] are not counted.
     pub fn take_warning(&mut self) -> bool {
-        self.warned.take()
+        self.base.take_warning()
     }
 
     /// Lets the calls from now on get copies of arrays, with canaries. [`Component::pass`] does not.
     pub fn guard_arrays(&mut self) {
-        self.guards = true;
-    }
-
-    /// As [`Component::check`], for a call that may have been guarded.
-    #[inline]
-    fn check_guarded(
-        &self,
-        function: &'static str,
-        (status, violation): Guarded,
-    ) -> Result<(), CallError> {
-        let done = self.check(function, status);
-        match violation {
-            None => done,
-            Some(what) => Err(self.failed(function, Failure::InvalidAnswer(what))),
-        }
-    }
-
-    /// Returns the error of a call, with the instance's recent messages.
-    #[cold]
-    fn failed(&self, function: &'static str, failure: Failure) -> CallError {
-        self.place.failed(CallError { function, failure, messages: self.sink.take() })
+        self.base.guards = true;
     }
 }

@@ -34,7 +34,7 @@ use mode::Mode;
 use modes::State;
 use plan::Plans;
 use refusal::refused;
-use slave::{CallError, CallSink, StepResult};
+use slave::{CallError, StepResult};
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
 /// with `loggingOn = false` alone an FMU is silent about its errors.
@@ -43,7 +43,7 @@ const STATUS_CATEGORIES: [&str; 4] =
 
 /// An instance of an FMU of FMI 3.0 in this process.
 pub(crate) struct Instance {
-    component: Component,
+    pub(crate) component: Component,
     view: ElementView,
     plans: Plans,
     interface: Interface,
@@ -287,17 +287,5 @@ impl Instance {
         never_back: bool,
     ) -> Result<StepResult, CallError> {
         self.step(time, size, never_back)
-    }
-
-    pub(crate) fn log_calls(&mut self, sink: CallSink) {
-        self.component.log_calls(sink);
-    }
-
-    pub(crate) fn guard_arrays(&mut self) {
-        self.component.guard_arrays();
-    }
-
-    pub(crate) fn take_warning(&mut self) -> bool {
-        self.component.take_warning()
     }
 }

@@ -30,8 +30,9 @@ impl Fmu {
             Some(CoSimulation::V1(library)) => {
                 let location = file_uri(unpacked.folder())?;
                 let (guid, names) = (&description.guid, self.names());
-                let component = library.instantiate(name, guid, &location, names).map_err(hint)?;
                 let interface = Interface::CoSimulation;
+                let component = library.instantiate(interface, name, guid, &location, names);
+                let component = component.map_err(hint)?;
                 Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description, interface))))
             }
             Some(CoSimulation::V3(library)) => {

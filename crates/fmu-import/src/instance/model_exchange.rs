@@ -44,7 +44,8 @@ impl Fmu {
         let library = v1::Library::open(&self.loading(&library), identifier, interface);
         let library = library.map_err(hint)?;
         let (location, names) = (file_uri(unpacked.folder())?, self.names());
-        let component = Arc::new(library).instantiate(name, &description.guid, &location, names)?;
+        let (library, guid) = (Arc::new(library), &description.guid);
+        let component = library.instantiate(interface, name, guid, &location, names)?;
         Ok(crate::v1::Instance::new(component, description, interface))
     }
 

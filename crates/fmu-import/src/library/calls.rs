@@ -1,20 +1,18 @@
 //! The calls of an instance: one method for each function of the standard.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::CString;
-
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
 use super::{Component, c_string, canary, copy_strings};
 use slave::{CallError, CompletedStep, EventInfo, absent};
 
 /// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
-/// if the library lacks it. [`Component::check`] marks its return.
+/// if the library lacks it. `Base::check` marks its return.
 macro_rules! function {
     ($self:ident.$field:ident, $name:expr) => {
-        match $self.functions.$field {
+        match $self.base.functions.$field {
             Some(function) => {
-                $self.place.enter(&$name);
+                $self.base.place.enter(&$name);
                 function
             }
             None => return Err(absent($name)),
@@ -25,103 +23,273 @@ pub(super) use function;
 
 /// Defines a method for each function that changes the mode only.
 macro_rules! modes {
-    ($($method:ident = $name:literal;)*) => {
+    ($($visibility:vis fn $method:ident = $name:literal;)*) => {
         impl Component {
             $(#[doc = concat!("Calls `", $name, "`.")]
             ///
             /// # Errors
             ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
-            /// nor `fmi2Warning`.
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
             #[inline]
-            pub fn $method(&mut self) -> Result<(), CallError> {
+            $visibility fn $method(&mut self) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
+                self.base.log_call($name, String::new);
                 // SAFETY: the instance is alive.
-                let status = unsafe { function(self.pointer) };
-                self.check($name, status)
+                let status = unsafe { function(self.base.pointer) };
+                self.base.check($name, status)
             })*
         }
     };
 }
+pub(super) use modes;
 
-modes! {
-    enter_initialization_mode = "fmi2EnterInitializationMode";
-    exit_initialization_mode = "fmi2ExitInitializationMode";
-    terminate = "fmi2Terminate";
-    enter_event_mode = "fmi2EnterEventMode";
-    enter_continuous_time_mode = "fmi2EnterContinuousTimeMode";
-}
-
-/// Defines the methods of the types whose values are copied.
+/// Defines the methods of the types whose values are copied, for FMI 1.0 and 2.0.
 macro_rules! values {
-    ($($get:ident $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
+    ($($visibility:vis fn $get:ident, $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
         impl Component {
             $(#[doc = concat!("Calls `", $get_name, "`.")]
             ///
             /// # Errors
             ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
-            /// nor `fmi2Warning`.
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
             #[inline]
-            pub fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
+            $visibility fn $get(
+                &mut self,
+                references: &[u32],
+                values: &mut [$type],
+            ) -> Result<(), CallError> {
                 let function = function!(self.$get, $get_name);
                 let count = same_length(references, values);
                 // SAFETY: the instance is alive; as many references as values.
-                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
-                self.check_guarded($get_name, canary::read(self.guards, references, values, call))
+                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                let done = canary::read(self.base.guards, references, values, call);
+                self.base.check_guarded($get_name, done, String::new)
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
             ///
             /// # Errors
             ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
-            /// nor `fmi2Warning`.
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
             #[inline]
-            pub fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
+            $visibility fn $set(
+                &mut self,
+                references: &[u32],
+                values: &[$type],
+            ) -> Result<(), CallError> {
                 let function = function!(self.$set, $set_name);
                 let count = same_length(references, values);
                 // SAFETY: the instance is alive; as many references as values.
-                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
-                self.check_guarded($set_name, canary::write(self.guards, references, values, call))
+                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                let done = canary::write(self.base.guards, references, values, call);
+                self.base.check_guarded($set_name, done, String::new)
             })*
         }
     };
 }
+pub(super) use values;
 
-values! {
-    get_real set_real: f64 = "fmi2GetReal" "fmi2SetReal";
-    get_integer set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger";
-    get_boolean set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
-}
-
-/// Defines the methods that fill a vector.
-macro_rules! vectors {
-    ($($method:ident = $name:literal;)*) => {
+/// Defines the methods for Strings, for FMI 1.0 and 2.0.
+macro_rules! strings {
+    ($visibility:vis fn $get:ident, $set:ident = $get_name:literal $set_name:literal;) => {
         impl Component {
+            #[doc = concat!("Calls `", $set_name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $visibility fn $set(
+                &mut self,
+                references: &[u32],
+                values: &[String],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$set, $set_name);
+                let count = same_length(references, values);
+                let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
+                let texts: Vec<_> = values.iter().map(std::ffi::CString::as_bytes_with_nul).collect();
+                let (pointer, guards) = (self.base.pointer, self.base.guards);
+                let done = canary::constants(guards, canary::STRING, &texts, |array| {
+                    canary::constant(guards, canary::REFERENCES, references, |list| {
+                        // SAFETY: the instance is alive; as many references as terminated strings.
+                        (unsafe { function(pointer, list, count, array.cast()) }, None)
+                    })
+                });
+                self.base.check_guarded($set_name, done, String::new)
+            }
+
+            #[doc = concat!("Calls `", $get_name, "` and copies the strings.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $visibility fn $get(
+                &mut self,
+                references: &[u32],
+                values: &mut [String],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$get, $get_name);
+                let count = same_length(references, values);
+                let mut pointers = vec![std::ptr::null(); count];
+                // SAFETY: the instance is alive; as many references as pointers to write.
+                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                let done = canary::read(self.base.guards, references, &mut pointers, call);
+                self.base.check_guarded($get_name, done, String::new)?;
+                self.base.place.enter(&$get_name);
+                // SAFETY: the FMU returns null or terminated strings, which live until the next call.
+                unsafe { copy_strings(&pointers, values) };
+                self.base.place.leave();
+                Ok(())
+            }
+        }
+    };
+}
+pub(super) use strings;
+
+/// Defines the methods for derivatives of inputs and outputs with respect to time, for FMI 1.0 and 2.0.
+macro_rules! derivatives {
+    ($visibility:vis fn $set:ident, $get:ident = $set_name:literal $get_name:literal;) => {
+        impl Component {
+            #[doc = concat!("Calls `", $set_name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[inline]
+            $visibility fn $set(
+                &mut self,
+                references: &[u32],
+                orders: &[i32],
+                values: &[f64],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$set, $set_name);
+                let (pointer, guards) = (self.base.pointer, self.base.guards);
+                let count = same_length(references, values);
+                let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+                    // SAFETY: the instance is alive; as many references as orders and values.
+                    let call = |list, array| unsafe { function(pointer, list, count, orders, array) };
+                    canary::write(guards, references, values, call)
+                });
+                self.base.check_guarded($set_name, done, String::new)
+            }
+
+            #[doc = concat!("Calls `", $get_name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[inline]
+            $visibility fn $get(
+                &mut self,
+                references: &[u32],
+                orders: &[i32],
+                values: &mut [f64],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$get, $get_name);
+                let (pointer, guards) = (self.base.pointer, self.base.guards);
+                let count = same_length(references, values);
+                let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+                    // SAFETY: the instance is alive; as many references as orders and values.
+                    let call = |list, array| unsafe { function(pointer, list, count, orders, array) };
+                    canary::read(guards, references, values, call)
+                });
+                self.base.check_guarded($get_name, done, String::new)
+            }
+        }
+    };
+}
+pub(super) use derivatives;
+
+/// Defines the methods of model exchange for time, states and what is a vector of them.
+macro_rules! equations {
+    (
+        $time_visibility:vis fn set_time = $set_time:literal;
+        $states_visibility:vis fn set_continuous_states = $set_states:literal;
+        $($visibility:vis fn $get:ident = $name:literal;)*
+    ) => {
+        impl Component {
+            #[doc = concat!("Calls `", $set_time, "`; `time` is in s.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[inline]
+            $time_visibility fn set_time(&mut self, time: f64) -> Result<(), CallError> {
+                let function = function!(self.set_time, $set_time);
+                self.base.log_call($set_time, || format!("{time:?}"));
+                self.base.place.set_time(time);
+                // SAFETY: the instance is alive.
+                let status = unsafe { function(self.base.pointer, time) };
+                self.base.check($set_time, status)
+            }
+
+            #[doc = concat!("Calls `", $set_states, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[inline]
+            $states_visibility fn set_continuous_states(
+                &mut self,
+                states: &[f64],
+            ) -> Result<(), CallError> {
+                let function = function!(self.set_continuous_states, $set_states);
+                self.base.log_call($set_states, || format!("{states:?}"));
+                // SAFETY: the instance is alive; `states.len()` values.
+                let call = |array| unsafe { function(self.base.pointer, array, states.len()) };
+                let done = canary::send(self.base.guards, states, call);
+                self.base.check_guarded($set_states, done, String::new)
+            }
+
             $(#[doc = concat!("Calls `", $name, "`.")]
             ///
             /// # Errors
             ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
-            /// nor `fmi2Warning`.
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
             #[inline]
-            pub fn $method(&mut self, values: &mut [f64]) -> Result<(), CallError> {
-                let function = function!(self.$method, $name);
+            $visibility fn $get(&mut self, values: &mut [f64]) -> Result<(), CallError> {
+                let function = function!(self.$get, $name);
+                self.base.log_call($name, String::new);
                 let count = values.len();
                 // SAFETY: the instance is alive; a place for each value.
-                let call = |array| unsafe { function(self.pointer, array, count) };
-                self.check_guarded($name, canary::fill(self.guards, values, call))
+                let call = |array| unsafe { function(self.base.pointer, array, count) };
+                let done = canary::fill(self.base.guards, values, call);
+                self.base.check_guarded($name, done, || format!(" {values:?}"))
             })*
         }
     };
 }
+pub(super) use equations;
 
-vectors! {
-    get_continuous_states = "fmi2GetContinuousStates";
-    get_derivatives = "fmi2GetDerivatives";
-    get_nominals = "fmi2GetNominalsOfContinuousStates";
-    get_event_indicators = "fmi2GetEventIndicators";
+modes! {
+    pub fn enter_initialization_mode = "fmi2EnterInitializationMode";
+    pub fn exit_initialization_mode = "fmi2ExitInitializationMode";
+    pub fn terminate = "fmi2Terminate";
+    pub fn enter_event_mode = "fmi2EnterEventMode";
+    pub fn enter_continuous_time_mode = "fmi2EnterContinuousTimeMode";
+}
+
+values! {
+    pub fn get_real, set_real: f64 = "fmi2GetReal" "fmi2SetReal";
+    pub fn get_integer, set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger";
+    pub fn get_boolean, set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
+}
+
+strings! {
+    pub fn get_string, set_string = "fmi2GetString" "fmi2SetString";
+}
+
+derivatives! {
+    pub fn set_real_input_derivatives, get_real_output_derivatives =
+        "fmi2SetRealInputDerivatives" "fmi2GetRealOutputDerivatives";
+}
+
+equations! {
+    pub fn set_time = "fmi2SetTime";
+    pub fn set_continuous_states = "fmi2SetContinuousStates";
+    pub fn get_continuous_states = "fmi2GetContinuousStates";
+    pub fn get_derivatives = "fmi2GetDerivatives";
+    pub fn get_nominals = "fmi2GetNominalsOfContinuousStates";
+    pub fn get_event_indicators = "fmi2GetEventIndicators";
 }
 
 /// Returns the common length of both slices.
@@ -131,164 +299,40 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     references.len()
 }
 
+#[expect(clippy::missing_errors_doc, reason = "the type documents the error of every call")]
 impl Component {
-    /// Calls `fmi2SetContinuousStates`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    #[inline]
-    pub fn set_continuous_states(&mut self, values: &[f64]) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetContinuousStates";
-        let function = function!(self.set_continuous_states, NAME);
-        // SAFETY: the instance is alive; `values.len()` values.
-        let call = |array| unsafe { function(self.pointer, array, values.len()) };
-        self.check_guarded(NAME, canary::send(self.guards, values, call))
-    }
-
     /// Calls `fmi2SetDebugLogging` for all categories.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
     pub fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
         // SAFETY: the instance is alive; no categories.
-        let status = unsafe { function(self.pointer, on.into(), 0, std::ptr::null()) };
-        self.check(NAME, status)
+        let status = unsafe { function(self.base.pointer, on.into(), 0, std::ptr::null()) };
+        self.base.check(NAME, status)
     }
 
     /// Calls `fmi2SetupExperiment`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
     pub fn setup_experiment(&mut self, e: &fmu_description::Experiment) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =
             (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
         let function = function!(self.setup_experiment, NAME);
-        self.place.set_time(e.start_time);
+        self.base.place.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
-            function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
+            function(self.base.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
         };
-        self.check(NAME, status)
-    }
-
-    /// Calls `fmi2SetString`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetString";
-        let function = function!(self.set_string, NAME);
-        let count = same_length(references, values);
-        let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
-        let texts: Vec<_> = values.iter().map(CString::as_bytes_with_nul).collect();
-        let (pointer, guards) = (self.pointer, self.guards);
-        let done = canary::constants(guards, canary::STRING, &texts, |array| {
-            canary::constant(guards, canary::REFERENCES, references, |list| {
-                // SAFETY: the instance is alive; as many references as terminated strings.
-                (unsafe { function(pointer, list, count, array.cast()) }, None)
-            })
-        });
-        self.check_guarded(NAME, done)
-    }
-
-    /// Calls `fmi2GetString` and copies the strings.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn get_string(
-        &mut self,
-        references: &[u32],
-        values: &mut [String],
-    ) -> Result<(), CallError> {
-        const NAME: &str = "fmi2GetString";
-        let function = function!(self.get_string, NAME);
-        let count = same_length(references, values);
-        let mut pointers = vec![std::ptr::null(); count];
-        // SAFETY: the instance is alive; as many references as pointers to write.
-        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
-        self.check_guarded(NAME, canary::read(self.guards, references, &mut pointers, call))?;
-        self.place.enter(&NAME);
-        // SAFETY: the FMU returns null or terminated strings, which live until the next call.
-        unsafe { copy_strings(&pointers, values) };
-        self.place.leave();
-        Ok(())
-    }
-
-    /// Calls `fmi2SetRealInputDerivatives`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    #[inline]
-    pub fn set_real_input_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &[f64],
-    ) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetRealInputDerivatives";
-        let function = function!(self.set_real_input_derivatives, NAME);
-        let (count, guards) = (same_length(references, values), self.guards);
-        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
-            // SAFETY: the instance is alive; as many references as orders and values.
-            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
-            canary::write(guards, references, values, call)
-        });
-        self.check_guarded(NAME, done)
-    }
-
-    /// Calls `fmi2GetRealOutputDerivatives`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    #[inline]
-    pub fn get_real_output_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), CallError> {
-        const NAME: &str = "fmi2GetRealOutputDerivatives";
-        let function = function!(self.get_real_output_derivatives, NAME);
-        let (count, guards) = (same_length(references, values), self.guards);
-        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
-            // SAFETY: the instance is alive; as many references as orders and values.
-            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
-            canary::read(guards, references, values, call)
-        });
-        self.check_guarded(NAME, done)
+        self.base.check(NAME, status)
     }
 
     /// Calls `fmi2NewDiscreteStates`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
     pub fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
         let function = function!(self.new_discrete_states, NAME);
         // SAFETY: the instance is alive; one structure to write to.
-        let status = unsafe { function(self.pointer, &raw mut info) };
-        self.check(NAME, status)?;
+        let status = unsafe { function(self.base.pointer, &raw mut info) };
+        self.base.check(NAME, status)?;
         Ok(EventInfo {
             discrete_states_need_update: info.new_discrete_states_needed != 0,
             terminate_simulation: info.terminate_simulation != 0,
@@ -298,27 +342,7 @@ impl Component {
         })
     }
 
-    /// Calls `fmi2SetTime`; `time` is in s.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetTime";
-        let function = function!(self.set_time, NAME);
-        self.place.set_time(time);
-        // SAFETY: the instance is alive.
-        let status = unsafe { function(self.pointer, time) };
-        self.check(NAME, status)
-    }
-
     /// Calls `fmi2CompletedIntegratorStep`. `never_back` is `noSetFMUStatePriorToCurrentPoint`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
     pub fn completed_integrator_step(
         &mut self,
         never_back: bool,
@@ -328,17 +352,12 @@ impl Component {
         let function = function!(self.completed_integrator_step, NAME);
         // SAFETY: the instance is alive; two Booleans to write to.
         let status =
-            unsafe { function(self.pointer, never_back.into(), &raw mut event, &raw mut end) };
-        self.check(NAME, status)?;
+            unsafe { function(self.base.pointer, never_back.into(), &raw mut event, &raw mut end) };
+        self.base.check(NAME, status)?;
         Ok(CompletedStep { enter_event_mode: event != 0, terminate_simulation: end != 0 })
     }
 
     /// Calls `fmi2GetDirectionalDerivative`.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -349,7 +368,7 @@ impl Component {
         const NAME: &str = "fmi2GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
         let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
-        let (pointer, guards) = (self.pointer, self.guards);
+        let (pointer, guards) = (self.base.pointer, self.base.guards);
         let done = canary::constant(guards, canary::REFERENCES, knowns, |columns| {
             canary::constant(guards, canary::SEED, seed, |seed| {
                 // SAFETY: the instance is alive; arrays that belong together have the same length.
@@ -359,6 +378,6 @@ impl Component {
                 canary::read(guards, unknowns, changes, call)
             })
         });
-        self.check_guarded(NAME, done)
+        self.base.check_guarded(NAME, done, String::new)
     }
 }

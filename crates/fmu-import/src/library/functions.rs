@@ -1,8 +1,6 @@
 //! The C functions of FMI 2.0: names and signatures.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::path::Path;
-
 use fmu_description::abi::{
     fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate,
     fmi2Integer, fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2Type, fmi2ValueReference,
@@ -10,7 +8,6 @@ use fmu_description::abi::{
 
 use super::Interface;
 use super::table::functions;
-use crate::error::LoadError;
 
 type References = *const fmi2ValueReference;
 type Component = fmi2Component;
@@ -109,18 +106,15 @@ impl Functions {
             ..self
         }
     }
+}
 
-    /// Checks that the library exports the functions that `interface` cannot do without.
-    pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
-        let more: &[&str] = match interface {
-            Interface::CoSimulation => &["fmi2DoStep"],
-            Interface::ModelExchange => {
-                &["fmi2NewDiscreteStates", "fmi2GetDerivatives", "fmi2SetContinuousStates"]
-            }
-        };
-        let missing = COMMON.iter().chain(more).find(|function| !self.has(function));
-        missing.map_or(Ok(()), |function| {
-            Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
-        })
-    }
+/// The functions that `interface` cannot do without.
+pub(super) fn required(interface: Interface) -> [&'static [&'static str]; 2] {
+    let more: &[_] = match interface {
+        Interface::CoSimulation => &["fmi2DoStep"],
+        Interface::ModelExchange => {
+            &["fmi2NewDiscreteStates", "fmi2GetDerivatives", "fmi2SetContinuousStates"]
+        }
+    };
+    [&COMMON, more]
 }

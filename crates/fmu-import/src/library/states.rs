@@ -1,119 +1,145 @@
 //! FMU states: saved in numbered slots, or serialized to bytes.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+use std::ffi::c_void;
 use std::ptr::null_mut;
-
-use fmu_description::abi::fmi2FMUstate;
 
 use super::calls::function;
 use super::{Component, canary};
 use slave::{CallError, Failure, absent};
 
-impl Component {
-    /// Saves the current state in `slot` (`fmi2GetFMUstate`).
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        const NAME: &str = "fmi2GetFMUstate";
-        let function = function!(self.get_state, NAME);
-        if self.saved.len() <= slot {
-            self.saved.resize(slot + 1, null_mut());
+/// Defines the methods for FMU states, for FMI 2.0 and 3.0.
+macro_rules! states {
+    (
+        $visibility:vis fn save_state = $get:literal;
+        restore_state = $set:literal;
+        serialize_state = $size:literal $serialize:literal;
+        deserialize_state = $deserialize:literal;
+        free_state = $free:literal;
+    ) => {
+        impl Component {
+            #[doc = concat!("Saves the current state in `slot` (`", $get, "`).")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $visibility fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+                let function = function!(self.get_state, $get);
+                self.base.log_call($get, String::new);
+                let saved = &mut self.base.saved;
+                if saved.len() <= slot {
+                    saved.resize(slot + 1, null_mut());
+                }
+                // SAFETY: the instance is alive; the state is null or its own.
+                let status = unsafe { function(self.base.pointer, &raw mut saved[slot]) };
+                self.base.check($get, status)
+            }
+
+            #[doc = concat!("Restores the state in `slot` (`", $set, "`).")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the slot is empty, if the library lacks the function, or if its status is neither
+            /// OK nor a warning.
+            $visibility fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+                let state = self.base.saved.get(slot).copied().unwrap_or(null_mut());
+                if state.is_null() {
+                    let what = format!("cannot restore the state of slot {slot}: the slot is empty");
+                    return Err(self.base.failed($set, Failure::InvalidAnswer(what)));
+                }
+                self.set_state(state)
+            }
+
+            fn set_state(&mut self, state: *mut c_void) -> Result<(), CallError> {
+                let function = function!(self.set_state, $set);
+                self.base.log_call($set, String::new);
+                // SAFETY: the instance is alive; the state is its own.
+                let status = unsafe { function(self.base.pointer, state) };
+                self.base.check($set, status)
+            }
+
+            /// Frees a state of the instance.
+            fn free_state(&mut self, state: &mut *mut c_void) {
+                if let (Some(function), false) = (self.base.functions.free_state, state.is_null()) {
+                    self.base.place.enter(&$free);
+                    // SAFETY: the instance is alive, the state is its own.
+                    unsafe { function(self.base.pointer, &raw mut *state) };
+                    self.base.place.leave();
+                    *state = null_mut();
+                }
+            }
+
+            /// Frees all saved states.
+            pub(super) fn free_states(&mut self) {
+                for mut state in std::mem::take(&mut self.base.saved) {
+                    self.free_state(&mut state);
+                }
+            }
+
+            #[doc = concat!("Serializes the current state (`", $get, "`, `", $serialize, "`).")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $visibility fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+                let function = function!(self.get_state, $get);
+                self.base.log_call($get, String::new);
+                let mut state = null_mut();
+                // SAFETY: the instance is alive; one state to write to.
+                let status = unsafe { function(self.base.pointer, &raw mut state) };
+                let bytes = self.base.check($get, status).and_then(|()| self.serialized(state));
+                self.free_state(&mut state);
+                bytes
+            }
+
+            fn serialized(&mut self, state: *mut c_void) -> Result<Vec<u8>, CallError> {
+                let mut size = 0;
+                let function = function!(self.serialized_state_size, $size);
+                self.base.log_call($size, String::new);
+                // SAFETY: the instance is alive, the state is its own.
+                let status = unsafe { function(self.base.pointer, state, &raw mut size) };
+                self.base.check($size, status)?;
+                let bytes = canary::bytes_of_state(size);
+                let mut bytes = bytes.map_err(|failure| self.base.failed($size, failure))?;
+                let function = function!(self.serialize_state, $serialize);
+                self.base.log_call($serialize, String::new);
+                let (pointer, guards) = (self.base.pointer, self.base.guards);
+                let done = canary::filled(guards, canary::BYTES, &mut bytes, |array| {
+                    // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
+                    (unsafe { function(pointer, state, array.cast(), size) }, None)
+                });
+                self.base.check_guarded($serialize, done, String::new)?;
+                Ok(bytes)
+            }
+
+            #[doc = concat!("Restores a serialized state (`", $deserialize, "`, `", $set, "`).")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $visibility fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+                let mut state = null_mut();
+                let function = function!(self.deserialize_state, $deserialize);
+                self.base.log_call($deserialize, String::new);
+                let (pointer, guards) = (self.base.pointer, self.base.guards);
+                let done = canary::constant(guards, canary::BYTES, bytes, |array| {
+                    // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
+                    (unsafe { function(pointer, array.cast(), bytes.len(), &raw mut state) }, None)
+                });
+                let done = self.base.check_guarded($deserialize, done, String::new);
+                let done = done.and_then(|()| self.set_state(state));
+                self.free_state(&mut state);
+                done
+            }
         }
-        // SAFETY: the instance is alive; the state is null or its own.
-        let status = unsafe { function(self.pointer, &raw mut self.saved[slot]) };
-        self.check(NAME, status)
-    }
+    };
+}
+pub(super) use states;
 
-    /// Restores the state in `slot` (`fmi2SetFMUstate`).
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the slot is empty, if the library lacks the function, or if its status is neither
-    /// `fmi2OK` nor `fmi2Warning`.
-    pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetFMUstate";
-        let state = self.saved.get(slot).copied().unwrap_or(null_mut());
-        if state.is_null() {
-            let what = format!("cannot restore the state of slot {slot}: the slot is empty");
-            return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
-        }
-        self.set_state(state)
-    }
-
-    fn set_state(&mut self, state: fmi2FMUstate) -> Result<(), CallError> {
-        const NAME: &str = "fmi2SetFMUstate";
-        let function = function!(self.set_state, NAME);
-        // SAFETY: the instance is alive; the state is its own.
-        let status = unsafe { function(self.pointer, state) };
-        self.check(NAME, status)
-    }
-
-    /// Frees a state of the instance.
-    pub(super) fn free_state(&mut self, state: &mut fmi2FMUstate) {
-        if let (Some(function), false) = (self.functions.free_state, state.is_null()) {
-            self.place.enter(&"fmi2FreeFMUstate");
-            // SAFETY: the instance is alive, the state is its own.
-            unsafe { function(self.pointer, &raw mut *state) };
-            self.place.leave();
-            *state = null_mut();
-        }
-    }
-
-    /// Serializes the current state (`fmi2GetFMUstate`, `fmi2SerializeFMUstate`).
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        const NAME: &str = "fmi2GetFMUstate";
-        let function = function!(self.get_state, NAME);
-        let mut state = null_mut();
-        // SAFETY: the instance is alive; one state to write to.
-        let status = unsafe { function(self.pointer, &raw mut state) };
-        let bytes = self.check(NAME, status).and_then(|()| self.serialized(state));
-        self.free_state(&mut state);
-        bytes
-    }
-
-    fn serialized(&mut self, state: fmi2FMUstate) -> Result<Vec<u8>, CallError> {
-        const SIZE: &str = "fmi2SerializedFMUstateSize";
-        const NAME: &str = "fmi2SerializeFMUstate";
-        let mut size = 0;
-        let function = function!(self.serialized_state_size, SIZE);
-        // SAFETY: the instance is alive, the state is its own.
-        let status = unsafe { function(self.pointer, state, &raw mut size) };
-        self.check(SIZE, status)?;
-        let mut bytes =
-            canary::bytes_of_state(size).map_err(|failure| self.failed(SIZE, failure))?;
-        let function = function!(self.serialize_state, NAME);
-        let done = canary::filled(self.guards, canary::BYTES, &mut bytes, |array| {
-            // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
-            (unsafe { function(self.pointer, state, array.cast(), size) }, None)
-        });
-        self.check_guarded(NAME, done)?;
-        Ok(bytes)
-    }
-
-    /// Restores a serialized state (`fmi2DeSerializeFMUstate`, `fmi2SetFMUstate`).
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-    /// `fmi2Warning`.
-    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        const NAME: &str = "fmi2DeSerializeFMUstate";
-        let mut state = null_mut();
-        let function = function!(self.deserialize_state, NAME);
-        let done = canary::constant(self.guards, canary::BYTES, bytes, |array| {
-            // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
-            (unsafe { function(self.pointer, array.cast(), bytes.len(), &raw mut state) }, None)
-        });
-        let done = self.check_guarded(NAME, done).and_then(|()| self.set_state(state));
-        self.free_state(&mut state);
-        done
-    }
+states! {
+    pub fn save_state = "fmi2GetFMUstate";
+    restore_state = "fmi2SetFMUstate";
+    serialize_state = "fmi2SerializedFMUstateSize" "fmi2SerializeFMUstate";
+    deserialize_state = "fmi2DeSerializeFMUstate";
+    free_state = "fmi2FreeFMUstate";
 }

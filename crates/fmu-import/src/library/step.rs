@@ -1,9 +1,10 @@
 //! `fmi2DoStep` and the evaluation of its status.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+use std::ffi::c_int;
 use std::time::{Duration, Instant};
 
-use fmu_description::abi::{Status, StatusKind, fmi2Status};
+use fmu_description::abi::{Status, StatusKind};
 
 use super::Component;
 use super::calls::{function, same_length};
@@ -14,7 +15,7 @@ const SET: &str = "fmi2SetReal";
 const GET: &str = "fmi2GetReal";
 
 /// Longest pause between two status queries of a pending step.
-const PAUSE: Duration = Duration::from_millis(1);
+pub(super) const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
     /// Calls `fmi2DoStep` from `time` with the step `size`, both in s.
@@ -31,11 +32,11 @@ impl Component {
         never_back: bool,
     ) -> Result<StepResult, CallError> {
         let function = function!(self.do_step, NAME);
-        self.place.set_time(time);
+        self.base.place.set_time(time);
         // SAFETY: the instance is alive.
-        let status = unsafe { function(self.pointer, time, size, never_back.into()) };
-        self.place.leave();
-        if status == Status::OK as fmi2Status || self.is_warning(status) {
+        let status = unsafe { function(self.base.pointer, time, size, never_back.into()) };
+        self.base.place.leave();
+        if status == Status::OK as c_int || self.base.is_warning(status) {
             return Ok(StepResult::Whole);
         }
         self.finish_step(status, time, size)
@@ -60,8 +61,7 @@ impl Component {
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
         let hot = &self.hot;
-        let usual =
-            |status| status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status;
+        let usual = |status| status == Status::OK as c_int || status == Status::Warning as c_int;
         if !inputs.is_empty() {
             let Some(function) = hot.set_real else { return Err(absent(SET)) };
             let count = same_length(inputs, values);
@@ -98,19 +98,15 @@ impl Component {
 
     /// Returns the error of a call in [`Component::pass`]. A separate function keeps the pass small.
     #[cold]
-    fn refuse(
-        &mut self,
-        function: &'static str,
-        status: fmi2Status,
-    ) -> Result<StepResult, CallError> {
-        self.check(function, status).map(|()| StepResult::Whole)
+    fn refuse(&mut self, function: &'static str, status: c_int) -> Result<StepResult, CallError> {
+        self.base.check(function, status).map(|()| StepResult::Whole)
     }
 
     /// Ends a pass whose step was pending or discarded, or failed.
     #[cold]
     fn finish_pass(
         &mut self,
-        status: fmi2Status,
+        status: c_int,
         step: CommunicationStep,
         outputs: &[u32],
         results: &mut [f64],
@@ -122,87 +118,112 @@ impl Component {
         Ok(done)
     }
 
-    /// Evaluates a step whose status is not `fmi2OK`: waits while it is pending, and asks for the time
-    /// reached if it was discarded.
-    #[cold]
-    fn finish_step(
-        &mut self,
-        mut status: fmi2Status,
-        time: f64,
-        size: f64,
-    ) -> Result<StepResult, CallError> {
-        let (start, mut pause) = (Instant::now(), Duration::from_micros(1));
-        while status == Status::Pending as fmi2Status {
-            if let Some(limit) = self.time_limit.filter(|limit| start.elapsed() > *limit) {
-                self.cancel();
-                return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
-            }
-            std::thread::sleep(pause);
-            pause = (2 * pause).min(PAUSE);
-            status = self.status(StatusKind::DoStepStatus)?;
-        }
-        if status != Status::Discard as fmi2Status {
-            return self.check(NAME, status).map(|()| StepResult::Whole);
-        }
-        let reached = match self.real_status(StatusKind::LastSuccessfulTime) {
-            Ok(reached) => reached,
-            Err(CallError { messages, .. }) => {
-                let failure = Failure::Status(Status::Discard);
-                return Err(CallError { function: NAME, failure, messages });
-            }
-        };
-        let terminated = self.boolean_status(StatusKind::Terminated).unwrap_or(false);
-        let rounding = 1e-9 * (size.abs() + time.abs());
-        if !(reached >= time - rounding && reached <= time + size + rounding) {
-            let what = format!(
-                "returned fmi2Discard with the last successful time {reached} s, expected one \
-                 from {time} to {} s",
-                time + size
-            );
-            return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
-        }
-        Ok(StepResult::Part { reached, terminated })
-    }
-
-    /// Calls `fmi2CancelStep`. The instance may be freed only if this succeeds (section 4.2.4).
-    fn cancel(&mut self) {
-        self.place.enter(&"fmi2CancelStep");
-        // SAFETY: the instance is alive.
-        let canceled = self
-            .functions
-            .cancel_step
-            .is_some_and(|function| unsafe { function(self.pointer) == Status::OK as fmi2Status });
-        self.place.leave();
-        self.abandoned = !canceled;
-    }
-
-    fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {
-        const NAME: &str = "fmi2GetStatus";
-        let mut value = 0;
-        let function = function!(self.get_status, NAME);
-        // SAFETY: the instance is alive; one place to write to.
-        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(NAME, status)?;
-        Ok(value)
-    }
-
-    fn real_status(&mut self, kind: StatusKind) -> Result<f64, CallError> {
-        const NAME: &str = "fmi2GetRealStatus";
-        let mut value = f64::NAN;
-        let function = function!(self.get_real_status, NAME);
-        // SAFETY: the instance is alive; one place to write to.
-        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(NAME, status)?;
-        Ok(value)
-    }
-
-    fn boolean_status(&mut self, kind: StatusKind) -> Result<bool, CallError> {
+    fn terminated(&mut self) -> Result<bool, CallError> {
         const NAME: &str = "fmi2GetBooleanStatus";
         let mut value = 0;
         let function = function!(self.get_boolean_status, NAME);
+        let kind = StatusKind::Terminated as c_int;
         // SAFETY: the instance is alive; one place to write to.
-        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(NAME, status)?;
+        let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
+        self.base.check(NAME, status)?;
         Ok(value != 0)
     }
+
+    /// Returns whether the FMU requests the end of the simulation, as far as it says so.
+    fn is_terminated(&mut self) -> bool {
+        self.terminated().unwrap_or(false)
+    }
+}
+
+/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. `terminated` asks the instance whether it
+/// requests the end of the simulation.
+macro_rules! finish_step {
+    (
+        do_step = $do_step:literal, discard = $discard:literal;
+        cancel_step = $cancel:literal;
+        get_status = $get_status:literal;
+        get_real_status = $get_real_status:literal;
+        terminated = $terminated:path;
+    ) => {
+        impl Component {
+            /// Evaluates a step whose status is neither OK nor a warning: waits while it is pending, and asks for the
+            /// time reached if it was discarded.
+            #[cold]
+            fn finish_step(
+                &mut self,
+                mut status: c_int,
+                time: f64,
+                size: f64,
+            ) -> Result<StepResult, CallError> {
+                let (start, mut pause) = (Instant::now(), Duration::from_micros(1));
+                while status == Status::Pending as c_int {
+                    let limit = self.base.time_limit.filter(|limit| start.elapsed() > *limit);
+                    if let Some(limit) = limit {
+                        self.cancel();
+                        return Err(self.base.failed($do_step, Failure::TimedOut(limit.as_secs_f64())));
+                    }
+                    std::thread::sleep(pause);
+                    pause = (2 * pause).min(PAUSE);
+                    status = self.status()?;
+                }
+                if status != Status::Discard as c_int {
+                    return self.base.check($do_step, status).map(|()| StepResult::Whole);
+                }
+                let reached = self.last_successful_time().map_err(|CallError { messages, .. }| {
+                    let failure = Failure::Status(Status::Discard);
+                    CallError { function: $do_step, failure, messages }
+                })?;
+                let terminated = $terminated(self);
+                let rounding = 1e-9 * (size.abs() + time.abs());
+                if !(reached >= time - rounding && reached <= time + size + rounding) {
+                    let what = format!(
+                        "returned {} with the last successful time {reached} s, expected one from {time} to {} s",
+                        $discard,
+                        time + size
+                    );
+                    return Err(self.base.failed($do_step, Failure::InvalidAnswer(what)));
+                }
+                Ok(StepResult::Part { reached, terminated })
+            }
+
+            /// Cancels the step. The instance may be freed only if this succeeds (FMI 2.0.5, section 4.2.4).
+            fn cancel(&mut self) {
+                self.base.place.enter(&$cancel);
+                let pointer = self.base.pointer;
+                // SAFETY: the instance is alive.
+                let status = self.base.functions.cancel_step.map(|cancel| unsafe { cancel(pointer) });
+                self.base.place.leave();
+                self.base.abandoned = status != Some(Status::OK as c_int);
+            }
+
+            fn status(&mut self) -> Result<c_int, CallError> {
+                let mut value = 0;
+                let function = function!(self.get_status, $get_status);
+                let kind = StatusKind::DoStepStatus as c_int;
+                // SAFETY: the instance is alive; one place to write to.
+                let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
+                self.base.check($get_status, status)?;
+                Ok(value)
+            }
+
+            fn last_successful_time(&mut self) -> Result<f64, CallError> {
+                let mut value = f64::NAN;
+                let function = function!(self.get_real_status, $get_real_status);
+                let kind = StatusKind::LastSuccessfulTime as c_int;
+                // SAFETY: the instance is alive; one place to write to.
+                let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
+                self.base.check($get_real_status, status)?;
+                Ok(value)
+            }
+        }
+    };
+}
+pub(super) use finish_step;
+
+finish_step! {
+    do_step = "fmi2DoStep", discard = "fmi2Discard";
+    cancel_step = "fmi2CancelStep";
+    get_status = "fmi2GetStatus";
+    get_real_status = "fmi2GetRealStatus";
+    terminated = Component::is_terminated;
 }

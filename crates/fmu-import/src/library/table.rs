@@ -6,7 +6,7 @@ macro_rules! functions {
         /// The functions of a library. The standard requires every function in every library; here a
         /// missing function fails only when it is called.
         #[derive(Clone, Copy)]
-        pub(super) struct Functions {
+        pub(crate) struct Functions {
             $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
         }
 
@@ -20,12 +20,22 @@ macro_rules! functions {
                 },)* }
             }
 
-            /// Returns whether the library exports `function`.
-            pub(super) fn has(&self, function: &str) -> bool {
-                match function {
+            /// Checks that the library exports the functions `required`, whose symbols have `prefix`.
+            pub(super) fn require(
+                &self,
+                path: &std::path::Path,
+                prefix: &str,
+                required: &[&[&str]],
+            ) -> Result<(), crate::LoadError> {
+                let has = |function: &str| match function {
                     $($name => self.$field.is_some(),)*
                     _ => false,
-                }
+                };
+                let missing = required.iter().copied().flatten().find(|function| !has(function));
+                missing.map_or(Ok(()), |function| {
+                    let (path, function) = (path.to_owned(), format!("{prefix}{function}"));
+                    Err(crate::LoadError::Missing { path, function })
+                })
             }
         }
     };

@@ -1,7 +1,6 @@
 //! The C functions of FMI 1.0: names and signatures.
 
 use std::ffi::{c_char, c_int, c_void};
-use std::path::Path;
 
 use fmu_description::abi::{
     fmi2CallbackAllocateMemory, fmi2CallbackFreeMemory, fmi2CallbackLogger,
@@ -9,7 +8,6 @@ use fmu_description::abi::{
 
 use super::super::Interface;
 use super::super::table::functions;
-use crate::error::LoadError;
 
 /// `fmiComponent`.
 pub(super) type Instance = *mut c_void;
@@ -56,7 +54,7 @@ functions! {
     free_instance = "fmiFreeSlaveInstance": fn(Instance);
     set_debug_logging = "fmiSetDebugLogging": fn(Instance, Boolean) -> Status;
     initialize = "fmiInitializeSlave": fn(Instance, f64, Boolean, f64) -> Status;
-    terminate = "fmiTerminateSlave": fn(Instance) -> Status;
+    terminate_slave = "fmiTerminateSlave": fn(Instance) -> Status;
     get_real = "fmiGetReal": fn(Instance, References, usize, *mut f64) -> Status;
     get_integer = "fmiGetInteger": fn(Instance, References, usize, *mut c_int) -> Status;
     get_boolean = "fmiGetBoolean": fn(Instance, References, usize, *mut Boolean) -> Status;
@@ -88,34 +86,18 @@ functions! {
     event_update = "fmiEventUpdate": fn(Instance, Boolean, *mut EventInfo) -> Status;
 }
 
-/// The functions without which no FMU can run in co-simulation.
-const SIMULATION: [&str; 4] =
-    ["fmiInstantiateSlave", "fmiFreeSlaveInstance", "fmiInitializeSlave", "fmiDoStep"];
-/// The functions without which no FMU can run in model exchange.
-const EXCHANGE: [&str; 5] = [
-    "fmiInstantiateModel",
-    "fmiFreeModelInstance",
-    "fmiInitialize",
-    "fmiSetTime",
-    "fmiEventUpdate",
-];
-
-impl Functions {
-    /// Checks that the library exports the functions that the interface cannot do without.
-    pub(super) fn require(
-        &self,
-        path: &Path,
-        prefix: &str,
-        interface: Interface,
-    ) -> Result<(), LoadError> {
-        let required = match interface {
-            Interface::CoSimulation => &SIMULATION[..],
-            Interface::ModelExchange => &EXCHANGE,
-        };
-        let missing = required.iter().find(|function| !self.has(function));
-        missing.map_or(Ok(()), |function| {
-            let function = format!("{prefix}_{function}");
-            Err(LoadError::Missing { path: path.to_owned(), function })
-        })
+/// The functions that `interface` cannot do without.
+pub(super) fn required(interface: Interface) -> &'static [&'static str] {
+    match interface {
+        Interface::CoSimulation => {
+            &["fmiInstantiateSlave", "fmiFreeSlaveInstance", "fmiInitializeSlave", "fmiDoStep"]
+        }
+        Interface::ModelExchange => &[
+            "fmiInstantiateModel",
+            "fmiFreeModelInstance",
+            "fmiInitialize",
+            "fmiSetTime",
+            "fmiEventUpdate",
+        ],
     }
 }

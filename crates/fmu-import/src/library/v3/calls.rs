@@ -5,35 +5,19 @@ use std::ffi::c_int;
 
 use fmu_description::Experiment;
 
-use super::super::calls::{function, same_length};
+use super::super::calls::{function, modes, same_length};
 use super::super::{c_string, canary};
 use super::Component;
 use slave::{CallError, absent};
 
-/// Defines a method for each function that changes the mode only.
-macro_rules! modes {
-    ($($method:ident = $name:literal;)*) => {
-        impl Component {
-            $(#[doc = concat!("Calls `", $name, "`.")]
-            pub(crate) fn $method(&mut self) -> Result<(), CallError> {
-                let function = function!(self.$method, $name);
-                self.log_call($name, String::new);
-                // SAFETY: the instance is alive.
-                let status = unsafe { function(self.pointer) };
-                self.check($name, status)
-            })*
-        }
-    };
-}
-
 modes! {
-    exit_initialization_mode = "fmi3ExitInitializationMode";
-    enter_event_mode = "fmi3EnterEventMode";
-    enter_step_mode = "fmi3EnterStepMode";
-    enter_continuous_time_mode = "fmi3EnterContinuousTimeMode";
-    enter_configuration_mode = "fmi3EnterConfigurationMode";
-    exit_configuration_mode = "fmi3ExitConfigurationMode";
-    terminate = "fmi3Terminate";
+    pub(crate) fn exit_initialization_mode = "fmi3ExitInitializationMode";
+    pub(crate) fn enter_event_mode = "fmi3EnterEventMode";
+    pub(crate) fn enter_step_mode = "fmi3EnterStepMode";
+    pub(crate) fn enter_continuous_time_mode = "fmi3EnterContinuousTimeMode";
+    pub(crate) fn enter_configuration_mode = "fmi3EnterConfigurationMode";
+    pub(crate) fn exit_configuration_mode = "fmi3ExitConfigurationMode";
+    pub(crate) fn terminate = "fmi3Terminate";
 }
 
 impl Component {
@@ -45,12 +29,12 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
-        self.log_call(NAME, || format!("{on}, {categories:?}"));
+        self.base.log_call(NAME, || format!("{on}, {categories:?}"));
         let texts: Vec<_> = categories.iter().map(|category| c_string(category)).collect();
         let pointers: Vec<_> = texts.iter().map(|text| text.as_ptr()).collect();
         // SAFETY: the instance is alive; terminated strings, as many as stated.
-        let status = unsafe { function(self.pointer, on, pointers.len(), pointers.as_ptr()) };
-        self.check(NAME, status)
+        let status = unsafe { function(self.base.pointer, on, pointers.len(), pointers.as_ptr()) };
+        self.base.check(NAME, status)
     }
 
     /// Calls `fmi3EnterInitializationMode`.
@@ -59,18 +43,18 @@ impl Component {
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) = (e.tolerance.is_some(), e.stop_time.is_some());
         let function = function!(self.enter_initialization_mode, NAME);
-        self.log_call(NAME, || {
+        self.base.log_call(NAME, || {
             format!(
                 "tolerance {:?}, start time {:?}, stop time {:?}",
                 e.tolerance, e.start_time, e.stop_time
             )
         });
-        self.place.set_time(e.start_time);
+        self.base.place.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
-            function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
+            function(self.base.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
         };
-        self.check(NAME, status)
+        self.base.check(NAME, status)
     }
 
     /// Calls `fmi3GetClock`: 0 is inactive.
@@ -81,23 +65,27 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetClock";
         let function = function!(self.get_clock, NAME);
-        self.log_call(NAME, || format!("{references:?}"));
+        self.base.log_call(NAME, || format!("{references:?}"));
         let count = same_length(references, values);
         // SAFETY: the instance is alive; as many references as values.
-        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
-        let done = canary::read(self.guards, references, values, call);
-        self.check_guarded(NAME, done, || format!(" {values:?}"))
+        let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+        let done = canary::read(self.base.guards, references, values, call);
+        self.base.check_guarded(NAME, done, || format!(" {values:?}"))
     }
 
     /// Calls `fmi3SetClock` to activate clocks.
     pub(crate) fn activate_clocks(&mut self, references: &[u32]) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetClock";
         let function = function!(self.set_clock, NAME);
-        self.log_call(NAME, || format!("{references:?}, active"));
+        self.base.log_call(NAME, || format!("{references:?}, active"));
         let values = vec![1_u8; references.len()];
         // SAFETY: the instance is alive; as many references as values.
-        let call = |list, array| unsafe { function(self.pointer, list, values.len(), array) };
-        self.check_guarded(NAME, canary::write(self.guards, references, &values, call), String::new)
+        let call = |list, array| unsafe { function(self.base.pointer, list, values.len(), array) };
+        self.base.check_guarded(
+            NAME,
+            canary::write(self.base.guards, references, &values, call),
+            String::new,
+        )
     }
 
     /// Calls `fmi3ActivateModelPartition` at `time` in s.
@@ -108,24 +96,25 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3ActivateModelPartition";
         let function = function!(self.activate_model_partition, NAME);
-        self.log_call(NAME, || format!("[{clock}], {time:?}"));
-        self.place.set_time(time);
+        self.base.log_call(NAME, || format!("[{clock}], {time:?}"));
+        self.base.place.set_time(time);
         // SAFETY: the instance is alive.
-        let status = unsafe { function(self.pointer, clock, time) };
-        self.check(NAME, status)
+        let status = unsafe { function(self.base.pointer, clock, time) };
+        self.base.check(NAME, status)
     }
 
     /// Calls `fmi3GetIntervalDecimal` for one clock: interval in s, and `fmi3IntervalQualifier`.
     pub(crate) fn get_interval(&mut self, clock: u32) -> Result<(f64, c_int), CallError> {
         const NAME: &str = "fmi3GetIntervalDecimal";
         let function = function!(self.get_interval_decimal, NAME);
-        self.log_call(NAME, || format!("[{clock}]"));
+        self.base.log_call(NAME, || format!("[{clock}]"));
         let (mut interval, mut qualifier) = (0.0, 0);
         // SAFETY: the instance is alive; one reference, one place for each result.
         let status = unsafe {
-            function(self.pointer, &raw const clock, 1, &raw mut interval, &raw mut qualifier)
+            function(self.base.pointer, &raw const clock, 1, &raw mut interval, &raw mut qualifier)
         };
-        self.check_results(NAME, status, || format!(" {interval:?}, qualifier {qualifier}"))?;
+        self.base
+            .check_results(NAME, status, || format!(" {interval:?}, qualifier {qualifier}"))?;
         Ok((interval, qualifier))
     }
 
@@ -133,11 +122,11 @@ impl Component {
     pub(crate) fn get_shift(&mut self, clock: u32) -> Result<f64, CallError> {
         const NAME: &str = "fmi3GetShiftDecimal";
         let function = function!(self.get_shift_decimal, NAME);
-        self.log_call(NAME, || format!("[{clock}]"));
+        self.base.log_call(NAME, || format!("[{clock}]"));
         let mut shift = 0.0;
         // SAFETY: the instance is alive; one reference, one place for the result.
-        let status = unsafe { function(self.pointer, &raw const clock, 1, &raw mut shift) };
-        self.check_results(NAME, status, || format!(" {shift:?}"))?;
+        let status = unsafe { function(self.base.pointer, &raw const clock, 1, &raw mut shift) };
+        self.base.check_results(NAME, status, || format!(" {shift:?}"))?;
         Ok(shift)
     }
 
@@ -152,8 +141,8 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
-        self.log_call(NAME, || format!("{unknowns:?}, {knowns:?}, {seed:?}"));
-        let (pointer, guards) = (self.pointer, self.guards);
+        self.base.log_call(NAME, || format!("{unknowns:?}, {knowns:?}, {seed:?}"));
+        let (pointer, guards) = (self.base.pointer, self.base.guards);
         let (rows, columns) = (unknowns.len(), knowns.len());
         let (seeds, results) = (seed.len(), changes.len());
         let done = canary::constant(guards, canary::REFERENCES, knowns, |knowns| {
@@ -167,7 +156,7 @@ impl Component {
                 canary::read(guards, unknowns, changes, call)
             })
         });
-        self.check_guarded(NAME, done, || format!(" {changes:?}"))
+        self.base.check_guarded(NAME, done, || format!(" {changes:?}"))
     }
 
     /// Calls `fmi3GetOutputDerivatives`. `values` has as many values as the elements of the outputs
@@ -180,15 +169,15 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetOutputDerivatives";
         let function = function!(self.get_output_derivatives, NAME);
-        self.log_call(NAME, || format!("{references:?}, orders {orders:?}"));
+        self.base.log_call(NAME, || format!("{references:?}, orders {orders:?}"));
         let count = same_length(references, orders);
-        let (pointer, guards, length) = (self.pointer, self.guards, values.len());
+        let (pointer, guards, length) = (self.base.pointer, self.base.guards, values.len());
         let done = canary::constant(guards, canary::ORDERS, orders, |orders| {
             // SAFETY: the instance is alive; as many references as orders, and `length` values.
             let call =
                 |list, array| unsafe { function(pointer, list, count, orders, array, length) };
             canary::read(guards, references, values, call)
         });
-        self.check_guarded(NAME, done, || format!(" {values:?}"))
+        self.base.check_guarded(NAME, done, || format!(" {values:?}"))
     }
 }

@@ -4,11 +4,9 @@
 //! Rust `bool` does not allow.
 
 use std::ffi::{c_char, c_int, c_void};
-use std::path::Path;
 
 use super::super::table::functions;
 use super::Interface;
-use crate::error::LoadError;
 
 /// `fmi3Instance`.
 pub(super) type Instance = *mut c_void;
@@ -118,30 +116,20 @@ functions! {
 /// The functions without which no FMU can run.
 const REQUIRED: [&str; 3] =
     ["fmi3FreeInstance", "fmi3EnterInitializationMode", "fmi3ExitInitializationMode"];
-/// Those that co-simulation cannot do without either.
-const CO_SIMULATION: [&str; 2] = ["fmi3InstantiateCoSimulation", "fmi3DoStep"];
-/// Those that model exchange cannot do without either.
-const MODEL_EXCHANGE: [&str; 4] = [
-    "fmi3InstantiateModelExchange",
-    "fmi3SetTime",
-    "fmi3UpdateDiscreteStates",
-    "fmi3EnterContinuousTimeMode",
-];
-/// Those that scheduled execution cannot do without either.
-const SCHEDULED_EXECUTION: [&str; 2] =
-    ["fmi3InstantiateScheduledExecution", "fmi3ActivateModelPartition"];
 
-impl Functions {
-    /// Checks that the library exports the functions that `interface` cannot do without.
-    pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
-        let of_interface: &[&str] = match interface {
-            Interface::CoSimulation => &CO_SIMULATION,
-            Interface::ModelExchange => &MODEL_EXCHANGE,
-            Interface::ScheduledExecution => &SCHEDULED_EXECUTION,
-        };
-        let missing = REQUIRED.iter().chain(of_interface).find(|function| !self.has(function));
-        missing.map_or(Ok(()), |function| {
-            Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
-        })
-    }
+/// The functions that `interface` cannot do without.
+pub(super) fn required(interface: Interface) -> [&'static [&'static str]; 2] {
+    let more: &[_] = match interface {
+        Interface::CoSimulation => &["fmi3InstantiateCoSimulation", "fmi3DoStep"],
+        Interface::ModelExchange => &[
+            "fmi3InstantiateModelExchange",
+            "fmi3SetTime",
+            "fmi3UpdateDiscreteStates",
+            "fmi3EnterContinuousTimeMode",
+        ],
+        Interface::ScheduledExecution => {
+            &["fmi3InstantiateScheduledExecution", "fmi3ActivateModelPartition"]
+        }
+    };
+    [&REQUIRED, more]
 }

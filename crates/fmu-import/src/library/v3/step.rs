@@ -32,21 +32,21 @@ impl Component {
     ) -> Result<StepDone, CallError> {
         const NAME: &str = "fmi3DoStep";
         let function = function!(self.do_step, NAME);
-        self.log_call(NAME, || format!("{time:?}, {size:?}, {never_back}"));
-        self.place.set_time(time);
+        self.base.log_call(NAME, || format!("{time:?}, {size:?}, {never_back}"));
+        self.base.place.set_time(time);
         let (mut event, mut terminate, mut early, mut reached) = (0, 0, 0, time + size);
-        let pointer = self.pointer;
+        let pointer = self.base.pointer;
         let results = (&raw mut event, &raw mut terminate, &raw mut early, &raw mut reached);
         let (first, second, third, fourth) = results;
         let step = || {
             // SAFETY: the instance is alive; one place for each result.
             unsafe { function(pointer, time, size, never_back, first, second, third, fourth) }
         };
-        let status = match self.functions.set_float64.filter(|_| self.inputs.is_set) {
+        let status = match self.base.functions.set_float64.filter(|_| self.inputs.is_set) {
             Some(set) => self.inputs.during((pointer, set), step),
             None => step(),
         };
-        self.check_results(NAME, status, || {
+        self.base.check_results(NAME, status, || {
             format!(
                 " eventHandlingNeeded {event}, terminateSimulation {terminate}, earlyReturn {early}, \
                  lastSuccessfulTime {reached:?}"
@@ -70,7 +70,7 @@ impl Component {
         self.inputs.derive(list, orders, values, is_followed).map_err(|order| {
             let what =
                 format!("cannot follow a derivative of order {order}, expected 1 to {ORDERS}");
-            self.failed(SET, Failure::InvalidAnswer(what))
+            self.base.failed(SET, Failure::InvalidAnswer(what))
         })?;
         let references = std::mem::take(&mut self.inputs.references);
         let mut present = std::mem::take(&mut self.inputs.values);
@@ -87,9 +87,9 @@ impl Component {
         if !self.inputs.is_set {
             return Ok(());
         }
-        self.place.enter(&SET);
+        self.base.place.enter(&SET);
         let status = self.inputs.settle(time);
-        self.check_status(SET, status)
+        self.base.check_status(SET, status)
     }
 
     /// Forgets the derivatives of the inputs, which are for one step.
@@ -101,13 +101,13 @@ impl Component {
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let function = function!(self.update_discrete_states, NAME);
-        self.log_call(NAME, String::new);
+        self.base.log_call(NAME, String::new);
         let [mut need_update, mut terminate, mut nominals, mut values, mut defined] = [0_u8; 5];
         let mut next = 0.0;
         // SAFETY: the instance is alive; one place for each result.
         let status = unsafe {
             function(
-                self.pointer,
+                self.base.pointer,
                 &raw mut need_update,
                 &raw mut terminate,
                 &raw mut nominals,
@@ -116,7 +116,7 @@ impl Component {
                 &raw mut next,
             )
         };
-        self.check_results(NAME, status, || {
+        self.base.check_results(NAME, status, || {
             format!(
                 " discreteStatesNeedUpdate {need_update}, terminateSimulation {terminate}, \
                  nextEventTimeDefined {defined}, nextEventTime {next:?}"

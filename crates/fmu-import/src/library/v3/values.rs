@@ -20,12 +20,12 @@ macro_rules! values {
                 values: &mut [$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$get, $get_name);
-                self.log_call($get_name, || format!("{references:?}"));
+                self.base.log_call($get_name, || format!("{references:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
-                let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
-                let done = canary::read(self.guards, references, values, call);
-                self.check_guarded($get_name, done, || format!(" {values:?}"))
+                let call = |list, array| unsafe { function(self.base.pointer, list, count, array, length) };
+                let done = canary::read(self.base.guards, references, values, call);
+                self.base.check_guarded($get_name, done, || format!(" {values:?}"))
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
@@ -36,12 +36,12 @@ macro_rules! values {
                 values: &[$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$set, $set_name);
-                self.log_call($set_name, || format!("{references:?}, {values:?}"));
+                self.base.log_call($set_name, || format!("{references:?}, {values:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
-                let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
-                let done = canary::write(self.guards, references, values, call);
-                self.check_guarded($set_name, done, String::new)
+                let call = |list, array| unsafe { function(self.base.pointer, list, count, array, length) };
+                let done = canary::write(self.base.guards, references, values, call);
+                self.base.check_guarded($set_name, done, String::new)
             })*
         }
     };
@@ -70,10 +70,10 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetString";
         let function = function!(self.set_string, NAME);
-        self.log_call(NAME, || format!("{references:?}, {values:?}"));
+        self.base.log_call(NAME, || format!("{references:?}, {values:?}"));
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
         let texts: Vec<_> = values.iter().map(CString::as_bytes_with_nul).collect();
-        let (pointer, guards) = (self.pointer, self.guards);
+        let (pointer, guards) = (self.base.pointer, self.base.guards);
         let (count, length) = (references.len(), texts.len());
         let done = canary::constants(guards, canary::STRING, &texts, |array| {
             canary::constant(guards, canary::REFERENCES, references, |list| {
@@ -81,7 +81,7 @@ impl Component {
                 (unsafe { function(pointer, list, count, array.cast(), length) }, None)
             })
         });
-        self.check_guarded(NAME, done, String::new)
+        self.base.check_guarded(NAME, done, String::new)
     }
 
     /// Calls `fmi3GetString` and copies the strings.
@@ -92,17 +92,17 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetString";
         let function = function!(self.get_string, NAME);
-        self.log_call(NAME, || format!("{references:?}"));
+        self.base.log_call(NAME, || format!("{references:?}"));
         let mut pointers = vec![std::ptr::null(); values.len()];
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
-        let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
-        let done = canary::read(self.guards, references, &mut pointers, call);
-        self.check_guarded(NAME, done, String::new)?;
-        self.place.enter(&NAME);
+        let call = |list, array| unsafe { function(self.base.pointer, list, count, array, length) };
+        let done = canary::read(self.base.guards, references, &mut pointers, call);
+        self.base.check_guarded(NAME, done, String::new)?;
+        self.base.place.enter(&NAME);
         // SAFETY: the FMU returns null or terminated strings, which live until the next call.
         unsafe { copy_strings(&pointers, values) };
-        self.place.leave();
+        self.base.place.leave();
         Ok(())
     }
 
@@ -114,10 +114,10 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetBinary";
         let function = function!(self.set_binary, NAME);
-        self.log_call(NAME, || format!("{references:?}, {values:?}"));
+        self.base.log_call(NAME, || format!("{references:?}, {values:?}"));
         let sizes: Vec<_> = values.iter().map(Vec::len).collect();
         let contents: Vec<_> = values.iter().map(Vec::as_slice).collect();
-        let (pointer, guards) = (self.pointer, self.guards);
+        let (pointer, guards) = (self.base.pointer, self.base.guards);
         let (count, length) = (references.len(), contents.len());
         let done = canary::constants(guards, canary::BYTES, &contents, |array| {
             // SAFETY: the instance is alive; as many sizes as pointers, each to as many bytes.
@@ -125,7 +125,7 @@ impl Component {
                 |list, sizes| unsafe { function(pointer, list, count, sizes, array, length) };
             canary::write(guards, references, &sizes, call)
         });
-        self.check_guarded(NAME, done, String::new)
+        self.base.check_guarded(NAME, done, String::new)
     }
 
     /// Calls `fmi3GetBinary` and copies the bytes.
@@ -136,31 +136,31 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetBinary";
         let function = function!(self.get_binary, NAME);
-        self.log_call(NAME, || format!("{references:?}"));
+        self.base.log_call(NAME, || format!("{references:?}"));
         let mut sizes = vec![0_usize; values.len()];
         let mut pointers = vec![std::ptr::null::<u8>(); values.len()];
         let (count, length) = (references.len(), pointers.len());
-        let (pointer, guards) = (self.pointer, self.guards);
+        let (pointer, guards) = (self.base.pointer, self.base.guards);
         let done = canary::filled(guards, canary::SIZES, &mut sizes, |sizes| {
             // SAFETY: the instance is alive; as many places for sizes as for pointers.
             let call =
                 |list, array| unsafe { function(pointer, list, count, sizes, array, length) };
             canary::read(guards, references, &mut pointers, call)
         });
-        self.check_guarded(NAME, done, String::new)?;
-        self.place.enter(&NAME);
+        self.base.check_guarded(NAME, done, String::new)?;
+        self.base.place.enter(&NAME);
         for (value, (pointer, size)) in values.iter_mut().zip(pointers.into_iter().zip(sizes)) {
             value.clear();
             if let Err(failure) = canary::check_size(size, "binary value") {
-                self.place.leave();
-                return Err(self.failed(NAME, failure));
+                self.base.place.leave();
+                return Err(self.base.failed(NAME, failure));
             }
             if size > 0 && !pointer.is_null() {
                 // SAFETY: the FMU returns `size` bytes at `pointer`, which live until the next call.
                 value.extend_from_slice(unsafe { std::slice::from_raw_parts(pointer, size) });
             }
         }
-        self.place.leave();
+        self.base.place.leave();
         Ok(())
     }
 }

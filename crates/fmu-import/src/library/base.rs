@@ -1,0 +1,207 @@
+//! What the libraries and the instances of all versions share.
+
+use std::cell::{Cell, RefCell};
+use std::ffi::{c_int, c_void};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use fmu_description::Version;
+use fmu_description::abi::{Status, fmi2CallbackFunctions};
+use slave::{CallError, CallSink, Failure};
+
+use super::canary::Guarded;
+use super::load::Handle;
+use super::log::Sink;
+use crate::crash::{self, Place};
+use crate::error::LoadError;
+
+/// A loaded library with the functions of its version of the standard.
+pub(crate) struct Loaded<F> {
+    pub(super) functions: F,
+    path: PathBuf,
+    /// An instance returned `fmi2Fatal`: no function of any instance may be called (FMI 2.0.5, section 2.1.3).
+    corrupted: AtomicBool,
+    _handle: Handle,
+}
+
+impl<F> Loaded<F> {
+    pub(super) fn new(functions: F, path: &Path, handle: Handle) -> Self {
+        let corrupted = AtomicBool::new(false);
+        Self { functions, path: path.to_owned(), corrupted, _handle: handle }
+    }
+}
+
+/// The part of an instance that does not depend on the version.
+pub(crate) struct Base<F> {
+    pub(super) pointer: *mut c_void,
+    /// A copy of the library's function table.
+    pub(super) functions: F,
+    /// The current function and time of the instance, for crash reports.
+    pub(super) place: Arc<Place>,
+    /// Receives messages; the FMU holds its address. FMI 1.0 has no environment: its logger finds it by the thread
+    /// or the name of the instance.
+    sink: Arc<Sink>,
+    /// The callbacks of FMI 2.0; the FMU holds their address.
+    pub(super) callbacks: Option<Arc<fmi2CallbackFunctions>>,
+    /// FMU states by slot; null in an empty slot.
+    pub(super) saved: Vec<*mut c_void>,
+    /// How long a step that returned `fmi2Pending` may take; `None`: no limit.
+    pub(crate) time_limit: Option<Duration>,
+    /// The instance still computes a step that could not be canceled, and must not be freed.
+    pub(super) abandoned: bool,
+    /// Whether a call has returned `fmi2Warning`.
+    warned: Cell<bool>,
+    /// Whether calls get copies of arrays, with canaries.
+    pub(crate) guards: bool,
+    /// Receives a text for each call, if calls are logged; in FMI 3.0 only.
+    call_sink: Option<RefCell<CallSink>>,
+    version: Version,
+    library: Arc<Loaded<F>>,
+}
+
+impl<F: Copy> Base<F> {
+    /// Takes over the instance that `function` has created. Null is an error with the messages of the FMU.
+    pub(super) fn new(
+        library: &Arc<Loaded<F>>,
+        pointer: *mut c_void,
+        function: &'static str,
+        place: Arc<Place>,
+        sink: Arc<Sink>,
+        version: Version,
+    ) -> Result<Self, LoadError> {
+        if pointer.is_null() {
+            let messages = sink.take();
+            let reason = if messages.is_empty() {
+                "it gave no reason".to_owned()
+            } else {
+                messages.join("; ")
+            };
+            let (path, instance) = (library.path.clone(), place.instance().to_owned());
+            return Err(LoadError::Instantiate { path, function, instance, reason });
+        }
+        Ok(Self {
+            pointer,
+            functions: library.functions,
+            place,
+            sink,
+            callbacks: None,
+            saved: Vec::new(),
+            time_limit: None,
+            abandoned: false,
+            warned: Cell::new(false),
+            guards: false,
+            call_sink: None,
+            version,
+            library: library.clone(),
+        })
+    }
+
+    /// Returns whether the instance may be freed. Otherwise it may still use the library, the callbacks and the
+    /// sink: they are leaked.
+    pub(super) fn may_be_freed(&self) -> bool {
+        crash::check_returned(&self.place);
+        let is_lost = self.abandoned || self.library.corrupted.load(Ordering::Relaxed);
+        if is_lost {
+            std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
+        }
+        !is_lost
+    }
+
+    /// Passes the text of every call from now on to `sink`.
+    pub(crate) fn log_calls(&mut self, sink: CallSink) {
+        self.call_sink = Some(RefCell::new(sink));
+    }
+
+    /// Logs a call before it is made.
+    #[inline]
+    pub(super) fn log_call(&self, function: &'static str, arguments: impl FnOnce() -> String) {
+        if let Some(sink) = &self.call_sink {
+            sink.borrow_mut()(&format!("{function}({})", arguments()));
+        }
+    }
+
+    /// Marks the call as returned and converts its status to a result.
+    #[inline]
+    pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), CallError> {
+        self.check_results(function, status, String::new)
+    }
+
+    /// As [`Base::check`], for a call with results, which are logged.
+    #[inline]
+    pub(super) fn check_results(
+        &self,
+        function: &'static str,
+        status: c_int,
+        results: impl FnOnce() -> String,
+    ) -> Result<(), CallError> {
+        if let Some(sink) = &self.call_sink {
+            let name = match Status::from_c(status) {
+                Some(status) => status.name().replace("fmi2", "fmi3"),
+                None => status.to_string(),
+            };
+            sink.borrow_mut()(&format!(" -> {name}{}\n", results()));
+        }
+        self.check_status(function, status)
+    }
+
+    /// As [`Base::check_results`], for a call that may have been guarded.
+    #[inline]
+    pub(super) fn check_guarded(
+        &self,
+        function: &'static str,
+        (status, violation): Guarded,
+        results: impl FnOnce() -> String,
+    ) -> Result<(), CallError> {
+        let done = self.check_results(function, status, results);
+        match violation {
+            None => done,
+            Some(what) => Err(self.failed(function, Failure::InvalidAnswer(what))),
+        }
+    }
+
+    /// As [`Base::check`], for a call that is not logged.
+    #[inline]
+    pub(super) fn check_status(
+        &self,
+        function: &'static str,
+        status: c_int,
+    ) -> Result<(), CallError> {
+        self.place.leave();
+        if status == Status::OK as c_int || self.is_warning(status) {
+            return Ok(());
+        }
+        if status == Status::Fatal as c_int {
+            self.library.corrupted.store(true, Ordering::Relaxed);
+        }
+        let failure = match Status::from_c(status) {
+            // FMI 3.0 has no pending calls.
+            Some(Status::Pending) if self.version == Version::V3 => Failure::UnknownStatus(status),
+            Some(status) => Failure::Status(status),
+            None => Failure::UnknownStatus(status),
+        };
+        Err(self.failed(function, failure))
+    }
+
+    /// Returns whether `status` is `fmi2Warning`, and records it for [`Base::take_warning`].
+    #[inline]
+    pub(super) fn is_warning(&self, status: c_int) -> bool {
+        let warning = status == Status::Warning as c_int;
+        if warning {
+            self.warned.set(true);
+        }
+        warning
+    }
+
+    /// Returns whether a call has returned `fmi2Warning` since the last call of this function.
+    pub(crate) fn take_warning(&self) -> bool {
+        self.warned.take()
+    }
+
+    /// Returns the error of a call, with the instance's recent messages.
+    #[cold]
+    pub(super) fn failed(&self, function: &'static str, failure: Failure) -> CallError {
+        self.place.failed(CallError { function, failure, messages: self.sink.take() })
+    }
+}
