@@ -9,7 +9,7 @@ use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
-use slave::{CallError, CallSink, CommunicationStep, EventInfo, Events, Slave, StepResult, absent};
+use slave::{CallError, CallSink, CommunicationStep, Events, Slave, StepResult, absent};
 
 /// An instance of an FMU in this process, for either interface.
 pub struct Instance {
@@ -49,6 +49,27 @@ impl Instance {
     }
 }
 
+/// Calls a method of the instance in the version of its FMU, or of a part of it; without a list of versions, of its
+/// component. In a version that is not listed the function is missing.
+macro_rules! of_version {
+    ($instance:ident.$method:ident $arguments:tt) => {
+        of_version!(
+            $instance.$method $arguments,
+            V1.component, V2.component, V3.component
+        )
+    };
+    (
+        $instance:ident.$method:ident $arguments:tt,
+        $($version:ident$(.$part:ident)*),+ $(; $absent:literal)?
+    ) => {
+        match &mut $instance.inner {
+            $(Inner::$version(instance) => instance$(.$part)*.$method $arguments,)+
+            $(_ => Err(absent($absent)),)?
+        }
+    };
+}
+use of_version;
+
 impl Slave for Instance {
     fn description(&self) -> &ModelDescription {
         match &self.inner {
@@ -59,11 +80,7 @@ impl Slave for Instance {
     }
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.set_debug_logging(on),
-            Inner::V2(instance) => instance.component.set_debug_logging(on),
-            Inner::V3(instance) => instance.set_debug_logging(on),
-        }
+        of_version!(self.set_debug_logging(on), V1.component, V2.component, V3)
     }
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
@@ -83,11 +100,7 @@ impl Slave for Instance {
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.enter_initialization_mode(),
-            Inner::V2(instance) => instance.component.enter_initialization_mode(),
-            Inner::V3(instance) => instance.enter_initialization_mode(),
-        }
+        of_version!(self.enter_initialization_mode(), V1, V2.component, V3)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
@@ -102,91 +115,49 @@ impl Slave for Instance {
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.terminate(),
-            Inner::V2(instance) => instance.component.terminate(),
-            Inner::V3(instance) => instance.terminate(),
-        }
+        of_version!(self.terminate())
     }
 
     #[inline]
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.get_real(references, values),
-            Inner::V2(instance) => instance.component.get_real(references, values),
-            Inner::V3(instance) => instance.get_real(references, values),
-        }
+        of_version!(self.get_real(references, values), V1, V2.component, V3)
     }
 
     #[inline]
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.set_real(references, values),
-            Inner::V2(instance) => instance.component.set_real(references, values),
-            Inner::V3(instance) => instance.set_real(references, values),
-        }
+        of_version!(self.set_real(references, values), V1, V2.component, V3)
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.get_integer(references, values),
-            Inner::V2(instance) => instance.get_integer(references, values),
-            Inner::V3(instance) => instance.get_integer(references, values),
-        }
+        of_version!(self.get_integer(references, values), V1, V2, V3)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.set_integer(references, values),
-            Inner::V2(instance) => instance.set_integer(references, values),
-            Inner::V3(instance) => instance.set_integer(references, values),
-        }
+        of_version!(self.set_integer(references, values), V1, V2, V3)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.get_boolean(references, values),
-            Inner::V2(instance) => instance.component.get_boolean(references, values),
-            Inner::V3(instance) => instance.get_boolean(references, values),
-        }
+        of_version!(self.get_boolean(references, values), V1, V2.component, V3)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.set_boolean(references, values),
-            Inner::V2(instance) => instance.component.set_boolean(references, values),
-            Inner::V3(instance) => instance.set_boolean(references, values),
-        }
+        of_version!(self.set_boolean(references, values), V1, V2.component, V3)
     }
 
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.get_string(references, values),
-            Inner::V2(instance) => instance.component.get_string(references, values),
-            Inner::V3(instance) => instance.get_string(references, values),
-        }
+        of_version!(self.get_string(references, values), V1.component, V2.component, V3)
     }
 
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.set_string(references, values),
-            Inner::V2(instance) => instance.component.set_string(references, values),
-            Inner::V3(instance) => instance.set_string(references, values),
-        }
+        of_version!(self.set_string(references, values), V1, V2.component, V3)
     }
 
     fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V3(instance) => instance.get_binary(references, values),
-            _ => Err(absent("fmi3GetBinary")),
-        }
+        of_version!(self.get_binary(references, values), V3; "fmi3GetBinary")
     }
 
     fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V3(instance) => instance.set_binary(references, values),
-            _ => Err(absent("fmi3SetBinary")),
-        }
+        of_version!(self.set_binary(references, values), V3; "fmi3SetBinary")
     }
 
     fn set_input_derivatives(
@@ -239,45 +210,26 @@ impl Slave for Instance {
         seed: &[f64],
         changes: &mut [f64],
     ) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(_) => Err(absent("fmi2GetDirectionalDerivative")),
-            Inner::V2(instance) => {
-                instance.component.directional_derivative(unknowns, knowns, seed, changes)
-            }
-            Inner::V3(instance) => instance.directional_derivative(unknowns, knowns, seed, changes),
-        }
+        of_version!(
+            self.directional_derivative(unknowns, knowns, seed, changes),
+            V2.component, V3; "fmi2GetDirectionalDerivative"
+        )
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(_) => Err(absent("fmi2GetFMUstate")),
-            Inner::V2(instance) => instance.component.save_state(slot),
-            Inner::V3(instance) => instance.save_state(slot),
-        }
+        of_version!(self.save_state(slot), V2.component, V3; "fmi2GetFMUstate")
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(_) => Err(absent("fmi2SetFMUstate")),
-            Inner::V2(instance) => instance.component.restore_state(slot),
-            Inner::V3(instance) => instance.restore_state(slot),
-        }
+        of_version!(self.restore_state(slot), V2.component, V3; "fmi2SetFMUstate")
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        match &mut self.inner {
-            Inner::V1(_) => Err(absent("fmi2SerializeFMUstate")),
-            Inner::V2(instance) => instance.component.serialize_state(),
-            Inner::V3(instance) => instance.serialize_state(),
-        }
+        of_version!(self.serialize_state(), V2.component, V3; "fmi2SerializeFMUstate")
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(_) => Err(absent("fmi2DeSerializeFMUstate")),
-            Inner::V2(instance) => instance.component.deserialize_state(bytes),
-            Inner::V3(instance) => instance.deserialize_state(bytes),
-        }
+        of_version!(self.deserialize_state(bytes), V2.component, V3; "fmi2DeSerializeFMUstate")
     }
 
     #[inline]
@@ -325,36 +277,10 @@ impl Slave for Instance {
     }
 
     fn guard_arrays(&mut self) {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.base.guards = true,
-            Inner::V2(instance) => instance.component.guard_arrays(),
-            Inner::V3(instance) => instance.component.base.guards = true,
-        }
+        of_version!(self.guard_arrays(), V1.component.base, V2.component.base, V3.component.base);
     }
 
     fn take_warning(&mut self) -> bool {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.component.base.take_warning(),
-            Inner::V2(instance) => instance.component.take_warning(),
-            Inner::V3(instance) => instance.component.base.take_warning(),
-        }
-    }
-}
-
-impl Events for v3::Instance {
-    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
-        Ok(v3::Instance::next_event(self))
-    }
-
-    fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        v3::Instance::enter_event_mode(self)
-    }
-
-    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        v3::Instance::update_discrete_states(self)
-    }
-
-    fn leave_event_mode(&mut self) -> Result<(), CallError> {
-        v3::Instance::leave_event_mode(self)
+        of_version!(self.take_warning(), V1.component.base, V2.component.base, V3.component.base)
     }
 }

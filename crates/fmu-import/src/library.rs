@@ -263,6 +263,6 @@ impl Component {
 
     /// Lets the calls from now on get copies of arrays, with canaries. [`Component::pass`] does not.
     pub fn guard_arrays(&mut self) {
-        self.base.guards = true;
+        self.base.guard_arrays();
     }
 }

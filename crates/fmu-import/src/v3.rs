@@ -34,7 +34,7 @@ use mode::Mode;
 use modes::State;
 use plan::Plans;
 use refusal::refused;
-use slave::{CallError, StepResult};
+use slave::CallError;
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
 /// with `loggingOn = false` alone an FMU is silent about its errors.
@@ -184,14 +184,6 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.end_initialization()
-    }
-
-    pub(crate) fn terminate(&mut self) -> Result<(), CallError> {
-        self.component.terminate()
-    }
-
     #[inline]
     pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         if self.view.plain {
@@ -277,15 +269,5 @@ impl Instance {
             |instance, references, values| instance.component.get_binary(references, values),
             |instance, references, values| instance.component.set_binary(references, values),
         )
-    }
-
-    #[inline]
-    pub(crate) fn do_step(
-        &mut self,
-        time: f64,
-        size: f64,
-        never_back: bool,
-    ) -> Result<StepResult, CallError> {
-        self.step(time, size, never_back)
     }
 }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use fmu_description::Version;
 use fmu_description::location::file_uri;
-use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
+use slave::{CallError, CompletedStep, EventInfo, Events as _, ModelExchange};
 
-use super::{Inner, Instance};
+use super::{Inner, Instance, of_version};
 use crate::fmu::{Fmu, FmuError, resource_path, with_tool_hint};
 use crate::library::{Interface, check_number, v1, v3};
 
@@ -65,17 +65,6 @@ impl Fmu {
     }
 }
 
-/// Calls a method of the instance in the version of its FMU.
-macro_rules! equations {
-    ($equations:ident.$method:ident($($argument:expr),*)) => {
-        match &mut $equations.inner {
-            Inner::V2(instance) => instance.component.$method($($argument),*),
-            Inner::V3(instance) => instance.$method($($argument),*),
-            Inner::V1(instance) => instance.$method($($argument),*),
-        }
-    };
-}
-
 impl ModelExchange for Instance {
     fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
         match &mut self.inner {
@@ -83,14 +72,14 @@ impl ModelExchange for Instance {
                 let flags = instance.description().model_exchange.as_ref();
                 Ok(flags.map_or(0, |flags| flags.number_of_continuous_states as usize))
             }
-            Inner::V3(instance) => instance.number_of_continuous_states(),
+            Inner::V3(instance) => instance.component.get_number_of_states(),
             Inner::V2(_) => Ok(self.fmu().description().structure.derivatives.len()),
         }
     }
 
     fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
         if let Inner::V3(instance) = &mut self.inner {
-            return instance.number_of_event_indicators();
+            return instance.component.get_number_of_indicators();
         }
         let count = self.fmu().description().number_of_event_indicators.unwrap_or(0);
         check_number(count as usize).map_err(|failure| {
@@ -111,42 +100,42 @@ impl ModelExchange for Instance {
     }
 
     fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        equations!(self.set_time(time))
+        of_version!(self.set_time(time), V1.component, V2.component, V3)
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
-        equations!(self.set_continuous_states(states))
+        of_version!(self.set_continuous_states(states))
     }
 
     fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        equations!(self.get_continuous_states(states))
+        of_version!(self.get_continuous_states(states))
     }
 
     fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        equations!(self.get_derivatives(derivatives))
+        of_version!(self.get_derivatives(derivatives))
     }
 
     fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError> {
-        equations!(self.get_event_indicators(indicators))
+        of_version!(self.get_event_indicators(indicators))
     }
 
     fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
-        equations!(self.get_nominals(nominals))
+        of_version!(self.get_nominals(nominals))
     }
 
     fn completed_integrator_step(&mut self, never_back: bool) -> Result<CompletedStep, CallError> {
-        equations!(self.completed_integrator_step(never_back))
+        of_version!(self.completed_integrator_step(never_back), V1, V2.component, V3)
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        equations!(self.enter_event_mode())
+        of_version!(self.enter_event_mode(), V1, V2.component, V3)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        equations!(self.update_discrete_states())
+        of_version!(self.update_discrete_states(), V1, V2.component, V3)
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
-        equations!(self.enter_continuous_time_mode())
+        of_version!(self.enter_continuous_time_mode(), V1, V2.component, V3)
     }
 }

@@ -54,7 +54,7 @@ pub(crate) struct Base<F> {
     /// Whether a call has returned `fmi2Warning`.
     warned: Cell<bool>,
     /// Whether calls get copies of arrays, with canaries.
-    pub(crate) guards: bool,
+    pub(super) guards: bool,
     /// Receives a text for each call, if calls are logged; in FMI 3.0 only.
     call_sink: Option<RefCell<CallSink>>,
     version: Version,
@@ -107,6 +107,11 @@ impl<F: Copy> Base<F> {
             std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
         }
         !is_lost
+    }
+
+    /// Lets the calls from now on get copies of arrays, with canaries.
+    pub(crate) fn guard_arrays(&mut self) {
+        self.guards = true;
     }
 
     /// Passes the text of every call from now on to `sink`.

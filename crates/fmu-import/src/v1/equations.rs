@@ -5,30 +5,6 @@ use super::Instance;
 use slave::{CallError, CompletedStep, EventInfo};
 
 impl Instance {
-    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        self.component.set_time(time)
-    }
-
-    pub(crate) fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
-        self.component.set_continuous_states(states)
-    }
-
-    pub(crate) fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        self.component.get_continuous_states(states)
-    }
-
-    pub(crate) fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        self.component.get_derivatives(derivatives)
-    }
-
-    pub(crate) fn get_event_indicators(&mut self, values: &mut [f64]) -> Result<(), CallError> {
-        self.component.get_event_indicators(values)
-    }
-
-    pub(crate) fn get_nominals(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
-        self.component.get_nominals(nominals)
-    }
-
     pub(crate) fn completed_integrator_step(
         &mut self,
         _never_back: bool,

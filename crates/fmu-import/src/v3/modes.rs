@@ -5,7 +5,7 @@ use super::mode::Mode;
 use super::refusal::refused;
 use crate::library::v3::Interface;
 use fmu_description::number::seconds;
-use slave::{CallError, EventInfo, Failure, StepResult};
+use slave::{CallError, EventInfo, Events, Failure, StepResult};
 
 use fmu_description::abi::Status;
 
@@ -39,7 +39,7 @@ pub(super) struct State {
 
 impl Instance {
     /// Ends the initialization; handles the event at the start time, unless the master does.
-    pub(super) fn end_initialization(&mut self) -> Result<(), CallError> {
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         let start = self.state.time;
         self.state.clocks.start(&mut self.component, start)?;
         self.component.exit_initialization_mode()?;
@@ -63,43 +63,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Enters Event Mode; input clocks that are due tick.
-    pub(crate) fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.enter_event()?;
-        self.tick()
-    }
-
-    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it.
-    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        self.tick()?;
-        if self.is_scheduled() {
-            return self.run_partitions();
-        }
-        self.state.clocks.read_outputs(&mut self.component)?;
-        self.read_clocked()?;
-        let mut info = self.component.update_discrete_states()?;
-        self.state.clocks.end_ticks();
-        if !info.discrete_states_need_update {
-            self.state.clocks.ask_intervals(&mut self.component, self.state.time)?;
-        }
-        self.state.terminate |= info.terminate_simulation;
-        self.state.next_event = info.next_event_time;
-        info.next_event_time = self.next_event();
-        Ok(info)
-    }
-
-    /// Enters Step Mode.
-    pub(crate) fn leave_event_mode(&mut self) -> Result<(), CallError> {
-        self.state.clocks.end_event();
-        if !self.is_scheduled() {
-            self.component.enter_step_mode()?;
-        }
-        self.state.mode = Mode::Step;
-        Ok(())
-    }
-
     /// Returns the time of the next time event or tick in s.
-    pub(crate) fn next_event(&self) -> Option<f64> {
+    pub(super) fn next_event_time(&self) -> Option<f64> {
         let events = [self.state.next_event, self.state.clocks.next()];
         events.into_iter().flatten().reduce(f64::min)
     }
@@ -132,7 +97,7 @@ impl Instance {
     }
 
     /// Steps from `time` over `size` s; handles the events within the step and at its end, unless the master does.
-    pub(super) fn step(
+    pub(crate) fn do_step(
         &mut self,
         time: f64,
         size: f64,
@@ -223,5 +188,46 @@ impl Instance {
     fn is_event_due(&self, time: f64, size: f64) -> bool {
         self.state.next_event.is_some_and(|next| next <= time + ROUNDING * size)
             || self.state.clocks.is_due(time)
+    }
+}
+
+impl Events for Instance {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        Ok(self.next_event_time())
+    }
+
+    /// Enters Event Mode; input clocks that are due tick.
+    fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        self.enter_event()?;
+        self.tick()
+    }
+
+    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it.
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        self.tick()?;
+        if self.is_scheduled() {
+            return self.run_partitions();
+        }
+        self.state.clocks.read_outputs(&mut self.component)?;
+        self.read_clocked()?;
+        let mut info = self.component.update_discrete_states()?;
+        self.state.clocks.end_ticks();
+        if !info.discrete_states_need_update {
+            self.state.clocks.ask_intervals(&mut self.component, self.state.time)?;
+        }
+        self.state.terminate |= info.terminate_simulation;
+        self.state.next_event = info.next_event_time;
+        info.next_event_time = self.next_event_time();
+        Ok(info)
+    }
+
+    /// Enters Step Mode.
+    fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        self.state.clocks.end_event();
+        if !self.is_scheduled() {
+            self.component.enter_step_mode()?;
+        }
+        self.state.mode = Mode::Step;
+        Ok(())
     }
 }

@@ -38,7 +38,7 @@ impl Instance {
         self.tick()?;
         Ok(EventInfo {
             discrete_states_need_update: self.state.clocks.any_active(),
-            next_event_time: self.next_event(),
+            next_event_time: self.next_event_time(),
             ..EventInfo::default()
         })
     }
