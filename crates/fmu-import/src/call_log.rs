@@ -3,7 +3,7 @@
 mod events;
 mod model_exchange;
 
-use std::fmt::{Debug, Write as _};
+use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -207,26 +207,16 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         self.write(&format!(" -> {status}{results}\n"));
     }
 
-    fn get<T: Debug>(
+    /// Logs a call that fills `values`.
+    fn read<T: Debug>(
         &mut self,
         function: &str,
-        references: &[u32],
+        arguments: &str,
         values: &mut [T],
         get: impl FnOnce(&mut S, &mut [T]) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
-        let arguments = format!("{references:?}");
-        let call = |slave: &mut S| get(slave, values).map(|()| format!("{values:?}"));
-        self.call(function, &arguments, call, |values| format!(" {values}")).map(|_| ())
-    }
-
-    fn set<T: Debug>(
-        &mut self,
-        function: &str,
-        references: &[u32],
-        values: &[T],
-        set: impl FnOnce(&mut S) -> Result<(), CallError>,
-    ) -> Result<(), CallError> {
-        self.plain(function, &format!("{references:?}, {values:?}"), set)
+        let call = |slave: &mut S| get(slave, values).map(|()| format!(" {values:?}"));
+        self.call(function, arguments, call, String::clone).map(|_| ())
     }
 
     fn plain(
@@ -251,6 +241,21 @@ impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     }
 }
 
+/// Defines the methods that get and set values.
+macro_rules! values {
+    ($($get:ident $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
+        $(fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
+            let get = |slave: &mut S, values: &mut [$type]| slave.$get(references, values);
+            self.read($get_name, &format!("{references:?}"), values, get)
+        }
+
+        fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
+            let set = |slave: &mut S| slave.$set(references, values);
+            self.plain($set_name, &format!("{references:?}, {values:?}"), set)
+        })*
+    };
+}
+
 impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn description(&self) -> &ModelDescription {
         self.slave.description()
@@ -266,33 +271,18 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         self.plain("fmi3EnterConfigurationMode", &arguments, call)
     }
 
-    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        self.get("fmi3GetBinary", references, values, |slave, values| {
-            slave.get_binary(references, values)
-        })
-    }
-
-    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        self.set("fmi3SetBinary", references, values, |slave| slave.set_binary(references, values))
-    }
-
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         if self.version != Version::V2 {
             // No function of the FMU.
             return self.slave.setup_experiment(experiment);
         }
-        let mut arguments = String::new();
         let Experiment { start_time, stop_time, tolerance } = experiment;
-        // Writing to a String cannot fail.
-        let _ = match tolerance {
-            Some(tolerance) => write!(arguments, "tolerance {tolerance:?}, "),
-            None => write!(arguments, "no tolerance, "),
+        let stated = |what: &str, value: &Option<f64>| match value {
+            Some(value) => format!("{what} {value:?}"),
+            None => format!("no {what}"),
         };
-        let _ = write!(arguments, "start time {start_time:?}, ");
-        let _ = match stop_time {
-            Some(stop) => write!(arguments, "stop time {stop:?}"),
-            None => write!(arguments, "no stop time"),
-        };
+        let (tolerance, stop) = (stated("tolerance", tolerance), stated("stop time", stop_time));
+        let arguments = format!("{tolerance}, start time {start_time:?}, {stop}");
         let call = |slave: &mut S| slave.setup_experiment(experiment);
         self.plain("fmi2SetupExperiment", &arguments, call)
     }
@@ -315,48 +305,12 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         self.slave.free()
     }
 
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        self.get("fmi2GetReal", references, values, |slave, values| {
-            slave.get_real(references, values)
-        })
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.set("fmi2SetReal", references, values, |slave| slave.set_real(references, values))
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        self.get("fmi2GetInteger", references, values, |slave, values| {
-            slave.get_integer(references, values)
-        })
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        self.set("fmi2SetInteger", references, values, |slave| {
-            slave.set_integer(references, values)
-        })
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.get("fmi2GetBoolean", references, values, |slave, values| {
-            slave.get_boolean(references, values)
-        })
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.set("fmi2SetBoolean", references, values, |slave| {
-            slave.set_boolean(references, values)
-        })
-    }
-
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        self.get("fmi2GetString", references, values, |slave, values| {
-            slave.get_string(references, values)
-        })
-    }
-
-    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        self.set("fmi2SetString", references, values, |slave| slave.set_string(references, values))
+    values! {
+        get_real set_real: f64 = "fmi2GetReal" "fmi2SetReal";
+        get_integer set_integer: i64 = "fmi2GetInteger" "fmi2SetInteger";
+        get_boolean set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
+        get_string set_string: String = "fmi2GetString" "fmi2SetString";
+        get_binary set_binary: Vec<u8> = "fmi3GetBinary" "fmi3SetBinary";
     }
 
     fn set_input_derivatives(
@@ -378,11 +332,9 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}, orders {orders:?}");
-        let call = |slave: &mut S| {
-            let done = slave.get_output_derivatives(references, orders, values);
-            done.map(|()| format!(" {values:?}"))
-        };
-        self.call("fmi2GetRealOutputDerivatives", &arguments, call, String::clone).map(|_| ())
+        self.read("fmi2GetRealOutputDerivatives", &arguments, values, |slave, values| {
+            slave.get_output_derivatives(references, orders, values)
+        })
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
@@ -408,11 +360,9 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         changes: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{unknowns:?}, {knowns:?}, {seed:?}");
-        let call = |slave: &mut S| {
-            let done = slave.directional_derivative(unknowns, knowns, seed, changes);
-            done.map(|()| format!(" {changes:?}"))
-        };
-        self.call("fmi2GetDirectionalDerivative", &arguments, call, String::clone).map(|_| ())
+        self.read("fmi2GetDirectionalDerivative", &arguments, changes, |slave, changes| {
+            slave.directional_derivative(unknowns, knowns, seed, changes)
+        })
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {

@@ -30,23 +30,23 @@ impl ModelExchange for LoggedSlave<Equations> {
 
     fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
         let call = |slave: &mut Equations| slave.set_continuous_states(states);
-        self.call("fmi2SetContinuousStates", &format!("{states:?}"), call, |()| String::new())
+        self.plain("fmi2SetContinuousStates", &format!("{states:?}"), call)
     }
 
     fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetContinuousStates", states, Equations::get_continuous_states)
+        self.read("fmi2GetContinuousStates", "", states, Equations::get_continuous_states)
     }
 
     fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetDerivatives", derivatives, Equations::get_derivatives)
+        self.read("fmi2GetDerivatives", "", derivatives, Equations::get_derivatives)
     }
 
     fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetEventIndicators", indicators, Equations::get_event_indicators)
+        self.read("fmi2GetEventIndicators", "", indicators, Equations::get_event_indicators)
     }
 
     fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetNominalsOfContinuousStates", nominals, |slave, to| {
+        self.read("fmi2GetNominalsOfContinuousStates", "", nominals, |slave, to| {
             slave.get_nominals_of_continuous_states(to)
         })
     }
@@ -72,23 +72,6 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
-        let call = |slave: &mut Equations| slave.enter_continuous_time_mode();
-        self.call("fmi2EnterContinuousTimeMode", "", call, |()| String::new())
-    }
-}
-
-impl LoggedSlave<Equations> {
-    /// Logs a call that fills an array.
-    fn read(
-        &mut self,
-        function: &str,
-        values: &mut [f64],
-        get: impl FnOnce(&mut Equations, &mut [f64]) -> Result<(), CallError>,
-    ) -> Result<(), CallError> {
-        let call = |slave: &mut Equations| {
-            let done = get(slave, values);
-            done.map(|()| format!(" {values:?}"))
-        };
-        self.call(function, "", call, String::clone).map(|_| ())
+        self.plain("fmi2EnterContinuousTimeMode", "", Equations::enter_continuous_time_mode)
     }
 }
