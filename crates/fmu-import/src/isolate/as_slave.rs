@@ -39,25 +39,31 @@ fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
     })
 }
 
+/// Defines the methods that are one request.
+macro_rules! requests {
+    ($(fn $method:ident($($argument:ident: $type:ty)?) -> $result:ty = $request:expr;)*) => {
+        $(fn $method(&mut self $(, $argument: $type)?) -> Result<$result, CallError> {
+            self.request(&$request)
+        })*
+    };
+}
+
+/// Defines the methods that get and set numbers.
+macro_rules! numbers {
+    ($($get:ident $set:ident: $type:ty = $get_function:ident $set_function:ident;)*) => {
+        $(fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
+            let read = |reader: &mut Reader<'_>| reader.take_all(values);
+            self.call(Function::$get_function, |writer| writer.put_list(references), read)
+        }
+
+        fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
+            let write = |writer: &mut Writer<'_>| write_pairs(writer, references, values);
+            self.call(Function::$set_function, write, |_| Some(()))
+        })*
+    };
+}
+
 impl Isolated {
-    fn get<T: Word>(
-        &mut self,
-        function: Function,
-        references: &[u32],
-        values: &mut [T],
-    ) -> Result<(), CallError> {
-        self.call(function, |writer| writer.put_list(references), |reader| reader.take_all(values))
-    }
-
-    fn set<T: Word>(
-        &mut self,
-        function: Function,
-        references: &[u32],
-        values: &[T],
-    ) -> Result<(), CallError> {
-        self.call(function, |writer| write_pairs(writer, references, values), |_| Some(()))
-    }
-
     /// Requests one value for each element of `values`.
     fn request_all<T: DeserializeOwned>(
         &mut self,
@@ -107,6 +113,25 @@ impl Background for Isolated {
 }
 
 impl Slave for Isolated {
+    requests! {
+        fn process_changes() -> Vec<String> = Request::ProcessChanges;
+        fn set_debug_logging(on: bool) -> () = Request::SetDebugLogging(on);
+        fn enter_initialization_mode() -> () = Request::EnterInitializationMode;
+        fn exit_initialization_mode() -> () = Request::ExitInitializationMode;
+        fn terminate() -> () = Request::Terminate;
+        fn save_state(slot: usize) -> () = Request::SaveState(slot);
+        fn restore_state(slot: usize) -> () = Request::RestoreState(slot);
+        fn serialize_state() -> Vec<u8> = Request::SerializeState;
+        fn deserialize_state(bytes: &[u8]) -> () = Request::DeserializeState(bytes);
+        fn hand_over_events(stop: bool) -> bool = Request::HandOverEvents(stop);
+    }
+
+    numbers! {
+        get_real set_real: f64 = GetReal SetReal;
+        get_integer set_integer: i64 = GetInteger SetInteger;
+        get_boolean set_boolean: i32 = GetBoolean SetBoolean;
+    }
+
     fn description(&self) -> &ModelDescription {
         self.description.as_ref().unwrap_or(&self.package.description)
     }
@@ -127,57 +152,13 @@ impl Slave for Isolated {
         Ok(())
     }
 
-    fn process_changes(&mut self) -> Result<Vec<String>, CallError> {
-        self.request(&Request::ProcessChanges)
-    }
-
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.request(&Request::SetDebugLogging(on))
-    }
-
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.place.set_time(experiment.start_time);
         self.request(&Request::SetupExperiment(*experiment))
     }
 
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.request(&Request::EnterInitializationMode)
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.request(&Request::ExitInitializationMode)
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
-        self.request(&Request::Terminate)
-    }
-
     fn free(&mut self) -> Result<(), CallError> {
         self.free_instance()
-    }
-
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        self.get(Function::GetReal, references, values)
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.set(Function::SetReal, references, values)
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        self.get(Function::GetInteger, references, values)
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        self.set(Function::SetInteger, references, values)
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.get(Function::GetBoolean, references, values)
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.set(Function::SetBoolean, references, values)
     }
 
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
@@ -243,22 +224,6 @@ impl Slave for Isolated {
         self.request_all(&Request::DirectionalDerivative { unknowns, knowns }, changes)
     }
 
-    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.request(&Request::SaveState(slot))
-    }
-
-    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.request(&Request::RestoreState(slot))
-    }
-
-    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        self.request(&Request::SerializeState)
-    }
-
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        self.request(&Request::DeserializeState(bytes))
-    }
-
     fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         self.begin_advance(request)?;
         self.finish_advance(request)
@@ -268,29 +233,16 @@ impl Slave for Isolated {
         Some(self)
     }
 
-    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
-        self.request(&Request::HandOverEvents(stop))
-    }
-
     fn events(&mut self) -> Option<&mut dyn Events> {
         Some(self)
     }
 }
 
 impl Events for Isolated {
-    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
-        self.request(&Request::NextEvent)
-    }
-
-    fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.request(&Request::EnterEventMode)
-    }
-
-    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        self.request(&Request::UpdateDiscreteStates)
-    }
-
-    fn leave_event_mode(&mut self) -> Result<(), CallError> {
-        self.request(&Request::LeaveEventMode)
+    requests! {
+        fn next_event() -> Option<f64> = Request::NextEvent;
+        fn enter_event_mode() -> () = Request::EnterEventMode;
+        fn update_discrete_states() -> EventInfo = Request::UpdateDiscreteStates;
+        fn leave_event_mode() -> () = Request::LeaveEventMode;
     }
 }

@@ -8,17 +8,7 @@ use super::region::Region;
 
 /// Distance in words between fields that different processes write: one or two cache lines.
 const SPACING: usize = 16;
-const TURN: usize = 0;
-const MASTER_SLEEPS: usize = SPACING;
-const WORKER_SLEEPS: usize = 2 * SPACING;
-const COMMAND: usize = 3 * SPACING;
-const PLACE: usize = 4 * SPACING;
-const LOG_HEAD: usize = 5 * SPACING;
-const LOG_DROPPED: usize = 5 * SPACING + 1;
-const LOG_TAIL: usize = 6 * SPACING;
 const MAGIC: usize = 7 * SPACING;
-const ATTACHED: usize = 7 * SPACING + 1;
-const NO_MEMORY: usize = 7 * SPACING + 2;
 const AREA: usize = 8 * SPACING;
 
 /// Words of the ring of messages: 256 KiB.
@@ -30,6 +20,42 @@ const MIN_AREA: usize = 1 << 13;
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
 const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0002;
+
+/// Defines a method for each field, a word at a position.
+macro_rules! fields {
+    ($($(#[$doc:meta])* $field:ident = $position:expr;)*) => {
+        impl Shared {
+            $($(#[$doc])*
+            #[inline]
+            pub(super) fn $field(&self) -> &AtomicU64 {
+                self.word($position)
+            })*
+        }
+    };
+}
+
+fields! {
+    /// The turn counter: odd when it is the worker's turn, even when it is the master's.
+    turn = 0;
+    /// Not 0 while the master sleeps until it is woken.
+    master_sleeps = SPACING;
+    /// Not 0 while the worker sleeps until it is woken.
+    worker_sleeps = 2 * SPACING;
+    /// The command for the worker.
+    command = 3 * SPACING;
+    /// The number of the function that the worker executes.
+    place = 4 * SPACING;
+    /// Number of words written to the message ring.
+    log_head = 5 * SPACING;
+    /// Number of messages dropped because the ring was full.
+    log_dropped = 5 * SPACING + 1;
+    /// Number of words read from the message ring.
+    log_tail = 6 * SPACING;
+    /// Not 0 once the worker is ready for commands.
+    attached = MAGIC + 1;
+    /// Not 0 if the FMU crashed after a failed allocation.
+    no_memory = MAGIC + 2;
+}
 
 /// The shared memory, with access to its fields.
 pub(super) struct Shared {
@@ -61,64 +87,6 @@ impl Shared {
     #[inline]
     fn word(&self, position: usize) -> &AtomicU64 {
         &self.region.words()[position]
-    }
-
-    /// The turn counter: odd when it is the worker's turn, even when it is the master's.
-    #[inline]
-    pub(super) fn turn(&self) -> &AtomicU64 {
-        self.word(TURN)
-    }
-
-    /// Not 0 while the master sleeps until it is woken.
-    #[inline]
-    pub(super) fn master_sleeps(&self) -> &AtomicU64 {
-        self.word(MASTER_SLEEPS)
-    }
-
-    /// Not 0 while the worker sleeps until it is woken.
-    #[inline]
-    pub(super) fn worker_sleeps(&self) -> &AtomicU64 {
-        self.word(WORKER_SLEEPS)
-    }
-
-    /// The command for the worker.
-    #[inline]
-    pub(super) fn command(&self) -> &AtomicU64 {
-        self.word(COMMAND)
-    }
-
-    /// The number of the function that the worker executes.
-    #[inline]
-    pub(super) fn place(&self) -> &AtomicU64 {
-        self.word(PLACE)
-    }
-
-    /// Number of words written to the message ring.
-    #[inline]
-    pub(super) fn log_head(&self) -> &AtomicU64 {
-        self.word(LOG_HEAD)
-    }
-
-    /// Number of words read from the message ring.
-    #[inline]
-    pub(super) fn log_tail(&self) -> &AtomicU64 {
-        self.word(LOG_TAIL)
-    }
-
-    /// Number of messages dropped because the ring was full.
-    #[inline]
-    pub(super) fn log_dropped(&self) -> &AtomicU64 {
-        self.word(LOG_DROPPED)
-    }
-
-    /// Not 0 once the worker is ready for commands.
-    pub(super) fn attached(&self) -> &AtomicU64 {
-        self.word(ATTACHED)
-    }
-
-    /// Not 0 if the FMU crashed after a failed allocation.
-    pub(super) fn no_memory(&self) -> &AtomicU64 {
-        self.word(NO_MEMORY)
     }
 
     /// The area for the arguments of a command, then for its results.

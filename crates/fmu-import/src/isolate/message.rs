@@ -76,38 +76,28 @@ pub(super) struct Open<'a> {
     pub(super) integration: Option<&'a str>,
 }
 
-impl Request<'_> {
-    /// Returns the function that the errors of the request name.
-    pub(super) fn function(&self) -> Function {
-        match self {
-            Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges => {
-                Function::Instantiate
+/// Defines [`Request::function`]: for most requests it has their name.
+macro_rules! functions {
+    ($($request:ident)*) => {
+        impl Request<'_> {
+            /// Returns the function that the errors of the request name.
+            pub(super) fn function(&self) -> Function {
+                match self {
+                    Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges => {
+                        Function::Instantiate
+                    }
+                    $(Request::$request { .. } => Function::$request,)*
+                }
             }
-            Request::SetDebugLogging(_) => Function::SetDebugLogging,
-            Request::SetupExperiment(_) => Function::SetupExperiment,
-            Request::EnterInitializationMode => Function::EnterInitializationMode,
-            Request::ExitInitializationMode => Function::ExitInitializationMode,
-            Request::Terminate => Function::Terminate,
-            Request::Configure(_) => Function::Configure,
-            Request::GetBinary(_) => Function::GetBinary,
-            Request::SetBinary(_) => Function::SetBinary,
-            Request::GetString(_) => Function::GetString,
-            Request::SetString(_) => Function::SetString,
-            Request::SetInputDerivatives(_) => Function::SetInputDerivatives,
-            Request::GetOutputDerivatives(_) => Function::GetOutputDerivatives,
-            Request::DirectionalDerivative { .. } => Function::DirectionalDerivative,
-            Request::SaveState(_) => Function::SaveState,
-            Request::RestoreState(_) => Function::RestoreState,
-            Request::SerializeState => Function::SerializeState,
-            Request::DeserializeState(_) => Function::DeserializeState,
-            Request::HandOverEvents(_) => Function::HandOverEvents,
-            Request::NextEvent => Function::NextEvent,
-            Request::EnterEventMode => Function::EnterEventMode,
-            Request::UpdateDiscreteStates => Function::UpdateDiscreteStates,
-            Request::LeaveEventMode => Function::LeaveEventMode,
-            Request::Free => Function::Free,
         }
-    }
+    };
+}
+
+functions! {
+    SetDebugLogging SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Configure
+    GetBinary SetBinary GetString SetString SetInputDerivatives GetOutputDerivatives DirectionalDerivative
+    SaveState RestoreState SerializeState DeserializeState
+    HandOverEvents NextEvent EnterEventMode UpdateDiscreteStates LeaveEventMode Free
 }
 
 /// The result of an instantiation.
