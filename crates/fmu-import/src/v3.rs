@@ -92,7 +92,7 @@ impl Instance {
             early_return: flags.has_event_mode || flags.might_return_early_from_do_step,
             intermediate: &intermediate,
         };
-        let (component, event_mode) = match library.instantiate(&with) {
+        let (mut component, event_mode) = match library.instantiate(&with) {
             Ok(component) => (component, with.event_mode),
             // Some FMUs promise Event Mode and lack it.
             Err(error) if with.event_mode => {
@@ -110,7 +110,6 @@ impl Instance {
         let known =
             |name: &&str| description.log_categories.iter().any(|category| category.name == *name);
         let categories: Vec<&str> = STATUS_CATEGORIES.into_iter().filter(known).collect();
-        let mut component = component;
         if !categories.is_empty() {
             // An FMU that refuses this is one without messages.
             let _ = component.set_debug_logging(true, &categories);
@@ -186,11 +185,8 @@ impl Instance {
 
     #[inline]
     pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        if self.view.plain {
-            return self.component.get_float64(list, values);
-        }
-        if self.plans.find(&self.view, list).is_err() {
-            // A value reference that no variable has: the FMU says so.
+        // A value reference that no variable has: the FMU says so.
+        if self.view.plain || self.plans.find(&self.view, list).is_err() {
             return self.component.get_float64(list, values);
         }
         self.read("fmi3GetFloat64", list, values, Buffer::real)
@@ -236,19 +232,11 @@ impl Instance {
         list: &[u32],
         values: &mut [String],
     ) -> Result<(), CallError> {
-        self.read_list("fmi3GetString", list, values, |instance, references, values| {
-            instance.component.get_string(references, values)
-        })
+        self.read_list("fmi3GetString", list, values)
     }
 
     pub(crate) fn set_string(&mut self, list: &[u32], values: &[String]) -> Result<(), CallError> {
-        self.write_list(
-            "fmi3SetString",
-            list,
-            values,
-            |instance, references, values| instance.component.get_string(references, values),
-            |instance, references, values| instance.component.set_string(references, values),
-        )
+        self.write_list("fmi3SetString", list, values)
     }
 
     pub(crate) fn get_binary(
@@ -256,18 +244,10 @@ impl Instance {
         list: &[u32],
         values: &mut [Vec<u8>],
     ) -> Result<(), CallError> {
-        self.read_list("fmi3GetBinary", list, values, |instance, references, values| {
-            instance.component.get_binary(references, values)
-        })
+        self.read_list("fmi3GetBinary", list, values)
     }
 
     pub(crate) fn set_binary(&mut self, list: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        self.write_list(
-            "fmi3SetBinary",
-            list,
-            values,
-            |instance, references, values| instance.component.get_binary(references, values),
-            |instance, references, values| instance.component.set_binary(references, values),
-        )
+        self.write_list("fmi3SetBinary", list, values)
     }
 }

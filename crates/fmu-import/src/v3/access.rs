@@ -12,11 +12,6 @@ use super::plan::Run;
 use super::refusal::refused;
 use slave::CallError;
 
-/// A function that reads the values of whole variables.
-type Get<T> = fn(&mut Instance, &[u32], &mut [T]) -> Result<(), CallError>;
-/// A function that passes the values of whole variables.
-type Set<T> = fn(&mut Instance, &[u32], &[T]) -> Result<(), CallError>;
-
 impl Instance {
     /// Returns the plan of a list, for `function`.
     fn plan(&mut self, function: &'static str, list: &[u32]) -> Result<usize, CallError> {
@@ -114,13 +109,12 @@ impl Instance {
         })
     }
 
-    /// Reads Strings or binaries by `get`.
+    /// Reads Strings or binaries.
     pub(super) fn read_list<T: Listed>(
         &mut self,
         function: &'static str,
         list: &[u32],
         values: &mut [T],
-        get: Get<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |instance, run| {
             if instance.is_silent(run) {
@@ -131,10 +125,10 @@ impl Instance {
                 return Ok(());
             }
             if run.direct {
-                return get(instance, &run.references, values);
+                return T::get(&mut instance.component, &run.references, values);
             }
             let mut all = vec![T::default(); run.shadows.len()];
-            get(instance, &run.references, &mut all)?;
+            T::get(&mut instance.component, &run.references, &mut all)?;
             for &(position, place) in &run.places {
                 values[position].clone_from(&all[place]);
             }
@@ -142,14 +136,12 @@ impl Instance {
         })
     }
 
-    /// Passes Strings or binaries by `set`.
+    /// Passes Strings or binaries.
     pub(super) fn write_list<T: Listed + Hash>(
         &mut self,
         function: &'static str,
         list: &[u32],
         values: &[T],
-        get: Get<T>,
-        set: Set<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |instance, run| {
             let silent = instance.is_silent(run);
@@ -158,7 +150,7 @@ impl Instance {
                 let known = instance.recall_list(run).into_iter();
                 all = known.map(Option::unwrap_or_default).collect();
             } else if run.partial {
-                get(instance, &run.references, &mut all)?;
+                T::get(&mut instance.component, &run.references, &mut all)?;
             }
             for &(position, place) in &run.places {
                 all[place].clone_from(&values[position]);
@@ -170,7 +162,7 @@ impl Instance {
                 return Ok(());
             }
             if instance.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
-                set(instance, &run.references, &all)?;
+                T::set(&mut instance.component, &run.references, &all)?;
             }
             Ok(())
         })

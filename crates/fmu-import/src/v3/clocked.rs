@@ -11,6 +11,7 @@ use super::Instance;
 use super::elements::ElementView;
 use super::mode::Mode;
 use super::plan::Run;
+use crate::library::v3::Component;
 use slave::CallError;
 
 /// The value of an element.
@@ -29,26 +30,41 @@ pub(super) type Memory = BTreeMap<usize, Remembered>;
 pub(super) trait Listed: Clone + Default {
     fn remembered(&self) -> Remembered;
     fn recalled(value: &Remembered) -> Option<&Self>;
+    /// Reads the values of whole variables.
+    fn get(component: &mut Component, list: &[u32], values: &mut [Self]) -> Result<(), CallError>;
+    /// Passes the values of whole variables.
+    fn set(component: &mut Component, list: &[u32], values: &[Self]) -> Result<(), CallError>;
 }
 
-impl Listed for String {
-    fn remembered(&self) -> Remembered {
-        Remembered::Text(self.clone())
-    }
+macro_rules! listed {
+    ($($type:ty: $variant:ident, $get:ident, $set:ident;)*) => {
+        $(impl Listed for $type {
+            fn remembered(&self) -> Remembered {
+                Remembered::$variant(self.clone())
+            }
 
-    fn recalled(value: &Remembered) -> Option<&Self> {
-        if let Remembered::Text(text) = value { Some(text) } else { None }
-    }
+            fn recalled(value: &Remembered) -> Option<&Self> {
+                if let Remembered::$variant(value) = value { Some(value) } else { None }
+            }
+
+            fn get(
+                component: &mut Component,
+                list: &[u32],
+                values: &mut [Self],
+            ) -> Result<(), CallError> {
+                component.$get(list, values)
+            }
+
+            fn set(component: &mut Component, list: &[u32], values: &[Self]) -> Result<(), CallError> {
+                component.$set(list, values)
+            }
+        })*
+    };
 }
 
-impl Listed for Vec<u8> {
-    fn remembered(&self) -> Remembered {
-        Remembered::Bytes(self.clone())
-    }
-
-    fn recalled(value: &Remembered) -> Option<&Self> {
-        if let Remembered::Bytes(bytes) = value { Some(bytes) } else { None }
-    }
+listed! {
+    String: Text, get_string, set_string;
+    Vec<u8>: Bytes, get_binary, set_binary;
 }
 
 /// The calls for all clocked variables of an FMU.
@@ -117,54 +133,45 @@ impl Instance {
             return Ok(());
         }
         let mut runs = std::mem::take(&mut self.clocked.others);
-        let done =
-            runs.iter_mut().filter(|run| run.kind != NativeType::Clock).try_for_each(|run| {
-                if !self.state.clocks.is_active(&run.clocks) {
-                    return Ok(());
+        let done = runs.iter_mut().try_for_each(|run| {
+            if !self.state.clocks.is_active(&run.clocks) {
+                return Ok(());
+            }
+            match run.kind {
+                NativeType::Clock => {}
+                NativeType::String => self.read_and_remember::<String>(run)?,
+                NativeType::Binary => self.read_and_remember::<Vec<u8>>(run)?,
+                _ => {
+                    run.buffer.get(&mut self.component, &run.references)?;
+                    self.remember(run);
                 }
-                match run.kind {
-                    NativeType::String => {
-                        let mut values = vec![String::new(); run.shadows.len()];
-                        self.component.get_string(&run.references, &mut values)?;
-                        self.remember_list(run, &values);
-                    }
-                    NativeType::Binary => {
-                        let mut values = vec![Vec::new(); run.shadows.len()];
-                        self.component.get_binary(&run.references, &mut values)?;
-                        self.remember_list(run, &values);
-                    }
-                    _ => {
-                        run.buffer.get(&mut self.component, &run.references)?;
-                        self.remember(run);
-                    }
-                }
-                Ok(())
-            });
+            }
+            Ok(())
+        });
         self.clocked.others = runs;
         done
+    }
+
+    fn read_and_remember<T: Listed>(&mut self, run: &Run) -> Result<(), CallError> {
+        let mut values = vec![T::default(); run.shadows.len()];
+        T::get(&mut self.component, &run.references, &mut values)?;
+        self.remember_list(run, &values);
+        Ok(())
     }
 
     /// Passes the values that were set last to the clocked inputs of `clocks`, which have started to tick.
     pub(super) fn set_clocked(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         let mut runs = std::mem::take(&mut self.clocked.inputs);
         let done = runs.iter_mut().try_for_each(|run| {
-            if run.kind == NativeType::Clock
-                || !run.clocks.iter().any(|clock| clocks.contains(clock))
-            {
+            if !run.clocks.iter().any(|clock| clocks.contains(clock)) {
                 return Ok(());
             }
             match run.kind {
-                NativeType::String => {
-                    let values: Option<Vec<_>> = self.recall_list(run).into_iter().collect();
-                    values.map_or(Ok(()), |all| self.component.set_string(&run.references, &all))
-                }
-                NativeType::Binary => {
-                    let values: Option<Vec<_>> = self.recall_list(run).into_iter().collect();
-                    values.map_or(Ok(()), |all| self.component.set_binary(&run.references, &all))
-                }
+                NativeType::String => self.set_remembered::<String>(run),
+                NativeType::Binary => self.set_remembered::<Vec<u8>>(run),
+                NativeType::Clock => Ok(()),
                 _ => {
-                    let known = self.recall(run);
-                    if !known {
+                    if !self.recall(run) {
                         return Ok(());
                     }
                     run.buffer.set(&mut self.component, &run.references)
@@ -173,5 +180,10 @@ impl Instance {
         });
         self.clocked.inputs = runs;
         done
+    }
+
+    fn set_remembered<T: Listed>(&mut self, run: &Run) -> Result<(), CallError> {
+        let values: Option<Vec<T>> = self.recall_list(run).into_iter().collect();
+        values.map_or(Ok(()), |all| T::set(&mut self.component, &run.references, &all))
     }
 }

@@ -7,8 +7,8 @@
 use std::collections::{HashMap, HashSet};
 
 use fmu_description::{
-    Causality, Dimension, Elements, Kind, ModelDescription, NativeType, ScalarVariable, Unknown,
-    Variability,
+    Causality, Dimension, Elements, Kind, ModelDescription, ModelStructure, NativeType,
+    ScalarVariable, Unknown, Variability,
 };
 
 /// Largest number of elements of all arrays together.
@@ -186,40 +186,25 @@ fn indices(mut position: usize, extents: &[u64]) -> String {
 
 /// Returns `kind` with the start value of one element.
 fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
+    macro_rules! start {
+        ($variant:ident, $copy:ident) => {
+            match values {
+                Some(Elements::$variant(values)) => values.get(position).$copy(),
+                _ => None,
+            }
+        };
+    }
     let mut kind = kind.clone();
-    let real = || match values {
-        Some(Elements::Real(values)) => values.get(position).copied(),
-        _ => None,
-    };
-    let integer = || match values {
-        Some(Elements::Integer(values)) => values.get(position).copied(),
-        _ => None,
-    };
     match &mut kind {
-        Kind::Boolean(start) => {
-            *start = match values {
-                Some(Elements::Boolean(values)) => values.get(position).copied(),
-                _ => None,
-            }
-        }
-        Kind::String(start) => {
-            *start = match values {
-                Some(Elements::String(values)) => values.get(position).cloned(),
-                _ => None,
-            }
-        }
-        Kind::Binary(attributes) => {
-            attributes.start = match values {
-                Some(Elements::Binary(values)) => values.get(position).cloned(),
-                _ => None,
-            }
-        }
+        Kind::Boolean(start) => *start = start!(Boolean, copied),
+        Kind::String(start) => *start = start!(String, cloned),
+        Kind::Binary(attributes) => attributes.start = start!(Binary, cloned),
         Kind::Clock(_) => {}
         number => {
             if let Some(attributes) = number.as_real_mut() {
-                attributes.start = real();
+                attributes.start = start!(Real, copied);
             } else if let Some(attributes) = number.as_integer_mut() {
-                attributes.start = integer();
+                attributes.start = start!(Integer, copied);
             }
         }
     }
@@ -332,11 +317,11 @@ impl Builder {
             for element in 0..size {
                 let variable = &self.view.description.variables[start + element];
                 let moved = |index: u32| self.moved(index, element);
-                let (mut kind, previous) = (variable.kind.clone(), variable.previous);
+                let mut kind = variable.kind.clone();
                 if let Kind::Real(real) | Kind::Float32(real) = &mut kind {
                     real.derivative = real.derivative.and_then(moved);
                 }
-                let previous = previous.and_then(moved);
+                let previous = variable.previous.and_then(moved);
                 let clocks = description.variables[position].clocks.iter();
                 let clocks = clocks.filter_map(|index| self.moved(*index, 0)).collect();
                 let variable = &mut self.view.description.variables[start + element];
@@ -350,22 +335,24 @@ impl Builder {
         }
         let structure = &description.structure;
         let rows = |rows: &[Unknown]| self.rows(rows);
-        let (outputs, derivatives) = (rows(&structure.outputs), rows(&structure.derivatives));
-        let (initial_unknowns, clocked_states, event_indicators) = (
-            rows(&structure.initial_unknowns),
-            rows(&structure.clocked_states),
-            rows(&structure.event_indicators),
-        );
-        let new = &mut self.view.description.structure;
-        (new.outputs, new.derivatives) = (outputs, derivatives);
-        (new.initial_unknowns, new.clocked_states, new.event_indicators) =
-            (initial_unknowns, clocked_states, event_indicators);
+        self.view.description.structure = ModelStructure {
+            outputs: rows(&structure.outputs),
+            derivatives: rows(&structure.derivatives),
+            initial_unknowns: rows(&structure.initial_unknowns),
+            clocked_states: rows(&structure.clocked_states),
+            event_indicators: rows(&structure.event_indicators),
+        };
         Ok(self.view)
+    }
+
+    /// Returns position and number of the elements of the variable with the 1-based index `index`.
+    fn range(&self, index: u32) -> Option<(usize, usize)> {
+        self.ranges.get((index as usize).checked_sub(1)?).copied()
     }
 
     /// Returns the new 1-based index of an element of the variable with the 1-based index `index`.
     fn moved(&self, index: u32, element: usize) -> Option<u32> {
-        let (start, size) = *self.ranges.get((index as usize).checked_sub(1)?)?;
+        let (start, size) = self.range(index)?;
         if size == 0 {
             return None;
         }
@@ -378,19 +365,11 @@ impl Builder {
         let mut all = Vec::new();
         let mut left = MOST_DEPENDENCIES;
         for row in rows {
-            let Some(&(start, size)) =
-                (row.index as usize).checked_sub(1).and_then(|index| self.ranges.get(index))
-            else {
-                continue;
-            };
+            let Some((start, size)) = self.range(row.index) else { continue };
             let (mut dependencies, mut kinds) = (row.dependencies.clone(), row.kinds.clone());
             if let Some(list) = &row.dependencies {
-                let range = |index: &u32| {
-                    let index = (*index as usize).checked_sub(1)?;
-                    self.ranges.get(index).copied()
-                };
-                let total: usize =
-                    list.iter().filter_map(range).map(|(_, count)| count).sum::<usize>() * size;
+                let ranges = list.iter().filter_map(|index| self.range(*index));
+                let total = ranges.map(|(_, count)| count).sum::<usize>() * size;
                 if total > left {
                     (dependencies, kinds) = (None, None);
                 } else {
@@ -398,7 +377,7 @@ impl Builder {
                     let mut of_all = Vec::new();
                     let mut kinds_of_all = Vec::new();
                     for (k, index) in list.iter().enumerate() {
-                        let Some((start, count)) = range(index) else { continue };
+                        let Some((start, count)) = self.range(*index) else { continue };
                         for element in start..start + count {
                             of_all.extend(u32::try_from(element + 1).ok());
                             kinds_of_all.extend(row.kinds.as_ref().and_then(|kinds| kinds.get(k)));
