@@ -43,9 +43,13 @@ macro_rules! modes {
 }
 pub(super) use modes;
 
-/// Defines the methods of the types whose values are copied, for FMI 1.0 and 2.0.
+/// Defines the methods of the types whose values are copied. `$count` returns the number of references; `$length`
+/// names the number of values, which only the functions of FMI 3.0 get.
 macro_rules! values {
-    ($($visibility:vis fn $get:ident, $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
+    ($(
+        $visibility:vis fn $get:ident, $set:ident: $type:ty =
+            $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
+    )*) => {
         impl Component {
             $(#[doc = concat!("Calls `", $get_name, "`.")]
             ///
@@ -59,11 +63,13 @@ macro_rules! values {
                 values: &mut [$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$get, $get_name);
-                let count = same_length(references, values);
-                // SAFETY: the instance is alive; as many references as values.
-                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                self.base.log_call($get_name, || format!("{references:?}"));
+                let (pointer, count) = (self.base.pointer, $count(references, values));
+                $(let $length = values.len();)?
+                // SAFETY: the instance is alive; both arrays have the stated numbers.
+                let call = |list, array| unsafe { function(pointer, list, count, array $(, $length)?) };
                 let done = canary::read(self.base.guards, references, values, call);
-                self.base.check_guarded($get_name, done, String::new)
+                self.base.check_guarded($get_name, done, || format!(" {values:?}"))
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
@@ -78,9 +84,11 @@ macro_rules! values {
                 values: &[$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$set, $set_name);
-                let count = same_length(references, values);
-                // SAFETY: the instance is alive; as many references as values.
-                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                self.base.log_call($set_name, || format!("{references:?}, {values:?}"));
+                let (pointer, count) = (self.base.pointer, $count(references, values));
+                $(let $length = values.len();)?
+                // SAFETY: the instance is alive; both arrays have the stated numbers.
+                let call = |list, array| unsafe { function(pointer, list, count, array $(, $length)?) };
                 let done = canary::write(self.base.guards, references, values, call);
                 self.base.check_guarded($set_name, done, String::new)
             })*
@@ -89,9 +97,12 @@ macro_rules! values {
 }
 pub(super) use values;
 
-/// Defines the methods for Strings, for FMI 1.0 and 2.0.
+/// Defines the methods for Strings, as `values` does.
 macro_rules! strings {
-    ($visibility:vis fn $get:ident, $set:ident = $get_name:literal $set_name:literal;) => {
+    (
+        $visibility:vis fn $get:ident, $set:ident =
+            $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
+    ) => {
         impl Component {
             #[doc = concat!("Calls `", $set_name, "`.")]
             ///
@@ -104,14 +115,16 @@ macro_rules! strings {
                 values: &[String],
             ) -> Result<(), CallError> {
                 let function = function!(self.$set, $set_name);
-                let count = same_length(references, values);
+                self.base.log_call($set_name, || format!("{references:?}, {values:?}"));
+                let count = $count(references, values);
+                $(let $length = values.len();)?
                 let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
                 let texts: Vec<_> = values.iter().map(std::ffi::CString::as_bytes_with_nul).collect();
                 let (pointer, guards) = (self.base.pointer, self.base.guards);
                 let done = canary::constants(guards, canary::STRING, &texts, |array| {
                     canary::constant(guards, canary::REFERENCES, references, |list| {
-                        // SAFETY: the instance is alive; as many references as terminated strings.
-                        (unsafe { function(pointer, list, count, array.cast()) }, None)
+                        // SAFETY: the instance is alive; both arrays have the stated numbers, of terminated strings.
+                        (unsafe { function(pointer, list, count, array.cast() $(, $length)?) }, None)
                     })
                 });
                 self.base.check_guarded($set_name, done, String::new)
@@ -128,10 +141,12 @@ macro_rules! strings {
                 values: &mut [String],
             ) -> Result<(), CallError> {
                 let function = function!(self.$get, $get_name);
-                let count = same_length(references, values);
-                let mut pointers = vec![std::ptr::null(); count];
-                // SAFETY: the instance is alive; as many references as pointers to write.
-                let call = |list, array| unsafe { function(self.base.pointer, list, count, array) };
+                self.base.log_call($get_name, || format!("{references:?}"));
+                let (pointer, count) = (self.base.pointer, $count(references, values));
+                $(let $length = values.len();)?
+                let mut pointers = vec![std::ptr::null(); values.len()];
+                // SAFETY: the instance is alive; both arrays have the stated numbers.
+                let call = |list, array| unsafe { function(pointer, list, count, array $(, $length)?) };
                 let done = canary::read(self.base.guards, references, &mut pointers, call);
                 self.base.check_guarded($get_name, done, String::new)?;
                 self.base.place.enter(&$get_name);
@@ -269,13 +284,13 @@ modes! {
 }
 
 values! {
-    pub fn get_real, set_real: f64 = "fmi2GetReal" "fmi2SetReal";
-    pub fn get_integer, set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger";
-    pub fn get_boolean, set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
+    pub fn get_real, set_real: f64 = "fmi2GetReal" "fmi2SetReal", same_length;
+    pub fn get_integer, set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger", same_length;
+    pub fn get_boolean, set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean", same_length;
 }
 
 strings! {
-    pub fn get_string, set_string = "fmi2GetString" "fmi2SetString";
+    pub fn get_string, set_string = "fmi2GetString" "fmi2SetString", same_length;
 }
 
 derivatives! {

@@ -160,13 +160,13 @@ modes! {
 }
 
 values! {
-    pub(crate) fn get_real, set_real: f64 = "fmiGetReal" "fmiSetReal";
-    pub(crate) fn get_integer, set_integer: c_int = "fmiGetInteger" "fmiSetInteger";
-    pub(crate) fn get_boolean, set_boolean: c_char = "fmiGetBoolean" "fmiSetBoolean";
+    pub(crate) fn get_real, set_real: f64 = "fmiGetReal" "fmiSetReal", same_length;
+    pub(crate) fn get_integer, set_integer: c_int = "fmiGetInteger" "fmiSetInteger", same_length;
+    pub(crate) fn get_boolean, set_boolean: c_char = "fmiGetBoolean" "fmiSetBoolean", same_length;
 }
 
 strings! {
-    pub(crate) fn get_string, set_string = "fmiGetString" "fmiSetString";
+    pub(crate) fn get_string, set_string = "fmiGetString" "fmiSetString", same_length;
 }
 
 derivatives! {
