@@ -26,7 +26,7 @@ pub(crate) use limit::Limit;
 pub use place::Name;
 pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
 #[cfg(target_os = "linux")]
-pub(crate) use signals::{ENDING_SIGNALS, ignores_hangup};
+pub(crate) use signals::{ENDING_SIGNALS, handle, ignores_hangup};
 #[cfg(unix)]
 pub use signals::{end_copy, leave_file, on_ending_signal};
 
@@ -261,15 +261,6 @@ impl fmt::Write for Line {
     }
 }
 
-/// Returns the message for a crash function that crashes or does not return.
-#[cfg(unix)]
-fn fallback_message() -> Line {
-    let mut line = Line::new();
-    // A line that is too long is cut.
-    let _ = write_fallback(&mut line);
-    line
-}
-
 /// Writes what is known of a crash of a program that called [`leave_file`].
 #[cfg(unix)]
 fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
@@ -282,6 +273,7 @@ fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
     line.write_str("; isolate=True runs each FMU in a process of its own")
 }
 
+/// Writes the message for a crash function that crashes or does not return.
 #[cfg(unix)]
 fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;

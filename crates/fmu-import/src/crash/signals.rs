@@ -19,8 +19,7 @@ use std::time::Duration;
 use libc::{c_int, c_void, siginfo_t};
 
 use super::{
-    EXIT, Line, RECORD, REPORT_LIMIT, STATUS, fallback_message, is_done, last_of_this_thread,
-    place, start_report,
+    EXIT, Line, RECORD, REPORT_LIMIT, STATUS, is_done, last_of_this_thread, place, start_report,
 };
 
 /// The signals that end a process, each with its name and meaning.
@@ -65,13 +64,16 @@ fn is_forked() -> bool {
 
 /// Whether SIGHUP is ignored, as `nohup` asks for.
 pub(crate) fn ignores_hangup() -> bool {
+    handler_of(libc::SIGHUP).is_ok_and(|handler| handler == libc::SIG_IGN)
+}
+
+/// Returns the present handler of a signal.
+fn handler_of(signal: c_int) -> io::Result<libc::sighandler_t> {
     let mut action = MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: asks only; all zeros is a valid value of the structure.
-    let action = unsafe {
-        libc::sigaction(libc::SIGHUP, null(), action.as_mut_ptr());
-        action.assume_init()
-    };
-    action.sa_sigaction == libc::SIG_IGN
+    // SAFETY: asks only.
+    check(unsafe { libc::sigaction(signal, null(), action.as_mut_ptr()) })?;
+    // SAFETY: all zeros is a valid value of the structure.
+    Ok(unsafe { action.assume_init() }.sa_sigaction)
 }
 
 /// The last ending signal that the thread of [`on_ending_signal`] has not seen yet; 0: none.
@@ -100,10 +102,7 @@ pub fn on_ending_signal(react: impl Fn(c_int) + Send + 'static) -> io::Result<()
     }
     let is_handled = |signal: &&c_int| **signal != libc::SIGHUP || !ignores_hangup();
     for signal in ENDING_SIGNALS.iter().filter(is_handled) {
-        let mut action = action(on_arrival);
-        action.sa_flags |= libc::SA_RESTART;
-        // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
-        check(unsafe { libc::sigaction(*signal, &raw const action, null_mut()) })?;
+        handle(*signal, on_arrival, libc::SA_RESTART)?;
     }
     Ok(())
 }
@@ -170,23 +169,35 @@ pub(super) fn install() -> io::Result<()> {
     let stack = libc::stack_t { ss_sp: stack.as_mut_ptr().cast(), ss_flags: 0, ss_size: STACK };
     // SAFETY: the memory is never freed.
     check(unsafe { libc::sigaltstack(&raw const stack, null_mut()) })?;
-    let action = action(on_signal);
     for (signal, _) in FATAL {
-        // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
-        check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })?;
+        handle(signal, on_signal, 0)?;
     }
     // SAFETY: no handler is installed.
     unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
     on_end_of_process()
 }
 
-/// The action of a handler, on the alternate stack if there is one.
-fn action(handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void)) -> libc::sigaction {
+/// Installs a handler, which is async-signal-safe and runs on the alternate stack if there is one.
+pub(crate) fn handle(
+    signal: c_int,
+    handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void),
+    flags: c_int,
+) -> io::Result<()> {
     // SAFETY: all zeros is a valid value of this structure.
     let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     action.sa_sigaction = handler as usize;
-    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
-    action
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | flags;
+    // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
+    check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })
+}
+
+/// Lets `signal`, whose handler calls this, act as by default.
+fn act_as_by_default(signal: c_int) {
+    // SAFETY: restores the default; the signal is delivered when the handler returns.
+    unsafe {
+        libc::signal(signal, libc::SIG_DFL);
+        libc::raise(signal);
+    }
 }
 
 fn check(result: c_int) -> io::Result<()> {
@@ -195,12 +206,7 @@ fn check(result: c_int) -> io::Result<()> {
 
 extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     if is_forked() || is_done() {
-        // SAFETY: restores the default; the signal is delivered when this handler returns.
-        unsafe {
-            libc::signal(signal, libc::SIG_DFL);
-            libc::raise(signal);
-        }
-        return;
+        return act_as_by_default(signal);
     }
     start_report(signal, last_of_this_thread());
     wait();
@@ -212,7 +218,10 @@ fn wait() -> ! {
     if !IS_REPORTER.try_with(Cell::get).unwrap_or(false) {
         std::thread::sleep(REPORT_LIMIT + Duration::from_secs(1));
     }
-    fallback_message().print();
+    let mut line = Line::new();
+    // A line that is too long is cut.
+    let _ = super::write_fallback(&mut line);
+    line.print();
     super::leave(1)
 }
 
@@ -245,13 +254,8 @@ pub fn leave_file(folder: &Path) -> io::Result<()> {
         return Ok(());
     }
     for (signal, _) in FATAL {
-        let mut former = action(write_file);
-        // SAFETY: asks for the present handler.
-        check(unsafe { libc::sigaction(signal, null(), &raw mut former) })?;
-        if former.sa_sigaction == libc::SIG_DFL {
-            let action = action(write_file);
-            // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
-            check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })?;
+        if handler_of(signal)? == libc::SIG_DFL {
+            handle(signal, write_file, 0)?;
         }
     }
     Ok(())
@@ -274,11 +278,7 @@ extern "C" fn write_file(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
             }
         }
     }
-    // SAFETY: restores the default; the signal is delivered when this handler returns.
-    unsafe {
-        libc::signal(signal, libc::SIG_DFL);
-        libc::raise(signal);
-    }
+    act_as_by_default(signal);
 }
 
 pub(super) fn leave(status: c_int) -> ! {

@@ -2,8 +2,6 @@
 #![expect(unsafe_code, reason = "signal handlers")]
 
 use std::io;
-use std::mem::MaybeUninit;
-use std::ptr::null_mut;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 
@@ -11,6 +9,7 @@ use libc::{c_int, c_void, siginfo_t};
 use rustix::process::{Resource, Rlimit, setrlimit};
 
 use super::layout::Shared;
+use crate::crash::handle;
 
 /// The memory in which a crash is recorded.
 static SHARED: OnceLock<Arc<Shared>> = OnceLock::new();
@@ -19,23 +18,12 @@ static SHARED: OnceLock<Arc<Shared>> = OnceLock::new();
 pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
     if SHARED.set(shared.clone()).is_ok() {
         for signal in [libc::SIGSEGV, libc::SIGBUS, libc::SIGABRT] {
-            note_crash(signal)?;
+            // RESETHAND restores the default action, which ends the process as the crash would have.
+            handle(signal, on_signal, libc::SA_RESETHAND)?;
         }
     }
     let limit = Rlimit { current: Some(bytes), maximum: Some(bytes) };
     Ok(setrlimit(Resource::As, limit)?)
-}
-
-fn note_crash(signal: c_int) -> io::Result<()> {
-    // SAFETY: all zeros is a valid value of this structure.
-    let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
-    let handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void) = on_signal;
-    action.sa_sigaction = handler as usize;
-    // RESETHAND restores the default action, which ends the process as the crash would have.
-    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_RESETHAND;
-    // SAFETY: the handler has the signature of SA_SIGINFO, and uses atomics only.
-    let result = unsafe { libc::sigaction(signal, &raw const action, null_mut()) };
-    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
 /// Records the crash if `errno` is ENOMEM. `malloc` sets it on failure and successful calls do not
