@@ -325,14 +325,21 @@ impl Isolated {
         CallError { function, failure, messages: self.inbox.take() }
     }
 
+    fn error(&self, function: Function, failure: Failure) -> CallError {
+        CallError { function: function.name(self.version), failure, messages: Vec::new() }
+    }
+
+    #[cold]
+    fn protocol_error(&self, function: Function, what: &str) -> CallError {
+        self.error(function, Failure::InvalidAnswer(what.to_owned()))
+    }
+
     /// Returns the process identifier of the worker.
     #[must_use]
     pub fn process_id(&self) -> u32 {
         self.process.id()
     }
-}
 
-impl Isolated {
     /// Lets the worker free the instance and end. Does nothing if that has happened already.
     pub(super) fn free_instance(&mut self) -> Result<(), CallError> {
         if self.freed || self.ended.is_some() {
@@ -362,17 +369,6 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
         Ok(Opening::NotPreloaded(reason)) => Err(IsolateError::Preload { reason }),
         Ok(Opening::Refused(reason)) => Err(IsolateError::Refused { instance, reason }),
         Err(source) => Err(IsolateError::Call { instance, source }),
-    }
-}
-
-impl Isolated {
-    fn error(&self, function: Function, failure: Failure) -> CallError {
-        CallError { function: function.name(self.version), failure, messages: Vec::new() }
-    }
-
-    #[cold]
-    fn protocol_error(&self, function: Function, what: &str) -> CallError {
-        self.error(function, Failure::InvalidAnswer(what.to_owned()))
     }
 }
 

@@ -3,7 +3,6 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 
@@ -51,22 +50,6 @@ pub fn worker_with(_: Integrator) -> Result<(), WorkerError> {
 
 impl Slave for Isolated {
     fn description(&self) -> &ModelDescription {
-        match self.never {}
-    }
-
-    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-        match self.never {}
-    }
-
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        match self.never {}
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        match self.never {}
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
         match self.never {}
     }
 

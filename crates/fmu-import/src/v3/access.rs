@@ -9,19 +9,10 @@ use super::buffer::Buffer;
 use super::clocked::Listed;
 use super::mode::Mode;
 use super::plan::Run;
-use super::refusal::refused;
+use super::refusal::{refused, unknown};
 use slave::CallError;
 
 impl Instance {
-    /// Returns the plan of a list, for `function`.
-    fn plan(&mut self, function: &'static str, list: &[u32]) -> Result<usize, CallError> {
-        self.plans.find(&self.view, list).map_err(|reference| {
-            let what =
-                format!("cannot access the value reference {reference}, which no variable has");
-            refused(function, what)
-        })
-    }
-
     /// Performs `action` for the runs of the plan of a list.
     fn for_runs(
         &mut self,
@@ -29,7 +20,8 @@ impl Instance {
         list: &[u32],
         mut action: impl FnMut(&mut Self, &mut Run) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
-        let plan = self.plan(function, list)?;
+        let plan = self.plans.find(&self.view, list);
+        let plan = plan.map_err(|reference| unknown(function, reference))?;
         let mut runs = self.plans.take(plan);
         let done = runs.iter_mut().try_for_each(|run| action(self, run));
         self.plans.put_back(plan, runs);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Instance;
-use super::refusal::refused;
+use super::refusal::unknown;
 use slave::CallError;
 
 /// Variables of the FMU, and where the values of a list are among the values of a call.
@@ -30,11 +30,8 @@ impl Instance {
         let mut whole = Whole { references: Vec::new(), count: 0, places: Vec::new() };
         let mut known: HashMap<usize, usize> = HashMap::new();
         for &reference in list {
-            let Some((number, element)) = self.view.locate(reference) else {
-                let what =
-                    format!("cannot access the value reference {reference}, which no variable has");
-                return Err(refused(function, what));
-            };
+            let (number, element) =
+                self.view.locate(reference).ok_or_else(|| unknown(function, reference))?;
             let variable = &self.view.variables[number];
             let first = *known.entry(number).or_insert_with(|| {
                 let first = whole.count;
