@@ -39,6 +39,7 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 /// returns a [`CallError`]. The default implementation of an optional function returns
 /// [`Failure::Missing`], that of a function which only begins or ends a mode does nothing.
 #[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
+#[expect(unused_variables, reason = "arguments of functions that an implementation may leave out")]
 pub trait Slave: Send {
     /// Returns the model description of the FMU, in which each element of an array is a scalar variable.
     ///
@@ -53,7 +54,6 @@ pub trait Slave: Send {
 
     /// `fmi2SetDebugLogging` for all categories.
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        let _ = on;
         Err(absent("fmi2SetDebugLogging"))
     }
 
@@ -62,13 +62,11 @@ pub trait Slave: Send {
     ///
     /// Arrays change their sizes, so [`Slave::description`] has other variables afterwards.
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi3EnterConfigurationMode"))
     }
 
     /// `fmi2SetupExperiment`.
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
-        let _ = experiment;
         Ok(())
     }
 
@@ -101,51 +99,43 @@ pub trait Slave: Send {
 
     /// `fmi2GetInteger`, also for enumerations and for the integer types of FMI 3.0.
     fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2GetInteger"))
     }
 
     /// `fmi2SetInteger`, also for enumerations and for the integer types of FMI 3.0.
     fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2SetInteger"))
     }
 
     /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks, otherwise if it has ticked in
     /// the last step or in the instant at its end.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2GetBoolean"))
     }
 
     /// `fmi2SetBoolean`: 0 is false. True makes a triggered input clock tick: in event mode now, otherwise at the
     /// start of the next step.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2SetBoolean"))
     }
 
     /// `fmi2GetString`.
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2GetString"))
     }
 
     /// `fmi2SetString`.
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi2SetString"))
     }
 
     /// `fmi3GetBinary`.
     fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi3GetBinary"))
     }
 
     /// `fmi3SetBinary`.
     fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        let _ = (references, values);
         Err(absent("fmi3SetBinary"))
     }
 
@@ -156,7 +146,6 @@ pub trait Slave: Send {
         orders: &[i32],
         values: &[f64],
     ) -> Result<(), CallError> {
-        let _ = (references, orders, values);
         Err(absent("fmi2SetRealInputDerivatives"))
     }
 
@@ -167,7 +156,6 @@ pub trait Slave: Send {
         orders: &[i32],
         values: &mut [f64],
     ) -> Result<(), CallError> {
-        let _ = (references, orders, values);
         Err(absent("fmi2GetRealOutputDerivatives"))
     }
 
@@ -184,19 +172,16 @@ pub trait Slave: Send {
         seed: &[f64],
         changes: &mut [f64],
     ) -> Result<(), CallError> {
-        let _ = (unknowns, knowns, seed, changes);
         Err(absent("fmi2GetDirectionalDerivative"))
     }
 
     /// `fmi2GetFMUstate`: saves the present state in `slot` (0, 1, 2, ...) and overwrites an earlier one.
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let _ = slot;
         Err(absent("fmi2GetFMUstate"))
     }
 
     /// `fmi2SetFMUstate`: restores the state saved in `slot`. The slot keeps it.
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let _ = slot;
         Err(absent("fmi2SetFMUstate"))
     }
 
@@ -207,7 +192,6 @@ pub trait Slave: Send {
 
     /// `fmi2DeSerializeFMUstate` and `fmi2SetFMUstate`: restores a serialised state.
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let _ = bytes;
         Err(absent("fmi2DeSerializeFMUstate"))
     }
 
@@ -261,7 +245,6 @@ pub trait Slave: Send {
     /// * ends a step with [`StepResult::Event`] if an event happens at the end of the step, or, with `stop`, at the
     ///   first event. Without `stop` it handles earlier events itself.
     fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
-        let _ = stop;
         Ok(false)
     }
 
@@ -274,7 +257,6 @@ pub trait Slave: Send {
     /// status, results and the end of the line after it. False if the slave cannot do so; the caller
     /// then logs the functions of this trait.
     fn log_calls(&mut self, sink: CallSink) -> bool {
-        drop(sink);
         false
     }
 
