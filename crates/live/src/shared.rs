@@ -48,17 +48,15 @@ pub(crate) struct Shared {
 
 impl Shared {
     pub(crate) fn new(events: Receiver<Event>, store: Store, phase: Phase) -> Self {
-        let shared = Self {
+        Self {
             flags: AtomicU8::new(REQUEST),
-            phase: AtomicU8::new(0),
+            phase: AtomicU8::new(phase as u8),
             cost: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
             closed: AtomicBool::new(false),
             events: Mutex::new(events),
             store: Mutex::new(store),
-        };
-        shared.set_phase(phase);
-        shared
+        }
     }
 
     #[inline]
@@ -88,12 +86,7 @@ impl Shared {
     }
 
     pub(crate) fn set_phase(&self, phase: Phase) {
-        let number = match phase {
-            Phase::Running => 0,
-            Phase::Paused => 1,
-            Phase::Ended => 2,
-        };
-        self.phase.store(number, Ordering::Release);
+        self.phase.store(phase as u8, Ordering::Release);
     }
 
     pub(crate) fn cost(&self) -> Duration {

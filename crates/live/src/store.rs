@@ -74,6 +74,7 @@ pub(crate) struct Query {
 }
 
 /// The state of a run on the side of the server.
+#[derive(Default)]
 pub(crate) struct Store {
     signals: usize,
     rows: VecDeque<Row>,
@@ -93,19 +94,7 @@ pub(crate) struct Store {
 impl Store {
     /// Creates the store of a run with this number of signals that starts at `start` s.
     pub(crate) fn new(signals: usize, start: f64) -> Self {
-        Self {
-            signals,
-            rows: VecDeque::new(),
-            last: Sample { time: start, ..Sample::default() },
-            row_number: 0,
-            messages: VecDeque::new(),
-            message_count: 0,
-            counts: BTreeMap::new(),
-            interventions: Vec::new(),
-            outcome: None,
-            asked: None,
-            outcome_shown: false,
-        }
+        Self { signals, last: Sample { time: start, ..Sample::default() }, ..Self::default() }
     }
 
     pub(crate) fn add(&mut self, event: Event) {
