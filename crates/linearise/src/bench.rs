@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::differences::{Side, extrapolate, reach};
 use super::parts::{Part, Parts};
-use super::point::{NAME, initialise, read};
+use super::point::{NAME, finite, initialise, read};
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
 use fmu_import::Instance;
@@ -25,6 +25,7 @@ const DRIFT: f64 = 1e-6;
 const HEIGHTS: usize = 3;
 
 /// The instance, its saved state at the operating point, and the variables to set and read.
+#[derive(Clone)]
 pub(super) struct Bench<'p> {
     /// Shared by the benches of all step sizes, because an FMU may allow only one instance.
     component: Rc<RefCell<Instance>>,
@@ -68,19 +69,7 @@ impl<'p> Bench<'p> {
 
     /// Returns a bench for the same instance with another step.
     pub(super) fn with_step(&self, step: f64) -> Self {
-        Self {
-            component: Rc::clone(&self.component),
-            parts: self.parts,
-            states: self.states,
-            inputs: self.inputs.clone(),
-            readings: self.readings.clone(),
-            x: self.x.clone(),
-            u: self.u.clone(),
-            y: self.y.clone(),
-            start: self.start,
-            step,
-            rest: DMatrix::zeros(0, 0),
-        }
+        Self { step, ..self.clone() }
     }
 
     /// Returns the typical size of reading `k`: states first, then outputs.
@@ -104,13 +93,9 @@ impl<'p> Bench<'p> {
         let mut row = vec![0.0; self.readings.len()];
         for step in 0..=count {
             component.get_real(&self.readings, &mut row)?;
-            for (column, &value) in row.iter().enumerate() {
-                if !value.is_finite() {
-                    let part = self.states.iter().chain(&self.parts.outputs).nth(column);
-                    let name = part.map_or_else(String::new, |part| part.name.clone());
-                    return Err(LineariseError::NotFinite { name, value });
-                }
-                readings[(step, column)] = value;
+            let parts = self.states.iter().chain(&self.parts.outputs);
+            for (column, (part, &value)) in parts.zip(&row).enumerate() {
+                readings[(step, column)] = finite(&part.name, value)?;
             }
             if step < count {
                 let value = |(input, u): (usize, &f64)| u + deviation(step, input);

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::LineariseError;
 use super::parts::Part;
-use super::point::{Equations, Known};
+use super::point::Equations;
 
 /// Number of steps of a ladder.
 const LEVELS: usize = 8;
@@ -159,26 +159,20 @@ pub(super) fn of_equations(
     equations: &mut Equations,
     scales: &[f64],
 ) -> Result<Differences, LineariseError> {
-    let (n, m) = (equations.states.len(), equations.parts.inputs.len());
-    let rows = n + equations.parts.outputs.len();
+    let rows = equations.states.len() + equations.parts.outputs.len();
     let mut differences = Differences {
-        jacobian: DMatrix::zeros(rows, n + m),
-        errors: DMatrix::zeros(rows, n + m),
-        steps: Vec::with_capacity(n + m),
+        jacobian: DMatrix::zeros(rows, scales.len()),
+        errors: DMatrix::zeros(rows, scales.len()),
+        steps: Vec::with_capacity(scales.len()),
     };
-    let mut columns = Vec::with_capacity(n + m);
+    let mut columns = Vec::with_capacity(scales.len());
     // The rounding error of a sum is that of its largest term, which may be much larger than the
     // sum.
     let mut magnitudes = vec![0.0_f64; rows];
     for (column, scale) in scales.iter().enumerate() {
-        let (known, value, part) = if column < n {
-            (Known::State(column), equations.x[column], &equations.states[column].part)
-        } else {
-            let input = column - n;
-            (Known::Input(input), equations.u[input], &equations.parts.inputs[input])
-        };
+        let (part, value) = equations.known(column);
         let (side, first) = reach(part, value, FIRST * scale)?;
-        let function = |at| equations.evaluate(Some((known, at)));
+        let function = |at| equations.evaluate(Some((column, at)));
         let samples = Samples::of(function, value, side, first)?;
         for (row, magnitude) in magnitudes.iter_mut().enumerate() {
             let term = samples.slopes[row][LEVELS / 2] * value.abs().max(first);

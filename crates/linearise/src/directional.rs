@@ -15,10 +15,7 @@ pub(super) fn jacobian(
     parts: &Parts,
     states: &[State],
 ) -> Result<DMatrix<f64>, LineariseError> {
-    let columns = states.iter().map(|state| &state.part).chain(&parts.inputs);
-    let knowns: Vec<u32> = columns.map(|part| part.reference).collect();
-    let rates = states.iter().map(|state| state.derivative);
-    let rows: Vec<u32> = rates.chain(parts.outputs.iter().map(|part| part.reference)).collect();
+    let (rows, knowns) = references(parts, states);
     let asked: Vec<usize> = (0..rows.len()).filter(|&row| !knowns.contains(&rows[row])).collect();
     listed(parts, states, &rows, &asked)?;
     let unknowns: Vec<u32> = asked.iter().map(|&row| rows[row]).collect();
@@ -38,6 +35,14 @@ pub(super) fn jacobian(
         }
     }
     Ok(jacobian)
+}
+
+/// Returns the value references of the rows, state derivatives and outputs, and of the columns, states and inputs.
+pub(super) fn references(parts: &Parts, states: &[State]) -> (Vec<u32>, Vec<u32>) {
+    let rates = states.iter().map(|state| state.derivative);
+    let rows = rates.chain(parts.outputs.iter().map(|part| part.reference)).collect();
+    let columns = states.iter().map(|state| &state.part).chain(&parts.inputs);
+    (rows, columns.map(|part| part.reference).collect())
 }
 
 /// Checks that `Outputs` or `Derivatives` list the variable: only those have directional

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use slave::ModelExchange;
 
 use super::parts::{Part, Parts, State};
-use super::point::{NAME, all_settable, finite, initialise, row_name, settle};
+use super::point::{NAME, all_settable, finite, initialise, nominals, row_name, settle};
 use super::{Linearise, LineariseError, directional};
 
 /// Relative steps of two-sided differences: the cube root of the machine epsilon.
@@ -98,27 +98,20 @@ impl PlantEquations {
         }
         let mut start = vec![0.0; states.len()];
         component.get_continuous_states(&mut start)?;
-        let mut nominals = vec![1.0; states.len()];
-        if component.get_nominals_of_continuous_states(&mut nominals).is_err() {
-            nominals.fill(1.0);
-        }
+        let nominals = nominals(&mut *component, states.len());
         let of_states = states.iter().zip(&nominals).zip(&start);
         let of_states = of_states.map(|((state, nominal), x)| match state.part.typical {
             None if *nominal > 0.0 && nominal.to_bits() != 1.0_f64.to_bits() => *nominal,
             _ => state.part.scale(*x),
         });
         let scales = of_states.chain(parts.inputs.iter().map(|part| part.scale(0.0))).collect();
-        let rates = states.iter().map(|state| state.derivative);
         let indicators = vec![0.0; component.number_of_event_indicators()?];
         let count = states.len() + parts.outputs.len();
         let names = Names {
             states: states.iter().map(|state| state.part.name.clone()).collect(),
             rows: (0..count).map(|row| row_name(states, parts, row)).collect(),
         };
-        let known_states = states.iter().map(|state| state.part.reference);
-        let knowns: Vec<u32> =
-            known_states.chain(parts.inputs.iter().map(|part| part.reference)).collect();
-        let rows: Vec<u32> = rates.chain(parts.outputs.iter().map(|part| part.reference)).collect();
+        let (rows, knowns) = directional::references(parts, states);
         let is = |row: usize| knowns.iter().position(|known| *known == rows[row]);
         let asked_rows: Vec<usize> = (0..count).filter(|&row| is(row).is_none()).collect();
         Ok(Self {

@@ -32,7 +32,7 @@ pub use result::{Differences, Disagreement, Linearisation, Matrices, Method, Sig
 use fmu_import::Fmu;
 use fmu_import::Interface;
 use parts::{Part, Parts, State};
-use point::{Equations, NAME, all_settable, initialise, read};
+use point::{Equations, NAME, all_settable, initialise, nominals, read};
 use result::{MethodResult, RawResult, assemble};
 
 /// Communication steps in s that are tried if the FMU states none.
@@ -151,19 +151,18 @@ fn by_equations(
     let mut equations = Equations::at(fmu, parts, states, request)?;
     let mut values = equations.evaluate(None)?;
     let outputs = values.split_off(states.len());
+    let nominals = nominals(&mut *equations.component, states.len());
     let mut with_nominals: Vec<Part> = states.iter().map(|state| state.part.clone()).collect();
-    for (part, nominal) in with_nominals.iter_mut().zip(equations.nominals()) {
+    for (part, nominal) in with_nominals.iter_mut().zip(nominals) {
         let told = nominal.is_finite() && nominal > 0.0 && nominal.to_bits() != 1.0_f64.to_bits();
         if told && !request.typical.iter().any(|(name, _)| *name == part.name) {
             part.typical = Some(nominal);
         }
     }
     let scales = scales(&with_nominals, &equations.x, &parts.inputs, &equations.u);
-    let derivatives = if differentiates {
-        Some(directional::jacobian(&mut *equations.component, parts, states)?)
-    } else {
-        None
-    };
+    let derivatives = differentiates
+        .then(|| directional::jacobian(&mut *equations.component, parts, states))
+        .transpose()?;
     let differences = differences::of_equations(&mut equations, &scales);
     let (jacobian, how) = match (derivatives, differences) {
         (Some(jacobian), differences) => {
@@ -233,54 +232,42 @@ fn by_steps(
         return Err(LineariseError::StatesNotNamed { model, candidates });
     }
     let preferred = parts.description.default_experiment.and_then(|default| default.step_size);
-    let (step, record) = match request.step.or(preferred) {
+    let raw = match request.step.or(preferred) {
         None => by_derived_step(fmu, parts, &states, request)?,
         Some(step) if step.is_finite() && step > 0.0 => {
-            (step, steps::of_steps(fmu, parts, &states, request, step)?)
+            steps::of_steps(fmu, parts, &states, request, step)?.raw
         }
         Some(value) => {
             let (what, expected) = ("the step".to_owned(), "a finite number of s above zero");
             return Err(LineariseError::Number { what, value, expected });
         }
     };
-    let heights = parts.inputs.iter().map(|part| part.name.clone()).zip(record.heights).collect();
-    let how = Differences::OfSteps { step, count: record.count, heights, missed: record.missed };
-    let findings = RawResult {
-        states,
-        x: record.x,
-        u: record.u,
-        y: record.y,
-        rates: record.rates,
-        jacobian: record.jacobian,
-        how: MethodResult::Differences(how, record.errors),
-    };
-    assemble(parts, request, findings)
+    assemble(parts, request, raw)
 }
 
-/// Linearises by communication steps of several sizes, for an FMU that states none; returns the step
-/// of the most accurate result, and that.
+/// Linearises by communication steps of several sizes, for an FMU that states none; returns the most
+/// accurate result.
 fn by_derived_step(
     fmu: &Fmu,
     parts: &Parts,
     states: &[Part],
     request: &Linearise,
-) -> Result<(f64, steps::RecordResult), LineariseError> {
+) -> Result<RawResult, LineariseError> {
     let experiment = parts.description.default_experiment;
     let length = experiment
         .and_then(|experiment| Some(experiment.stop_time? - experiment.start_time.unwrap_or(0.0)));
     let of_length = length.filter(|length| length.is_finite() && *length > 0.0);
-    let mut tried: Vec<f64> = of_length.map(|length| length / 1000.0).into_iter().collect();
-    tried.extend(
-        STEPS.iter().filter(|step| tried.first() != Some(step)).copied().collect::<Vec<_>>(),
-    );
-    let mut best: Option<(f64, steps::RecordResult)> = None;
+    let first = of_length.map(|length| length / 1000.0);
+    let others = STEPS.into_iter().filter(|step| first != Some(*step));
+    let tried: Vec<f64> = first.into_iter().chain(others).collect();
+    let mut best: Option<steps::RecordResult> = None;
     let mut reason = None;
     for &step in &tried {
         match steps::of_steps(fmu, parts, states, request, step) {
             Ok(record) => {
                 let enough = record.relative < ACCURATE;
-                if best.as_ref().is_none_or(|(_, known)| record.relative < known.relative) {
-                    best = Some((step, record));
+                if best.as_ref().is_none_or(|known| record.relative < known.relative) {
+                    best = Some(record);
                 }
                 if enough {
                     break;
@@ -289,14 +276,11 @@ fn by_derived_step(
             Err(error) => reason = reason.or(Some(error)),
         }
     }
-    match (best, reason) {
-        (Some(best), _) => Ok(best),
-        (None, reason) => {
-            let model = parts.description.model_name.clone();
-            let reason = reason.unwrap_or(LineariseError::Empty { list: "communication steps" });
-            Err(LineariseError::NoStep { model, tried, reason: Box::new(reason) })
-        }
-    }
+    best.map(|record| record.raw).ok_or_else(|| {
+        let model = parts.description.model_name.clone();
+        let reason = reason.unwrap_or(LineariseError::Empty { list: "communication steps" });
+        LineariseError::NoStep { model, tried, reason: Box::new(reason) }
+    })
 }
 
 /// Lists the continuous Reals that may be states, as part of a sentence.

@@ -1,5 +1,7 @@
 //! Resolves the names of a request to variables and their roles.
 
+use std::collections::HashSet;
+
 use fmu_description::{
     Causality, Initial, Kind, ModelDescription, RealType, ScalarVariable, Variability,
 };
@@ -7,6 +9,9 @@ use fmu_description::{
 use super::{Linearise, LineariseError};
 use fmu_description::similar::nearest;
 use slave::Value;
+
+/// The causalities of states and outputs.
+const READABLE: [Causality; 2] = [Causality::Output, Causality::Local];
 
 /// A Real variable that is a state, an input or an output.
 #[derive(Clone, Debug)]
@@ -75,8 +80,7 @@ impl<'a> Parts<'a> {
         };
         let inputs = request.inputs.iter().chain(&request.faults);
         let inputs = inputs.map(|name| part(name, &[Causality::Input], "an input"));
-        let readable = [Causality::Output, Causality::Local];
-        let outputs = request.outputs.iter().map(|name| part(name, &readable, "an output"));
+        let outputs = request.outputs.iter().map(|name| part(name, &READABLE, "an output"));
         for (name, size) in &request.typical {
             find(description, name)?;
             if !(size.is_finite() && *size > 0.0) {
@@ -110,8 +114,7 @@ impl<'a> Parts<'a> {
                 let text = format!("the variable {index} is not the derivative of a state");
                 return Err(LineariseError::Structure { text });
             };
-            let allowed = [Causality::Output, Causality::Local];
-            let part = part(self.description, request, state, &allowed, "a state")?;
+            let part = part(self.description, request, state, &READABLE, "a state")?;
             states.push(State { part, derivative: derivative.value_reference });
         }
         Ok(states)
@@ -119,10 +122,9 @@ impl<'a> Parts<'a> {
 
     /// Returns the variables that the request names as states.
     pub(super) fn named_states(&self, request: &Linearise) -> Result<Vec<Part>, LineariseError> {
-        let allowed = [Causality::Output, Causality::Local];
         let named = request.states.iter().map(|name| {
             let variable = find(self.description, name)?;
-            part(self.description, request, variable, &allowed, "a state")
+            part(self.description, request, variable, &READABLE, "a state")
         });
         named.collect()
     }
@@ -132,14 +134,11 @@ fn distinct<'n>(
     names: impl IntoIterator<Item = &'n String>,
     list: &'static str,
 ) -> Result<(), LineariseError> {
-    let mut earlier = Vec::new();
-    for name in names {
-        if earlier.contains(&name) {
-            return Err(LineariseError::Twice { name: name.clone(), list });
-        }
-        earlier.push(name);
+    let mut earlier = HashSet::new();
+    match names.into_iter().find(|name| !earlier.insert(*name)) {
+        Some(name) => Err(LineariseError::Twice { name: name.clone(), list }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 pub(super) fn find<'a>(

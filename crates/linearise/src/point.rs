@@ -96,13 +96,6 @@ pub(super) fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
     Err(LineariseError::NotFinite { name: name.to_owned(), value })
 }
 
-/// The variable to change about the operating point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Known {
-    State(usize),
-    Input(usize),
-}
-
 /// A model exchange instance in continuous-time mode at the operating point.
 pub(super) struct Equations<'p> {
     pub(super) component: Box<dyn ModelExchange>,
@@ -152,34 +145,29 @@ impl<'p> Equations<'p> {
         Ok(Self { component, parts, states, x, u, inputs, outputs, returns })
     }
 
-    /// Returns the current nominal value of each state; 1 if the FMU does not state it.
-    pub(super) fn nominals(&mut self) -> Vec<f64> {
-        let mut nominals = vec![1.0; self.states.len()];
-        let told = self.component.get_nominals_of_continuous_states(&mut nominals);
-        if told.is_err() { vec![1.0; self.states.len()] } else { nominals }
+    /// Returns the state or input of a column of the Jacobian and its value at the operating point.
+    pub(super) fn known(&self, column: usize) -> (&'p Part, f64) {
+        match column.checked_sub(self.states.len()) {
+            None => (&self.states[column].part, self.x[column]),
+            Some(input) => (&self.parts.inputs[input], self.u[input]),
+        }
     }
 
-    /// Evaluates derivatives and outputs with one variable at `value` and all others at the
+    /// Evaluates derivatives and outputs with the variable of one column at another value and all others at the
     /// operating point.
     pub(super) fn evaluate(
         &mut self,
-        change: Option<(Known, f64)>,
+        change: Option<(usize, f64)>,
     ) -> Result<Vec<f64>, LineariseError> {
         if self.returns {
             self.component.restore_state(0)?;
         }
         let (mut x, mut u) = (self.x.clone(), self.u.clone());
-        let mut changed = None;
-        match change {
-            Some((Known::State(k), value)) => {
-                x[k] = value;
-                changed = Some((&self.states[k].part.name, value));
+        if let Some((column, value)) = change {
+            match column.checked_sub(x.len()) {
+                None => x[column] = value,
+                Some(input) => u[input] = value,
             }
-            Some((Known::Input(k), value)) => {
-                u[k] = value;
-                changed = Some((&self.parts.inputs[k].name, value));
-            }
-            None => {}
         }
         let mut values = vec![0.0; self.states.len() + self.outputs.len()];
         let (derivatives, outputs) = values.split_at_mut(self.states.len());
@@ -192,8 +180,8 @@ impl<'p> Equations<'p> {
                 if outputs.is_empty() { Ok(()) } else { component.get_real(&self.outputs, outputs) }
             })
             .and_then(|()| component.get_derivatives(derivatives));
-        done.map_err(|source| match changed {
-            Some((name, value)) => refused(name, &value, source),
+        done.map_err(|source| match change {
+            Some((column, value)) => refused(&self.known(column).0.name, &value, source),
             None => LineariseError::Call(source),
         })?;
         for (row, &value) in values.iter().enumerate() {
@@ -201,6 +189,15 @@ impl<'p> Equations<'p> {
         }
         Ok(values)
     }
+}
+
+/// Returns the current nominal value of each of `count` states; 1 if the FMU does not state it.
+pub(super) fn nominals(component: &mut dyn ModelExchange, count: usize) -> Vec<f64> {
+    let mut nominals = vec![1.0; count];
+    if component.get_nominals_of_continuous_states(&mut nominals).is_err() {
+        nominals.fill(1.0);
+    }
+    nominals
 }
 
 /// Returns the name of a row of the Jacobian: a state derivative or an output.

@@ -8,7 +8,7 @@ use super::bench::{Bench, Record, index};
 use super::differences::{Side, extrapolate};
 use super::fit::{Directions, least_squares};
 use super::parts::{Part, Parts};
-use super::result::relative_error;
+use super::result::{Differences, MethodResult, RawResult, relative_error};
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
 
@@ -32,19 +32,7 @@ const MAX_PREDICTION_ERROR: f64 = 1e-2;
 
 /// The result of records of one length.
 pub(super) struct RecordResult {
-    pub(super) x: Vec<f64>,
-    pub(super) u: Vec<f64>,
-    pub(super) y: Vec<f64>,
-    /// x' at the operating point.
-    pub(super) rates: Vec<f64>,
-    pub(super) jacobian: DMatrix<f64>,
-    pub(super) errors: DMatrix<f64>,
-    /// Number of steps of the record.
-    pub(super) count: usize,
-    /// Height of the pulse of each input.
-    pub(super) heights: Vec<f64>,
-    /// Relative prediction error for an input signal that the fit did not use.
-    pub(super) missed: f64,
+    pub(super) raw: RawResult,
     /// The largest error relative to its row.
     pub(super) relative: f64,
 }
@@ -149,18 +137,19 @@ fn of_count(
     if relative.is_nan() || relative > MAX_ERROR {
         return Err(LineariseError::Inaccurate { relative, allowed: MAX_ERROR });
     }
-    Ok(RecordResult {
-        rates: (0..n).map(|k| values[(k, columns)]).collect(),
-        relative,
-        jacobian,
-        errors,
-        count,
-        heights: record.pulses.iter().map(|pulse| pulse.1).collect(),
-        missed,
+    let names = parts.inputs.iter().map(|part| part.name.clone());
+    let heights = names.zip(record.pulses.iter().map(|pulse| pulse.1)).collect();
+    let how = Differences::OfSteps { step: bench.step, count, heights, missed };
+    let raw = RawResult {
+        states: states.to_vec(),
         x: bench.x.clone(),
         u: bench.u.clone(),
         y: bench.y.clone(),
-    })
+        rates: (0..n).map(|k| values[(k, columns)]).collect(),
+        jacobian,
+        how: MethodResult::Differences(how, errors),
+    };
+    Ok(RecordResult { raw, relative })
 }
 
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
