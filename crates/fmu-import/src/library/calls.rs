@@ -21,15 +21,20 @@ macro_rules! function {
 }
 pub(super) use function;
 
+/// The end of the documentation of a call.
+macro_rules! errors {
+    () => {
+        "\n\n# Errors\n\n[`CallError`] if the library lacks the function, or if its status is neither OK nor a \
+         warning."
+    };
+}
+pub(super) use errors;
+
 /// Defines a method for each function that changes the mode only.
 macro_rules! modes {
     ($($visibility:vis fn $method:ident = $name:literal;)*) => {
         impl Component {
-            $(#[doc = concat!("Calls `", $name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $(#[doc = concat!("Calls `", $name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $method(&mut self) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
@@ -51,11 +56,7 @@ macro_rules! values {
             $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
     )*) => {
         impl Component {
-            $(#[doc = concat!("Calls `", $get_name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $(#[doc = concat!("Calls `", $get_name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $get(
                 &mut self,
@@ -72,11 +73,7 @@ macro_rules! values {
                 self.base.check_guarded($get_name, done, || format!(" {values:?}"))
             }
 
-            #[doc = concat!("Calls `", $set_name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $set(
                 &mut self,
@@ -104,11 +101,7 @@ macro_rules! strings {
             $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
     ) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
             $visibility fn $set(
                 &mut self,
                 references: &[u32],
@@ -130,11 +123,7 @@ macro_rules! strings {
                 self.base.check_guarded($set_name, done, String::new)
             }
 
-            #[doc = concat!("Calls `", $get_name, "` and copies the strings.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $get_name, "` and copies the strings.", $crate::library::calls::errors!())]
             $visibility fn $get(
                 &mut self,
                 references: &[u32],
@@ -164,11 +153,7 @@ pub(super) use strings;
 macro_rules! derivatives {
     ($visibility:vis fn $set:ident, $get:ident = $set_name:literal $get_name:literal;) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $set(
                 &mut self,
@@ -187,11 +172,7 @@ macro_rules! derivatives {
                 self.base.check_guarded($set_name, done, String::new)
             }
 
-            #[doc = concat!("Calls `", $get_name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $get_name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $get(
                 &mut self,
@@ -222,11 +203,7 @@ macro_rules! equations {
         $($visibility:vis fn $get:ident = $name:literal;)*
     ) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_time, "`; `time` is in s.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $set_time, "`; `time` is in s.", $crate::library::calls::errors!())]
             #[inline]
             $time_visibility fn set_time(&mut self, time: f64) -> Result<(), CallError> {
                 let function = function!(self.set_time, $set_time);
@@ -237,11 +214,7 @@ macro_rules! equations {
                 self.base.check($set_time, status)
             }
 
-            #[doc = concat!("Calls `", $set_states, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Calls `", $set_states, "`.", $crate::library::calls::errors!())]
             #[inline]
             $states_visibility fn set_continuous_states(
                 &mut self,
@@ -255,11 +228,7 @@ macro_rules! equations {
                 self.base.check_guarded($set_states, done, String::new)
             }
 
-            $(#[doc = concat!("Calls `", $name, "`.")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            $(#[doc = concat!("Calls `", $name, "`.", $crate::library::calls::errors!())]
             #[inline]
             $visibility fn $get(&mut self, values: &mut [f64]) -> Result<(), CallError> {
                 let function = function!(self.$get, $name);

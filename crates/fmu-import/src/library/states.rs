@@ -18,11 +18,7 @@ macro_rules! states {
         free_state = $free:literal;
     ) => {
         impl Component {
-            #[doc = concat!("Saves the current state in `slot` (`", $get, "`).")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Saves the current state in `slot` (`", $get, "`).", $crate::library::calls::errors!())]
             $visibility fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
                 let function = function!(self.get_state, $get);
                 self.base.log_call($get, String::new);
@@ -76,11 +72,7 @@ macro_rules! states {
                 }
             }
 
-            #[doc = concat!("Serializes the current state (`", $get, "`, `", $serialize, "`).")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Serializes the current state (`", $get, "`, `", $serialize, "`).", $crate::library::calls::errors!())]
             $visibility fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
                 let function = function!(self.get_state, $get);
                 self.base.log_call($get, String::new);
@@ -112,11 +104,7 @@ macro_rules! states {
                 Ok(bytes)
             }
 
-            #[doc = concat!("Restores a serialized state (`", $deserialize, "`, `", $set, "`).")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the library lacks the function, or if its status is neither OK nor a warning.
+            #[doc = concat!("Restores a serialized state (`", $deserialize, "`, `", $set, "`).", $crate::library::calls::errors!())]
             $visibility fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
                 let mut state = null_mut();
                 let function = function!(self.deserialize_state, $deserialize);
