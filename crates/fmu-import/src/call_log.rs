@@ -45,12 +45,11 @@ impl CallLog {
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
         let logged = self.wrap(instance, slave);
-        let (function, kind) = match logged.version {
-            Version::V1 => ("fmiInstantiateSlave", ""),
-            Version::V2 => ("fmi2Instantiate", "fmi2CoSimulation, "),
-            Version::V3 => ("fmi3InstantiateCoSimulation", ""),
-        };
-        logged.created(function, kind);
+        logged.created([
+            ("fmiInstantiateSlave", ""),
+            ("fmi2Instantiate", "fmi2CoSimulation, "),
+            ("fmi3InstantiateCoSimulation", ""),
+        ]);
         logged
     }
 
@@ -62,12 +61,11 @@ impl CallLog {
         slave: Box<dyn ModelExchange>,
     ) -> LoggedSlave<dyn ModelExchange> {
         let logged = self.wrap(instance, slave);
-        let (function, kind) = match logged.version {
-            Version::V1 => ("fmiInstantiateModel", ""),
-            Version::V2 => ("fmi2Instantiate", "fmi2ModelExchange, "),
-            Version::V3 => ("fmi3InstantiateModelExchange", ""),
-        };
-        logged.created(function, kind);
+        logged.created([
+            ("fmiInstantiateModel", ""),
+            ("fmi2Instantiate", "fmi2ModelExchange, "),
+            ("fmi3InstantiateModelExchange", ""),
+        ]);
         logged
     }
 
@@ -137,21 +135,27 @@ const MODELS: [(&str, &str); 4] = [
 ];
 
 impl<S: Slave + ?Sized> LoggedSlave<S> {
-    /// Logs that `function` has created the instance of this `kind`.
-    fn created(&self, function: &str, kind: &str) {
+    /// Logs that a function has created the instance of a kind: both for FMI 1.0, 2.0 and 3.0.
+    fn created(&self, functions: [(&str, &str); 3]) {
+        let (function, kind) = self.of_version(functions);
         let (instance, guid) = (&self.instance, &self.slave.description().guid);
         let prefix = self.prefix();
         self.log
             .write(&format!("{instance} {function}({instance:?}, {kind}{guid:?}) -> {prefix}OK\n"));
     }
 
+    /// Returns what belongs to the version of the FMU, of FMI 1.0, 2.0 and 3.0.
+    fn of_version<T>(&self, [v1, v2, v3]: [T; 3]) -> T {
+        match self.version {
+            Version::V1 => v1,
+            Version::V2 => v2,
+            Version::V3 => v3,
+        }
+    }
+
     /// Returns the prefix of functions and statuses in the version of the FMU.
     fn prefix(&self) -> &'static str {
-        match self.version {
-            Version::V1 => "fmi",
-            Version::V2 => "fmi2",
-            Version::V3 => "fmi3",
-        }
+        self.of_version(["fmi", "fmi2", "fmi3"])
     }
 
     /// Returns the name of a function of FMI 2.0 in the version of the FMU.
@@ -232,11 +236,8 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
 impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     fn drop(&mut self) {
         // The instance is freed after this.
-        let function = match self.version {
-            Version::V1 => "fmiFreeSlaveInstance",
-            Version::V2 => "fmi2FreeInstance",
-            Version::V3 => "fmi3FreeInstance",
-        };
+        let function =
+            self.of_version(["fmiFreeSlaveInstance", "fmi2FreeInstance", "fmi3FreeInstance"]);
         self.log.write(&format!("{} {function}()\n", self.instance));
     }
 }
