@@ -22,7 +22,7 @@ pub(crate) struct Instance {
     /// Whether the FMU has been initialised and no step has been made: then only inputs can be set.
     settled: bool,
     /// The inputs: type and value reference.
-    inputs: HashSet<(u8, u32)>,
+    inputs: HashSet<(ValueType, u32)>,
     /// Value references of variables whose sign differs from that of their FMU's value reference
     /// (`negatedAlias`): that of the description, that of the FMU.
     negated: HashMap<u32, u32>,
@@ -35,16 +35,6 @@ pub(crate) struct Instance {
     /// For model exchange: the result of `fmiInitialize`, until a value is set or the event is updated.
     initialized: Option<EventInfo>,
     interface: Interface,
-}
-
-/// Returns a number for a type, as a key.
-fn key(kind: ValueType) -> u8 {
-    match kind {
-        ValueType::Real => 0,
-        ValueType::Integer => 1,
-        ValueType::Boolean => 2,
-        ValueType::String | ValueType::Binary => 3,
-    }
 }
 
 /// Returns the description of an instance, in which negated aliases have value references of their own.
@@ -82,7 +72,7 @@ impl Instance {
         let inputs =
             description.variables.iter().filter(|variable| variable.causality == Causality::Input);
         let inputs =
-            inputs.map(|variable| (key(ValueType::of(&variable.kind)), variable.value_reference));
+            inputs.map(|variable| (ValueType::of(&variable.kind), variable.value_reference));
         Self {
             component,
             experiment: Experiment { start_time: 0.0, stop_time: None, tolerance: None },
@@ -104,7 +94,7 @@ impl Instance {
     fn takes(&mut self, kind: ValueType, references: &[u32]) -> bool {
         self.initialized = None;
         !self.settled
-            || references.iter().all(|reference| self.inputs.contains(&(key(kind), *reference)))
+            || references.iter().all(|reference| self.inputs.contains(&(kind, *reference)))
     }
 
     pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {

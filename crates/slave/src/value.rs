@@ -66,7 +66,7 @@ fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
 }
 
 /// The types between which a master distinguishes: the functions of a slave that access a variable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ValueType {
     /// `get_real` and `set_real`: Real, `Float64`, `Float32`.
     Real,
