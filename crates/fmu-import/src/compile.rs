@@ -185,14 +185,13 @@ impl Compiler {
         let stated = std::env::var(variable).ok().filter(|command| !command.trim().is_empty());
         let tried =
             stated.map_or_else(|| known.map(str::to_owned).to_vec(), |command| vec![command]);
-        let compilers = tried.iter().filter_map(|command| {
+        let mut compilers = tried.iter().filter_map(|command| {
             let words: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
             let output =
                 Command::new(&words[0]).args(&words[1..]).arg("--version").output().ok()?;
             let version = String::from_utf8_lossy(&output.stdout).into_owned();
             output.status.success().then_some(Self { words, version })
         });
-        let mut compilers = compilers;
         compilers.next().ok_or_else(|| CompileError::NoCompiler {
             path: path.to_owned(),
             language,

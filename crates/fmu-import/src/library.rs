@@ -67,7 +67,7 @@ pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<St
     }
     type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let handle = Loading::of(path, &name).load()?;
+    let handle = Loading { path, fmu: &name, binding: Binding::Lenient }.load()?;
     let name = if version == Version::V3 { DESCRIBE_3 } else { DESCRIBE };
     // SAFETY: `fmu::export!` gives this name this signature.
     let describe = unsafe { handle.get::<Describe>(name.as_bytes()) }

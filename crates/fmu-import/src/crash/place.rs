@@ -131,9 +131,7 @@ impl Place {
     pub(crate) fn instance(&self) -> &str {
         &self.instance
     }
-}
 
-impl Place {
     /// Notes an error of the instance, and returns it.
     pub(crate) fn failed(&self, error: CallError) -> CallError {
         if !matches!(error.failure, Failure::Status(Status::Discard | Status::Pending)) {

@@ -4,7 +4,7 @@
 //! if each side has a processor, yielding if both share one, blocking serves long steps. A closed
 //! socket shows that the other side has ended.
 
-use std::io::{self, Read as _, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -124,18 +124,16 @@ impl Channel {
                 Ok(0) => break self.poll(old).unwrap_or(WaitResult::Closed),
                 // The byte is for this wait, or left over from an earlier one.
                 Ok(_) => self.sleeps().0.store(1, Ordering::SeqCst),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) if is_timeout(&error) => {
-                    break self.poll(old).unwrap_or(WaitResult::TimedOut);
-                }
-                Err(_) => break self.poll(old).unwrap_or(WaitResult::Closed),
+                Err(error) => match error.kind() {
+                    ErrorKind::Interrupted => {}
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                        break self.poll(old).unwrap_or(WaitResult::TimedOut);
+                    }
+                    _ => break self.poll(old).unwrap_or(WaitResult::Closed),
+                },
             }
         };
         self.sleeps().0.store(0, Ordering::SeqCst);
         woken
     }
-}
-
-fn is_timeout(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }

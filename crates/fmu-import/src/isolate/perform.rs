@@ -31,7 +31,8 @@ pub(super) type CommandResult = Option<Result<(), CallError>>;
 /// An instance and the buffers of its calls, kept so that a step does not allocate.
 pub(super) struct Executor {
     instance: Box<dyn Slave>,
-    maker: Maker,
+    /// What creates another instance like this one.
+    pub(super) maker: Maker,
     references: Vec<u32>,
     reals: Vec<f64>,
     integers: Vec<i64>,
@@ -99,11 +100,6 @@ impl Executor {
         Self { instance, maker, references, reals, integers, booleans, step: Step::default() }
     }
 
-    /// Returns what creates another instance like this one.
-    pub(super) fn maker(&self) -> Maker {
-        self.maker.clone()
-    }
-
     /// Steps, or gets or sets numbers: reads the arguments from `reader`, writes the results to
     /// `writer`. Other functions are executed by [`Executor::execute`].
     #[inline]
@@ -115,26 +111,19 @@ impl Executor {
         writer: &mut Writer<'_>,
     ) -> CommandResult {
         let Self { instance, references, reals, integers, booleans, step, .. } = self;
+        macro_rules! values {
+            ($transfer:ident, $values:ident, $method:ident) => {
+                $transfer(reader, writer, references, $values, |r, v| instance.$method(r, v))
+            };
+        }
         match function {
             Function::DoStep => step.advance(instance.as_mut(), shared, reader, writer),
-            Function::GetReal => {
-                get(reader, writer, references, reals, |r, v| instance.get_real(r, v))
-            }
-            Function::GetInteger => {
-                get(reader, writer, references, integers, |r, v| instance.get_integer(r, v))
-            }
-            Function::GetBoolean => {
-                get(reader, writer, references, booleans, |r, v| instance.get_boolean(r, v))
-            }
-            Function::SetReal => {
-                set(reader, writer, references, reals, |r, v| instance.set_real(r, v))
-            }
-            Function::SetInteger => {
-                set(reader, writer, references, integers, |r, v| instance.set_integer(r, v))
-            }
-            Function::SetBoolean => {
-                set(reader, writer, references, booleans, |r, v| instance.set_boolean(r, v))
-            }
+            Function::GetReal => values!(get, reals, get_real),
+            Function::GetInteger => values!(get, integers, get_integer),
+            Function::GetBoolean => values!(get, booleans, get_boolean),
+            Function::SetReal => values!(set, reals, set_real),
+            Function::SetInteger => values!(set, integers, set_integer),
+            Function::SetBoolean => values!(set, booleans, set_boolean),
             _ => None,
         }
     }

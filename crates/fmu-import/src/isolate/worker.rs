@@ -173,8 +173,11 @@ impl Worker {
             }
             _ => return self.answer_request(function),
         };
-        let done = done.unwrap_or_else(|| Err(invalid_command(function)));
-        if let Err(error) = done.and_then(|()| check_fit(function, &writer)) {
+        let mut done = done.unwrap_or_else(|| Err(invalid_command(function)));
+        if done.is_ok() && !writer.fits() {
+            done = Err(invalid(function, "returned more than the shared memory holds"));
+        }
+        if let Err(error) = done {
             reply(Err::<(), _>(error), &mut self.answer);
             self.send_answer();
         }
@@ -192,8 +195,10 @@ impl Worker {
                 reply(opened, &mut self.answer);
             }
             (Some(Request::Renew { name, logging }), Some(executor)) => {
-                let maker = executor.maker();
-                let renewed = self.renew(maker, name, logging);
+                let maker = executor.maker.clone();
+                self.record(Function::Free);
+                self.executor = None;
+                let renewed = self.create(maker, name, logging);
                 reply(Ok(renewed), &mut self.answer);
             }
             (Some(Request::ProcessChanges), _) => {
@@ -247,13 +252,6 @@ impl Worker {
         })
     }
 
-    /// Frees the instance and creates another one.
-    fn renew(&mut self, maker: Maker, name: &str, logging: bool) -> Opening {
-        self.record(Function::Free);
-        self.executor = None;
-        self.create(maker, name, logging)
-    }
-
     /// Stores the function that runs now, so that the master can name the one that crashed.
     fn record(&self, function: Function) {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
@@ -287,14 +285,6 @@ fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> 
     writer.put(VALUES);
     writer.put_part(rest);
     Some(Ok(()))
-}
-
-/// Checks that the results fitted into the shared memory.
-fn check_fit(function: Function, writer: &Writer<'_>) -> Result<(), CallError> {
-    if writer.fits() {
-        return Ok(());
-    }
-    Err(invalid(function, "returned more than the shared memory holds"))
 }
 
 /// Returns the text of an error and of its causes.

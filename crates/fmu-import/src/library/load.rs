@@ -38,12 +38,7 @@ pub(crate) struct Loading<'a> {
     pub(crate) binding: Binding,
 }
 
-impl<'a> Loading<'a> {
-    /// The library at `path` of the FMU with the name `fmu`.
-    pub(crate) fn of(path: &'a Path, fmu: &'a str) -> Self {
-        Self { path, fmu, binding: Binding::Lenient }
-    }
-
+impl Loading<'_> {
     /// Loads the library. If it lacks symbols of Python, loads the library of Python first.
     pub(super) fn load(&self) -> Result<Handle, LoadError> {
         let place = Place::new(self.fmu);
