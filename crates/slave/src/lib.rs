@@ -9,8 +9,6 @@ mod model_exchange;
 mod transformation;
 mod value;
 
-use std::fmt;
-
 pub use events::Events;
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
@@ -462,52 +460,36 @@ impl CallError {
 }
 
 /// How a call failed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failure {
     /// The function returned this status.
+    #[error("returned {}", .0.name())]
     Status(Status),
     /// The function returned a value that is no `fmi2Status`.
+    #[error("returned {0}, expected a status of the standard (0 to 5)")]
     UnknownStatus(i32),
     /// The FMU does not have the function, or this kind of slave does not offer it.
+    #[error("is missing")]
     Missing,
     /// The importer panicked during the call; the text is the panic's message.
+    #[error("panicked: {0}")]
     Panicked(String),
     /// A signal ended the process of the FMU: number and name.
+    #[error("crashed: its process was ended by signal {0} ({1})")]
     Killed(i32, &'static str),
     /// The FMU ended its process with this exit status.
+    #[error("ended its process with exit status {0}")]
     Exited(i32),
     /// The function did not return within this time in s; the importer ended the FMU's process.
+    #[error("did not return within {0} s")]
     TimedOut(f64),
     /// The process of the FMU crashed when it needed more memory than this limit in bytes.
+    #[error("crashed: it needs more memory than the limit of {0} bytes for its process")]
     OutOfMemory(u64),
     /// The function returned an impossible result; the text describes it.
+    #[error("{0}")]
     InvalidAnswer(String),
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Failure::Status(status) => write!(formatter, "returned {}", status.name()),
-            Failure::UnknownStatus(status) => {
-                write!(formatter, "returned {status}, expected a status of the standard (0 to 5)")
-            }
-            Failure::Missing => formatter.write_str("is missing"),
-            Failure::Panicked(text) => write!(formatter, "panicked: {text}"),
-            Failure::Killed(number, name) => {
-                write!(formatter, "crashed: its process was ended by signal {number} ({name})")
-            }
-            Failure::Exited(status) => {
-                write!(formatter, "ended its process with exit status {status}")
-            }
-            Failure::TimedOut(seconds) => write!(formatter, "did not return within {seconds} s"),
-            Failure::OutOfMemory(limit) => write!(
-                formatter,
-                "crashed: it needs more memory than the limit of {limit} bytes for its process"
-            ),
-            Failure::InvalidAnswer(what) => formatter.write_str(what),
-        }
-    }
 }
 
 /// Returns the error [`Failure::Missing`] for `function`.
