@@ -7,7 +7,7 @@ use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDesc
 use serde::{Deserialize, Serialize};
 
 use super::Instance;
-use super::mode::Mode;
+use super::modes::Mode;
 use super::plan::Run;
 use super::refusal::refused;
 use crate::library::v3::Component;
@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 const CHANGED: i32 = 2;
 
 /// An input clock that ticks at times.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct TimedClock {
     reference: u32,
     attributes: ClockType,
@@ -135,11 +135,7 @@ impl Clocks {
                 (Causality::Input, _) => clocks.timed.push(TimedClock {
                     reference,
                     attributes: attributes.clone(),
-                    interval: 0.0,
-                    fraction: None,
-                    first: 0.0,
-                    ticks: 0,
-                    next: None,
+                    ..TimedClock::default()
                 }),
                 _ => clocks.outputs.push(reference),
             }

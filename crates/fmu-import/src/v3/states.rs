@@ -6,8 +6,7 @@ use slave::CallError;
 use super::Instance;
 use super::clocked::Memory;
 use super::clocks::ClocksState;
-use super::mode::Mode;
-use super::modes::State;
+use super::modes::{Mode, State};
 use super::refusal::refused;
 
 /// The first bytes of a serialised state.
