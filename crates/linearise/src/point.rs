@@ -43,9 +43,7 @@ fn set(component: &mut (impl Slave + ?Sized), setting: &Setting) -> Result<(), L
         Value::Real(value) => component.set_real(&to, &[*value]),
         Value::Integer(value) => component.set_integer(&to, &[*value]),
         Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
-        Value::String(value) => {
-            component.set_string(&[setting.reference], std::slice::from_ref(value))
-        }
+        Value::String(value) => component.set_string(&to, std::slice::from_ref(value)),
         Value::Binary(_) => Err(slave::absent("fmi3SetBinary")),
     };
     done.map_err(|source| refused(&setting.name, &setting.text, source))

@@ -387,8 +387,6 @@ pub(super) fn description_of_instance(
         Version::V2 => None,
         Version::V3 => Some(crate::v3::ElementView::new(description, sizes)?.description),
     };
-    Ok(match describe {
-        Some(describe) => Some(describe(scalar.as_ref().unwrap_or(description))),
-        None => scalar,
-    })
+    let described = describe.map(|describe| describe(scalar.as_ref().unwrap_or(description)));
+    Ok(described.or(scalar))
 }

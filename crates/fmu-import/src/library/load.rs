@@ -186,15 +186,9 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
     #[cfg(not(unix))]
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
     let opened = unsafe { Library::new(library) };
-    match opened {
-        Ok(handle) => {
-            std::mem::forget(handle);
-            Ok(())
-        }
-        Err(error) => Err(LoadError::Refused {
-            path: PathBuf::from(library),
-            message: reason(&error),
-            hint: String::new(),
-        }),
-    }
+    opened.map(std::mem::forget).map_err(|error| LoadError::Refused {
+        path: PathBuf::from(library),
+        message: reason(&error),
+        hint: String::new(),
+    })
 }
