@@ -15,54 +15,27 @@ pub(super) trait Word: Copy {
     fn from_word(word: u64) -> Option<Self>;
 }
 
-impl Word for u64 {
-    fn to_word(self) -> u64 {
-        self
-    }
+macro_rules! words {
+    ($($type:ty: $value:ident => $to_word:expr, $word:ident => $from_word:expr;)*) => {
+        $(impl Word for $type {
+            fn to_word(self) -> u64 {
+                let $value = self;
+                $to_word
+            }
 
-    fn from_word(word: u64) -> Option<Self> {
-        Some(word)
-    }
+            fn from_word($word: u64) -> Option<Self> {
+                $from_word
+            }
+        })*
+    };
 }
 
-impl Word for f64 {
-    fn to_word(self) -> u64 {
-        self.to_bits()
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        Some(f64::from_bits(word))
-    }
-}
-
-impl Word for u32 {
-    fn to_word(self) -> u64 {
-        self.into()
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        word.try_into().ok()
-    }
-}
-
-impl Word for i64 {
-    fn to_word(self) -> u64 {
-        self.cast_unsigned()
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        Some(word.cast_signed())
-    }
-}
-
-impl Word for i32 {
-    fn to_word(self) -> u64 {
-        i64::from(self).cast_unsigned()
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        word.cast_signed().try_into().ok()
-    }
+words! {
+    u64: value => value, word => Some(word);
+    f64: value => value.to_bits(), word => Some(f64::from_bits(word));
+    u32: value => value.into(), word => word.try_into().ok();
+    i64: value => value.cast_unsigned(), word => Some(word.cast_signed());
+    i32: value => i64::from(value).cast_unsigned(), word => word.cast_signed().try_into().ok();
 }
 
 /// Returns the words that hold `bytes`; the last one is filled with zeros.
