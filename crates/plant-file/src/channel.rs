@@ -5,6 +5,8 @@ use control::lmi::weight_of_table;
 use control::weight::{Weight, bilinear_frequency};
 use files::{Entry, PlaceError, Table};
 
+use crate::read::{each, refuse};
+
 /// The entries of a plant file that belong to `h_infinity`.
 pub const CHANNEL: [&str; 2] = ["weights", "noise"];
 
@@ -103,21 +105,10 @@ fn noises(
     names: &[&str],
     domain: Domain,
 ) -> Result<Vec<ChannelWeight>, PlaceError> {
-    let signal = |name: &str| format!("noise of {name}");
-    if !entry.is_list() {
-        let one = weight(entry, String::new(), domain)?;
-        let named = |name: &&str| ChannelWeight { signal: signal(name), ..one.clone() };
-        return Ok(names.iter().map(named).collect());
-    }
-    let members = entry.list()?;
-    let (expected, count) = (names.len(), members.len());
-    if count != expected {
-        return Err(
-            entry.error(format!("expected {expected} numbers, one per measurement, found {count}"))
-        );
-    }
-    let both = members.iter().zip(names);
-    both.map(|(member, name)| weight(member, signal(name), domain)).collect()
+    let one = |entry: &Entry<'_>| weight(entry, String::new(), domain);
+    let all = each(entry, names.len(), "numbers, one per measurement", one)?;
+    let named = |(name, one)| ChannelWeight { signal: format!("noise of {name}"), ..one };
+    Ok(names.iter().zip(all).map(named).collect())
 }
 
 /// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`, the latter two with `order`.
@@ -138,9 +129,7 @@ fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWe
     };
     if let Some(points) = table.get("table") {
         let alone = "a weight is stated by `table` or by `low`, `frequency` and `high`";
-        if let Some(other) = ["low", "frequency", "high"].iter().find_map(|key| table.get(key)) {
-            return Err(other.error(alone));
-        }
+        refuse(&table, &["low", "frequency", "high"], alone)?;
         let table_weight = weight_of_table(&read_points(&points, domain)?, order)
             .map_err(|error| points.error(error.to_string()))?;
         let deviation = Some(table_weight.deviation);

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Model;
 use crate::faults::Fault;
+use crate::read::{is_first, positive, refuse, within};
 use crate::signals::{Signal, name, position};
 
 /// What the detection of faults shall do.
@@ -127,10 +128,9 @@ impl DetectionRequest {
         };
         let table = entry.table()?;
         table.allow(&KEYS)?;
-        let positive = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
-        let sample_time = positive("sample_time")?;
-        if let (Some(entry), true) = (table.get("sample_time"), file.get("sample_time").is_some()) {
-            return Err(entry.error("a sampled controller tests in each of its samples"));
+        let sample_time = positive(&table, "sample_time")?;
+        if file.get("sample_time").is_some() {
+            refuse(&table, &["sample_time"], "a sampled controller tests in each of its samples")?;
         }
         Ok(Some(Self {
             method: method(&table)?,
@@ -147,13 +147,10 @@ impl DetectionRequest {
             sizes: sizes(&entry, faults)?,
             model_error: model_error(&table, actuators)?,
             sample_time,
-            delay: positive("delay")?,
+            delay: positive(&table, "delay")?,
             from: table
                 .get("from")
-                .map(|entry| match entry.number()? {
-                    number if number >= 0.0 => Ok(number),
-                    number => Err(entry.error(format!("expected a time from 0, found {number}"))),
-                })
+                .map(|entry| within(&entry, 0.0.., "expected a time from 0"))
                 .transpose()?,
             place: entry.place,
         }))
@@ -163,18 +160,11 @@ impl DetectionRequest {
 fn method(table: &Table<'_>) -> Result<Method, PlaceError> {
     let meaning = "the test: \"cusum\" or \"chi-square\"";
     let entry = table.require("method", meaning)?;
-    let window = table.get("window");
-    match (entry.text()?, window) {
-        ("cusum", None) => Ok(Method::Cusum),
-        ("cusum", Some(window)) => Err(window.error("it belongs to the method \"chi-square\"")),
-        ("chi-square", window) => {
-            let window = window.map(|entry| entry.positive()).transpose()?;
-            Ok(Method::ChiSquare { window })
-        }
-        (other, _) => {
-            Err(entry.error(format!("expected \"cusum\" or \"chi-square\", found {other:?}")))
-        }
+    if !is_first(&entry, ["cusum", "chi-square"])? {
+        return Ok(Method::ChiSquare { window: positive(table, "window")? });
     }
+    refuse(table, &["window"], "it belongs to the method \"chi-square\"")?;
+    Ok(Method::Cusum)
 }
 
 /// Reads the mean time between false alarms in s, or their number per hour.
@@ -236,40 +226,31 @@ fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
         stated.allow(&names)?;
     }
     let size = |fault: &Fault| {
-        let stated_size = stated.as_ref().and_then(|table| table.get(&fault.name));
-        match stated_size.map(|entry| entry.positive()).transpose()?.or(fault.step).or(fault.bound) {
-            Some(size) => Ok(size),
-            None => Err(entry.error(format!(
+        let size = stated.as_ref().map_or(Ok(None), |table| positive(table, &fault.name))?;
+        size.or(fault.step).or(fault.bound).ok_or_else(|| {
+            entry.error(format!(
                 "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
                  `step` or `bound` of the fault",
                 fault.name
-            ))),
-        }
+            ))
+        })
     };
     faults.iter().map(size).collect()
 }
 
 /// Reads the margin for errors of the model, and the bounds of the commands.
 fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelError>, PlaceError> {
-    let stated = table.get("commands");
     let Some(entry) = table.get("model_error") else {
-        return match stated {
-            Some(entry) => Err(entry.error("it belongs to `model_error`")),
-            None => Ok(None),
-        };
+        return refuse(table, &["commands"], "it belongs to `model_error`").map(|()| None);
     };
-    let margin = match entry.number()? {
-        margin if margin >= 1.0 => margin,
-        margin => return Err(entry.error(format!("expected a factor from 1, found {margin}"))),
-    };
-    let stated = stated.map(|entry| entry.table()).transpose()?;
+    let margin = within(&entry, 1.0.., "expected a factor from 1")?;
+    let stated = table.get("commands").map(|entry| entry.table()).transpose()?;
     if let Some(stated) = &stated {
         stated
             .allow(&actuators.iter().map(|actuator| actuator.name.as_str()).collect::<Vec<_>>())?;
     }
     let bound = |actuator: &Signal| {
-        let bound = stated.as_ref().and_then(|table| table.get(&actuator.name));
-        bound.map(|entry| entry.positive()).transpose()
+        stated.as_ref().map_or(Ok(None), |table| positive(table, &actuator.name))
     };
     let commands = actuators.iter().map(bound).collect::<Result<_, _>>()?;
     Ok(Some(ModelError { margin, commands, place: entry.place }))
@@ -351,7 +332,7 @@ fn disturbance(
     Ok(Disturbance {
         name: name(&table.require("name", "the name of the disturbance")?)?,
         entry_point,
-        bound: table.get("bound").map(|entry| entry.positive()).transpose()?,
+        bound: positive(&table, "bound")?,
         place: entry.place.clone(),
     })
 }

@@ -1,5 +1,6 @@
 //! The table `[estimation]` of a plant file: the law that estimates the faults.
 
+use crate::read::{each, not_negative, positive, within};
 use files::{Entry, Place, PlaceError, Table};
 
 /// A law with the parameters that the file states; the others follow from plant and observer.
@@ -173,50 +174,29 @@ impl EstimationRequest {
             }
         }
         table.allow(&known)?;
-        let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
-        let numbers = |key: &str| table.get(key).map(|entry| each(&entry, faults)).transpose();
+        let numbers = |key: &str| {
+            let what = "numbers, one for each fault";
+            let entry = table.get(key);
+            entry.map(|entry| each(&entry, faults, what, Entry::positive)).transpose()
+        };
         let law = match law {
             Law::Augmented => law,
             Law::ProportionalIntegral { .. } => Law::ProportionalIntegral {
-                proportional: table.get("proportional").map(|entry| part(&entry)).transpose()?,
+                proportional: table.get("proportional").as_ref().map(not_negative).transpose()?,
             },
             Law::FastAdaptive { .. } => {
-                Law::FastAdaptive { sigma: number("sigma")?, gamma: numbers("gamma")? }
+                Law::FastAdaptive { sigma: positive(&table, "sigma")?, gamma: numbers("gamma")? }
             }
             Law::SlidingMode { .. } => {
                 Law::SlidingMode { rho: numbers("rho")?, delta: numbers("delta")? }
             }
             Law::Learning { .. } => {
-                let share = number("K_1")?;
-                if let Some((k_1, entry)) = share.zip(table.get("K_1")).filter(|pair| pair.0 > 1.0)
-                {
-                    return Err(entry.error(format!("expected at most 1, found {k_1}")));
-                }
-                Law::Learning { kept: share }
+                let share = |entry: Entry<'_>| {
+                    entry.positive().and_then(|_| within(&entry, ..=1.0, "expected at most 1"))
+                };
+                Law::Learning { kept: table.get("K_1").map(share).transpose()? }
             }
         };
         Ok(Self { law, place: stated.place })
     }
-}
-
-/// Reads a number of at least 0.
-fn part(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.number()? {
-        number if number >= 0.0 => Ok(number),
-        number => Err(entry.error(format!("expected no less than 0, found {number}"))),
-    }
-}
-
-/// Reads one number above 0 for all faults, or one for each.
-fn each(entry: &Entry<'_>, faults: usize) -> Result<Vec<f64>, PlaceError> {
-    if !entry.is_list() {
-        return Ok(vec![entry.positive()?; faults]);
-    }
-    let members = entry.list()?;
-    if members.len() != faults {
-        let count = members.len();
-        let message = format!("expected {faults} numbers, one for each fault, found {count}");
-        return Err(entry.error(message));
-    }
-    members.iter().map(Entry::positive).collect()
 }

@@ -1,8 +1,8 @@
 //! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
 
+use crate::read::{alone, within};
 use crate::requirements::{Region, stated_region};
-use crate::signals::Signal;
-use crate::signals::positions;
+use crate::signals::{Signal, positions};
 use files::{Place, PlaceError, Table};
 
 /// The failures that one feedback must serve without knowing which of them there is.
@@ -34,24 +34,17 @@ impl FallbackRequest {
         let Some(entry) = file.get("fallback") else {
             return Ok(None);
         };
-        for other in ["reference", "schedule", "family"] {
-            if file.get(other).is_some() {
-                return Err(entry.error(format!("it is not possible together with `{other}`")));
-            }
-        }
+        alone(&entry, file, &["reference", "schedule", "family"])?;
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let meaning = "the names of the actuators that may fail, or \"all\"";
         let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
         let loss = match table.get("loss") {
             None => 1.0,
-            Some(entry) => match entry.positive()? {
-                loss if loss <= 1.0 => loss,
-                loss => {
-                    let rule = "expected a fraction above 0 and at most 1";
-                    return Err(entry.error(format!("{rule}, found {loss}")));
-                }
-            },
+            Some(entry) => {
+                entry.positive()?;
+                within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")?
+            }
         };
         if actuators.len() < 2 && loss >= 1.0 {
             let message =

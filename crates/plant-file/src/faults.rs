@@ -3,6 +3,7 @@
 use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::MatrixEntry as _;
+use crate::read::{is_first, positive, refuse, within};
 use crate::signals::{Signal, description, name, position, positions, unit};
 
 /// The assumed dynamics of a fault.
@@ -150,7 +151,6 @@ fn fault(
 ) -> Result<Fault, PlaceError> {
     let table = entry.table()?;
     table.allow(&FAULT)?;
-    let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
     let entry_point = entry_point(&table, actuators, measurements, column)?;
     let own_unit = unit(&table)?;
     let unit = own_unit.or_else(|| match entry_point {
@@ -166,22 +166,18 @@ fn fault(
         description: description(&table)?,
         dynamics: dynamics(&table)?,
         entry_point,
-        bound: number("bound")?,
-        rate_bound: number("rate_bound")?,
-        step: number("step")?,
+        bound: positive(&table, "bound")?,
+        rate_bound: positive(&table, "rate_bound")?,
+        step: positive(&table, "step")?,
         up_to: up_to(&table)?,
         place: entry.place.clone(),
     })
 }
 
 fn dynamics(table: &Table<'_>) -> Result<FaultDynamics, PlaceError> {
-    let Some(entry) = table.get("kind") else {
-        return Ok(FaultDynamics::Constant);
-    };
-    match entry.text()? {
-        "constant" => Ok(FaultDynamics::Constant),
-        "ramp" => Ok(FaultDynamics::Ramp),
-        other => Err(entry.error(format!("expected \"constant\" or \"ramp\", found {other:?}"))),
+    match table.get("kind") {
+        Some(entry) if !is_first(&entry, ["constant", "ramp"])? => Ok(FaultDynamics::Ramp),
+        _ => Ok(FaultDynamics::Constant),
     }
 }
 
@@ -196,16 +192,13 @@ fn entry_point(
     if let [_, second, ..] = stated.as_slice() {
         return Err(second.error(format!("a fault has only one of {}", keys.join(", "))));
     }
-    let least_command = table.get("least_command");
     if let Some(actuator) = table.get("loss_of") {
         let at = position(&actuator, actuators, "actuator")?;
         let meaning = "the command, in its unit, below which no loss of effectiveness is estimated";
         let least_command = table.require("least_command", meaning)?.positive()?;
         return Ok(EntryPoint::Loss { actuator: at, least_command });
     }
-    if let Some(entry) = least_command {
-        return Err(entry.error("this belongs to a fault with `loss_of`"));
-    }
+    refuse(table, &["least_command"], "this belongs to a fault with `loss_of`")?;
     if let Some(actuator) = table.get("actuator") {
         return Ok(EntryPoint::Actuator(position(&actuator, actuators, "actuator")?));
     }
@@ -226,13 +219,10 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
     if table.get("loss_of").is_none() {
         return Err(entry.error("this belongs to a fault with `loss_of`"));
     }
-    match entry.positive()? {
-        fraction if fraction <= 1.0 => Ok(Some(fraction)),
-        other => Err(entry.error(format!(
-            "expected a fraction above 0 and at most 1, the largest part of its effect that the \
-             actuator may lose, found {other}"
-        ))),
-    }
+    entry.positive()?;
+    let rule = "expected a fraction above 0 and at most 1, the largest part of its effect that the \
+                actuator may lose";
+    within(&entry, ..=1.0, rule).map(Some)
 }
 
 /// Returns one additive fault for each actuator at `positions`.

@@ -12,6 +12,7 @@ mod model;
 mod names;
 pub mod parameters;
 pub mod pid;
+mod read;
 pub mod reconfiguration;
 pub mod references;
 pub mod requirements;
@@ -33,6 +34,7 @@ use crate::matrix::MatrixEntry as _;
 use crate::model::{linearised, stated};
 use crate::names::check_names;
 use crate::pid::Pid;
+use crate::read::{each, is_first, positive, refuse};
 use crate::reconfiguration::ReconfigurationRequest;
 use crate::references::References;
 use crate::requirements::{Request, request};
@@ -224,17 +226,14 @@ impl<'a> PlantFile<'a> {
         if let Some(table) = &experiment {
             table.allow(&["stop_time", "step_size"])?;
         }
-        let time = |key: &str| {
-            let entry = experiment.as_ref().and_then(|table| table.get(key));
-            entry.map(|entry| entry.positive()).transpose()
-        };
+        let time = |key| experiment.as_ref().map_or(Ok(None), |table| positive(table, key));
         let plant_file = Self {
             source,
             places: PLACES.iter().filter_map(place).collect(),
             description: Some(description(file)?).filter(|text| !text.is_empty()),
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
-            transfer_time: file.get("transfer_time").map(|entry| entry.positive()).transpose()?,
+            transfer_time: positive(file, "transfer_time")?,
             filter: filter(file, &measurements, &faults)?,
             delay_order: delay_order(file, [&actuators, &measurements])?,
             feedback,
@@ -403,24 +402,12 @@ impl<'a> PlantFile<'a> {
 }
 
 fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
-    let estimator = file.get("estimator");
     let Some(entry) = file.get("sample_time") else {
-        return match estimator {
-            Some(entry) => Err(entry.error("the design has no `sample_time`")),
-            None => Ok(None),
-        };
+        return refuse(file, &["estimator"], "the design has no `sample_time`").map(|()| None);
     };
-    let current = match &estimator {
-        None => true,
-        Some(entry) => match entry.text()? {
-            "current" => true,
-            "prediction" => false,
-            other => {
-                let expected = "expected \"current\" or \"prediction\"";
-                return Err(entry.error(format!("{expected}, found {other:?}")));
-            }
-        },
-    };
+    let estimator = file.get("estimator");
+    let current =
+        estimator.map_or(Ok(true), |entry| is_first(&entry, ["current", "prediction"]))?;
     Ok(Some(Sampling { period: entry.positive()?, current }))
 }
 
@@ -451,18 +438,9 @@ fn filter(
             );
             Err(file.source.error(&fault.place, message))
         }
-        (Some(entry), _) if !entry.is_list() => {
-            Ok(Some(vec![entry.positive()?; measurements.len()]))
-        }
         (Some(entry), _) => {
-            let members = entry.list()?;
-            let (expected, count) = (measurements.len(), members.len());
-            if count != expected {
-                let message =
-                    format!("expected {expected} rates, one per measurement, found {count}");
-                return Err(entry.error(message));
-            }
-            members.iter().map(Entry::positive).collect::<Result<_, _>>().map(Some)
+            let what = "rates, one per measurement";
+            each(&entry, measurements.len(), what, Entry::positive).map(Some)
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
 
 use crate::pid::Pid;
+use crate::read::{alone, positive, within};
 use crate::requirements::{Bandwidth, Request, Requirement};
 use crate::signals::Signal;
 use control::Domain;
@@ -57,9 +58,7 @@ impl LoopShape {
         let Some(entry) = file.get("loop") else {
             return Ok(None);
         };
-        if let Some(other) = OTHERS.iter().find(|key| file.get(key).is_some()) {
-            return Err(entry.error(format!("it is not possible together with `{other}`")));
-        }
+        alone(&entry, file, &OTHERS)?;
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let stated =
@@ -73,16 +72,16 @@ impl LoopShape {
                 "expected at most {most:.3} rad/s for samples every {period} s, found {bandwidth}"
             )));
         }
-        let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
-        let peak = number("peak")?.unwrap_or(PEAK);
-        if let Some(entry) = table.get("peak").filter(|_| peak < 1.0) {
-            return Err(entry.error(format!(
-                "expected at least 1, as S is I at high frequencies, found {peak}"
-            )));
-        }
-        let roll_off = number("roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
-        let effort = number("effort")?;
-        let set_point = number("set_point")?.unwrap_or(SET_POINT * bandwidth);
+        let peak = match table.get("peak") {
+            None => PEAK,
+            Some(entry) => {
+                entry.positive()?;
+                within(&entry, 1.0.., "expected at least 1, as S is I at high frequencies")?
+            }
+        };
+        let roll_off = positive(&table, "roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
+        let effort = positive(&table, "effort")?;
+        let set_point = positive(&table, "set_point")?.unwrap_or(SET_POINT * bandwidth);
         let pid = Pid::read(file, &table, signals, roll_off)?;
         Ok(Some(Self { bandwidth, set_point, peak, roll_off, effort, pid, place: entry.place }))
     }

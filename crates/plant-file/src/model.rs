@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::Sampling;
 use crate::matrix::MatrixEntry as _;
+use crate::read::{positive, refuse};
 use crate::sampled_matrices::SampledMatrices;
 use crate::signals::{Role, Signal, signals};
 use files::{Entry, PlaceError, Source, Table};
@@ -66,11 +67,8 @@ pub(crate) fn linearised(
     file: &Table<'_>,
     plant: &Entry<'_>,
 ) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
-    for key in ["A", "B", "C", "D", "F_a", "matrices"] {
-        if let Some(entry) = file.get(key) {
-            return Err(entry.error("an FMU is the plant; its matrices are not stated"));
-        }
-    }
+    let message = "an FMU is the plant; its matrices are not stated";
+    refuse(file, &["A", "B", "C", "D", "F_a", "matrices"], message)?;
     let folder = source.path.parent().map(PathBuf::from).unwrap_or_default();
     let mut operating_point = Vec::new();
     if let Some(entry) = file.get("operating_point") {
@@ -84,7 +82,7 @@ pub(crate) fn linearised(
         operating_point,
         states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
         preload: file.get("preload").map_or(Ok(Vec::new()), |entry| texts(&entry))?,
-        step: file.get("linearisation_step").map(|entry| entry.positive()).transpose()?,
+        step: positive(file, "linearisation_step")?,
     });
     let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
     let meaning = "the outputs of the FMU that the controller reads";
@@ -105,15 +103,9 @@ pub(crate) fn stated(
     file: &Table<'_>,
     sampling: Option<Sampling>,
 ) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
-    for key in ["preload", "linearisation_step"] {
-        if let Some(entry) = file.get(key) {
-            return Err(entry.error("it belongs to `plant`, an FMU"));
-        }
-    }
-    if let Some(entry) = file.get("operating_point") {
-        let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
-        return Err(entry.error(advice));
-    }
+    refuse(file, &["preload", "linearisation_step"], "it belongs to `plant`, an FMU")?;
+    let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
+    refuse(file, &["operating_point"], advice)?;
     let meaning = "the plant x' = A x + B u + F_a f_a, y = C x + D u; or `plant`, an FMU";
     let entry = file.require("A", meaning)?;
     let n = entry.matrix()?.nrows();

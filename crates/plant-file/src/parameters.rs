@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::read::within;
 use files::{Entry, PlaceError};
 
 /// A parameter of the plant's FMU, and how far it may be from its value.
@@ -59,8 +60,5 @@ pub fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
 ///
 /// Returns a [`PlaceError`] at the entry that is wrong or missing.
 pub fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.number()? {
-        number if (0.0..1.0).contains(&number) => Ok(number),
-        number => Err(entry.error(format!("expected a number from 0 to below 1, found {number}"))),
-    }
+    within(entry, 0.0..1.0, "expected a number from 0 to below 1")
 }

@@ -1,7 +1,8 @@
 //! The entries `structure` and `pairs` of `[loop]`: PI or PID controllers in place of a state feedback.
 
+use crate::read::{alone, is_first, refuse};
 use crate::references::References;
-use crate::signals::{Signal, position};
+use crate::signals::{Signal, position, position_of};
 use files::{Place, PlaceError, Table};
 use nalgebra::RowDVector;
 
@@ -52,22 +53,11 @@ impl Pid {
         corner: f64,
     ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = table.get("structure") else {
-            return match table.get("pairs") {
-                Some(entry) => Err(entry.error("it belongs to `structure`, \"PI\" or \"PID\"")),
-                None => Ok(None),
-            };
+            let message = "it belongs to `structure`, \"PI\" or \"PID\"";
+            return refuse(table, &["pairs"], message).map(|()| None);
         };
-        let derivative = match entry.text()? {
-            "PID" => true,
-            "PI" => false,
-            other => {
-                let message = format!("expected \"PI\" or \"PID\", found {other:?}");
-                return Err(entry.error(message));
-            }
-        };
-        if let Some(other) = OTHERS.iter().find(|key| file.get(key).is_some()) {
-            return Err(entry.error(format!("it is not possible together with `{other}`")));
-        }
+        let derivative = !is_first(&entry, ["PI", "PID"])?;
+        alone(&entry, file, &OTHERS)?;
         if let Some(estimator) = file.get("estimator")
             && estimator.text()? == "current"
         {
@@ -79,13 +69,7 @@ impl Pid {
         match table.get("pairs") {
             Some(stated) => {
                 for (name, measurement) in stated.table()?.entries() {
-                    let Some(actuator) = actuators.iter().position(|one| one.name == name) else {
-                        let names: Vec<_> = actuators.iter().map(|one| one.name.as_str()).collect();
-                        return Err(measurement.error(format!(
-                            "no actuator is named {name:?}; there are {}",
-                            names.join(", ")
-                        )));
-                    };
+                    let actuator = position_of(name, &measurement, actuators, "actuator")?;
                     let measurement = position(&measurement, measurements, "measurement")?;
                     pairs.push(Pair { actuator, measurement });
                 }

@@ -1,6 +1,7 @@
 //! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
 
 use crate::faults::{EntryPoint, Fault};
+use crate::read::{alone, within};
 use crate::signals::{Signal, positions};
 use files::{Place, PlaceError, Table};
 
@@ -40,11 +41,7 @@ impl ReconfigurationRequest {
         let Some(entry) = file.get("reconfiguration") else {
             return Ok(None);
         };
-        for other in ["reference", "schedule"] {
-            if file.get(other).is_some() {
-                return Err(entry.error(format!("it is not possible together with `{other}`")));
-            }
-        }
+        alone(&entry, file, &["reference", "schedule"])?;
         if actuators.len() < 2 {
             return Err(entry.error("without its only actuator a plant is not controlled"));
         }
@@ -161,11 +158,8 @@ fn decision(
             return Err(entry.error("expected `loss` beside it: the fraction that is exceeded"));
         }
     };
-    let fraction = loss.positive()?;
-    if fraction >= 1.0 {
-        let message = format!("expected a fraction above 0 and below 1, found {fraction}");
-        return Err(loss.error(message));
-    }
+    loss.positive()?;
+    let fraction = within(&loss, ..1.0, "expected a fraction above 0 and below 1")?;
     let estimated = |fault: &Fault| match fault.entry_point {
         EntryPoint::Loss { actuator, .. } => used.contains(&actuator),
         _ => false,

@@ -3,7 +3,7 @@
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DMatrix;
 
-use crate::signals::{Signal, description, name, unit};
+use crate::signals::{Signal, description, name, position, position_of, unit};
 
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +112,7 @@ fn reference(
 ) -> Result<(Signal, Vec<f64>, Option<f64>), PlaceError> {
     let mut weights = vec![0.0; measurements.len()];
     if entry.is_text() {
-        let at = position(entry, entry.text()?, measurements)?;
+        let at = position(entry, measurements, "measurement")?;
         weights[at] = 1.0;
         return Ok((named_after(&measurements[at], entry), weights, None));
     }
@@ -129,13 +129,14 @@ fn reference(
             return Err(entry.error(message));
         }
         (Some(measurement), None) => {
-            let at = position(&measurement, measurement.text()?, measurements)?;
+            let at = position(&measurement, measurements, "measurement")?;
             weights[at] = 1.0;
             named_after(&measurements[at], entry)
         }
         (None, Some(combination)) => {
             for (measurement, factor) in combination.table()?.entries() {
-                weights[position(&factor, measurement, measurements)?] = factor.number()?;
+                let at = position_of(measurement, &factor, measurements, "measurement")?;
+                weights[at] = factor.number()?;
             }
             if weights.iter().all(|weight| *weight == 0.0) {
                 return Err(combination.error("expected a factor other than 0"));
@@ -177,11 +178,4 @@ fn named_after(measurement: &Signal, entry: &Entry<'_>) -> Signal {
         places: [Some(entry.place.clone()), None, None],
         ..Signal::named(name)
     }
-}
-
-fn position(entry: &Entry<'_>, name: &str, measurements: &[Signal]) -> Result<usize, PlaceError> {
-    measurements.iter().position(|signal| signal.name == name).ok_or_else(|| {
-        let names: Vec<_> = measurements.iter().map(|signal| signal.name.as_str()).collect();
-        entry.error(format!("no measurement is named {name:?}; there are {}", names.join(", ")))
-    })
 }

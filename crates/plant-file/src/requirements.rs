@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::matrix::MatrixEntry as _;
+use crate::read::{not_negative, positive, refuse, within};
 use nalgebra::{Complex, DMatrix};
 
 use crate::channel::{CHANNEL, Channel, ChannelSignals};
@@ -134,10 +135,8 @@ pub fn request(
     known.extend(weights);
     let allowed: Vec<_> = known.iter().copied().chain(CHANNEL).collect();
     table.allow(&allowed)?;
-    if table.get("h_infinity").is_none()
-        && let Some(entry) = CHANNEL.iter().find_map(|key| table.get(key))
-    {
-        return Err(entry.error("it belongs to `h_infinity`"));
+    if table.get("h_infinity").is_none() {
+        refuse(table, &CHANNEL, "it belongs to `h_infinity`")?;
     }
     let region = table.get("region");
     if let Some(entry) = region.as_ref().filter(|_| sampled) {
@@ -192,11 +191,7 @@ pub fn request(
 /// Rejects a disc or a sector for a sampled design: the map z = e^(s T) does not preserve their
 /// shape.
 fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
-    let table = region.table()?;
-    match ["disc", "sector"].iter().find_map(|key| table.get(key)) {
-        Some(entry) => Err(entry.error("a sampled design has a region by `decay` only")),
-        None => Ok(()),
-    }
+    refuse(&region.table()?, &["disc", "sector"], "a sampled design has a region by `decay` only")
 }
 
 /// Returns the only method of the table besides a region; several methods are an error.
@@ -273,7 +268,7 @@ pub fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceEr
 fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
     let table = entry.table()?;
     table.allow(&["decay", "disc", "sector"])?;
-    let decay = table.get("decay").map(|entry| entry.positive()).transpose()?;
+    let decay = positive(&table, "decay")?;
     let sector = table.get("sector").map(|entry| angle(&entry)).transpose()?;
     let disc = table.get("disc").map(|entry| disc(&entry)).transpose()?;
     if decay.is_none() && sector.is_none() && disc.is_none() {
@@ -284,10 +279,8 @@ fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
 
 /// Reads an angle between 0 and 90 degrees.
 fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.positive()? {
-        degrees if degrees < 90.0 => Ok(degrees),
-        degrees => Err(entry.error(format!("expected less than 90 degrees, found {degrees}"))),
-    }
+    entry.positive()?;
+    within(entry, ..90.0, "expected less than 90 degrees")
 }
 
 fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
@@ -350,13 +343,7 @@ fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
         }
         return Ok((matrix + transposed) / 2.0);
     }
-    let mut diagonal = Vec::with_capacity(members.len());
-    for member in &members {
-        match member.number()? {
-            number if number >= 0.0 => diagonal.push(number),
-            number => return Err(member.error(format!("expected no less than 0, found {number}"))),
-        }
-    }
+    let diagonal = members.iter().map(not_negative).collect::<Result<Vec<_>, _>>()?;
     Ok(DMatrix::from_diagonal(&diagonal.into()))
 }
 

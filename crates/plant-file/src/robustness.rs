@@ -5,6 +5,7 @@ use files::{Entry, PlaceError, Table};
 
 use crate::Model;
 use crate::parameters::{self, ParameterTolerance, fraction};
+use crate::read::{each, not_negative, within};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,13 +103,15 @@ impl RobustnessLimits {
             limits.seed = whole(&entry, u32::MAX)?;
         }
         if let Some(entry) = table.get("noise") {
-            limits.noise = noise(&entry, measurements)?;
+            limits.noise =
+                each(&entry, measurements, "numbers, one per measurement", not_negative)?;
             limits.noise_is_stated = true;
         }
         let (amber, red) = (table.get("amber"), table.get("red"));
         for (entry, limit) in [(&amber, &mut limits.amber), (&red, &mut limits.red)] {
             if let Some(entry) = entry {
-                *limit = at_least_one(entry)?;
+                let rule = "the peak of S is never below 1: expected more";
+                *limit = within(entry, 1.0.., rule)?;
             }
         }
         if let Some(entry) = red.or(amber).filter(|_| limits.amber > limits.red) {
@@ -181,16 +184,6 @@ fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
     Ok(all)
 }
 
-fn at_least_one(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.number()? {
-        number if number >= 1.0 => Ok(number),
-        number => {
-            let message = format!("the peak of S is never below 1: expected more, found {number}");
-            Err(entry.error(message))
-        }
-    }
-}
-
 fn whole(entry: &Entry<'_>, largest: u32) -> Result<u32, PlaceError> {
     let number = entry.number()?;
     if number.fract() == 0.0 && (0.0..=f64::from(largest)).contains(&number) {
@@ -198,23 +191,4 @@ fn whole(entry: &Entry<'_>, largest: u32) -> Result<u32, PlaceError> {
         return Ok(number as u32);
     }
     Err(entry.error(format!("expected a whole number from 0 to {largest}, found {number}")))
-}
-
-/// Reads one number, or one for each measurement.
-fn noise(entry: &Entry<'_>, measurements: usize) -> Result<Vec<f64>, PlaceError> {
-    let positive = |entry: &Entry<'_>| match entry.number()? {
-        number if number >= 0.0 => Ok(number),
-        number => Err(entry.error(format!("expected no less than 0, found {number}"))),
-    };
-    if !entry.is_list() {
-        return Ok(vec![positive(entry)?; measurements]);
-    }
-    let members = entry.list()?;
-    if members.len() != measurements {
-        let count = members.len();
-        let message =
-            format!("expected {measurements} numbers, one per measurement, found {count}");
-        return Err(entry.error(message));
-    }
-    members.iter().map(positive).collect()
 }

@@ -7,6 +7,7 @@ use files::{PlaceError, Table};
 use nalgebra::DMatrix;
 
 use crate::Sampling;
+use crate::read::{is_first, refuse};
 
 /// Part of the largest entries of row and column below which an entry of the logarithm is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -38,24 +39,16 @@ impl SampledMatrices {
         pair: (&DMatrix<f64>, &DMatrix<f64>),
     ) -> Result<Option<Box<Self>>, PlaceError> {
         let Some(entry) = file.get("matrices") else { return Ok(None) };
-        match entry.text()? {
-            "continuous" => return Ok(None),
-            "sampled" => {}
-            other => {
-                let expected = "expected \"continuous\" or \"sampled\"";
-                return Err(entry.error(format!("{expected}, found {other:?}")));
-            }
+        if is_first(&entry, ["continuous", "sampled"])? {
+            return Ok(None);
         }
         let Some(Sampling { period, .. }) = sampling else {
             let message =
                 "expected `sample_time`, too: the time, in s, between the samples of A and B";
             return Err(entry.error(message));
         };
-        if let Some(other) = ["family", "schedule"].iter().find_map(|key| file.get(key)) {
-            return Err(
-                other.error("expected continuous matrices, without `matrices = \"sampled\"`")
-            );
-        }
+        let message = "expected continuous matrices, without `matrices = \"sampled\"`";
+        refuse(file, &["family", "schedule"], message)?;
         let refuse =
             |error: control::Error| entry.error(format!("sampled every {period} s: {error}"));
         let identity = DMatrix::identity(pair.0.nrows(), pair.0.nrows());

@@ -3,10 +3,11 @@
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
 
+use crate::read::within;
 use files::{Entry, Place, PlaceError, Table};
 
 /// A state, an actuator or a measurement.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signal {
     /// Its name.
     pub name: String,
@@ -41,9 +42,7 @@ impl Signal {
     /// Creates a signal with a name only.
     #[must_use]
     pub fn named(name: String) -> Self {
-        let (unit, operating, limits, longest_hold) = (None, None, None, None);
-        let (description, places) = (String::new(), [None, None, None]);
-        Self { name, unit, description, operating, limits, longest_hold, delay: 0.0, places }
+        Self { name, ..Self::default() }
     }
 
     /// Fills missing fields from `other`.
@@ -107,7 +106,9 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
         operating: table.get("operating").map(|entry| entry.number()).transpose()?,
         limits: limited.as_ref().map(limits).transpose()?,
         longest_hold: longest_hold.as_ref().map(Entry::positive).transpose()?,
-        delay: table.get("delay").map_or(Ok(0.0), |entry| delay(&entry))?,
+        delay: table
+            .get("delay")
+            .map_or(Ok(0.0), |entry| within(&entry, 0.0.., "expected a time in s, 0 or more"))?,
         places: [
             Some(named.place),
             limited.map(|entry| entry.place),
@@ -168,13 +169,6 @@ pub fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     }
 }
 
-fn delay(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.number()? {
-        seconds if seconds >= 0.0 => Ok(seconds),
-        seconds => Err(entry.error(format!("expected a time in s, 0 or more, found {seconds}"))),
-    }
-}
-
 /// Reads `delay_order`, the number of states by which the observer approximates each delay.
 pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize, PlaceError> {
     let Some(entry) = file.get("delay_order") else { return Ok(DELAY_ORDER) };
@@ -210,10 +204,19 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
 ///
 /// Returns a [`PlaceError`] at the entry that is wrong or missing.
 pub fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
-    let text = entry.text()?;
-    signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
+    position_of(entry.text()?, entry, signals, what)
+}
+
+/// Returns the index of the signal `name`; `entry` is for the error.
+pub(crate) fn position_of(
+    name: &str,
+    entry: &Entry<'_>,
+    signals: &[Signal],
+    what: &str,
+) -> Result<usize, PlaceError> {
+    signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
-        entry.error(format!("no {what} is named {text:?}; there are {}", names.join(", ")))
+        entry.error(format!("no {what} is named {name:?}; there are {}", names.join(", ")))
     })
 }
 

@@ -4,6 +4,7 @@
 use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::MatrixEntry as _;
+use crate::read::{positive, refuse};
 use crate::references::References;
 use crate::signals::{Signal, description, name, unit};
 use crate::{Model, PlantFile};
@@ -104,11 +105,8 @@ impl PlantFile<'_> {
 /// Returns a [`PlaceError`] at the entry that is wrong or missing.
 pub fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
-    if let Some(schedule) = file.get("schedule") {
-        return Err(
-            schedule.error("expected `family` (one gain) or `schedule` (gains by a variable)")
-        );
-    }
+    let message = "expected `family` (one gain) or `schedule` (gains by a variable)";
+    refuse(file, &["schedule"], message)?;
     let mut variants: Vec<Variant> = Vec::new();
     for (at, member) in entry.list()?.iter().enumerate() {
         let table = member.table()?;
@@ -154,9 +152,8 @@ pub fn schedule(
     let variable_name = name(&named)?;
     let variable = match measurements.iter().position(|signal| signal.name == variable_name) {
         Some(at) => {
-            if let Some(entry) = ["unit", "description"].iter().find_map(|key| table.get(key)) {
-                return Err(entry.error(format!("the measurement `{variable_name}` states it")));
-            }
+            let message = format!("the measurement `{variable_name}` states it");
+            refuse(&table, &["unit", "description"], &message)?;
             Variable::Measurement(at)
         }
         None => Variable::Input(Signal {
@@ -168,12 +165,7 @@ pub fn schedule(
     };
     let listed = table.require("points", "the plants at two or more values of the variable")?;
     let (points, nominal) = points(&listed, model)?;
-    Ok(Some(Schedule {
-        variable,
-        rate_bound: table.get("rate_bound").map(|entry| entry.positive()).transpose()?,
-        points,
-        nominal,
-    }))
+    Ok(Some(Schedule { variable, rate_bound: positive(&table, "rate_bound")?, points, nominal }))
 }
 
 fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {

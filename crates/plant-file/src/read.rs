@@ -1,0 +1,72 @@
+//! What several tables of a plant file have in common: numbers in a range, one of two texts, one number for all.
+
+use std::ops::RangeBounds;
+
+use files::{Entry, PlaceError, Table};
+
+/// Reads a number above 0, if the table has the entry.
+pub(crate) fn positive(table: &Table<'_>, key: &str) -> Result<Option<f64>, PlaceError> {
+    table.get(key).map(|entry| entry.positive()).transpose()
+}
+
+/// Reads a number in `range`; `rule` is the text for other numbers, such as "expected at most 1".
+pub(crate) fn within(
+    entry: &Entry<'_>,
+    range: impl RangeBounds<f64>,
+    rule: &str,
+) -> Result<f64, PlaceError> {
+    match entry.number()? {
+        number if range.contains(&number) => Ok(number),
+        number => Err(entry.error(format!("{rule}, found {number}"))),
+    }
+}
+
+/// Reads a number of at least 0.
+pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    within(entry, 0.0.., "expected no less than 0")
+}
+
+/// Reads one of two texts: whether it is the first.
+pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<bool, PlaceError> {
+    match entry.text()? {
+        text if text == first || text == second => Ok(text == first),
+        other => Err(entry.error(format!("expected {first:?} or {second:?}, found {other:?}"))),
+    }
+}
+
+/// Reads one value for all of `count` signals, or a list of one for each: `what`, in words.
+pub(crate) fn each<'a, T: Clone>(
+    entry: &Entry<'a>,
+    count: usize,
+    what: &str,
+    read: impl Fn(&Entry<'a>) -> Result<T, PlaceError>,
+) -> Result<Vec<T>, PlaceError> {
+    if !entry.is_list() {
+        return Ok(vec![read(entry)?; count]);
+    }
+    let members = entry.list()?;
+    if members.len() != count {
+        return Err(entry.error(format!("expected {count} {what}, found {}", members.len())));
+    }
+    members.iter().map(read).collect()
+}
+
+/// Refuses the first of `keys` that the table has.
+pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<(), PlaceError> {
+    match keys.iter().find_map(|key| table.get(key)) {
+        Some(entry) => Err(entry.error(message)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses `entry` together with one of `others` in the file.
+pub(crate) fn alone(
+    entry: &Entry<'_>,
+    file: &Table<'_>,
+    others: &[&str],
+) -> Result<(), PlaceError> {
+    match others.iter().find(|key| file.get(key).is_some()) {
+        Some(other) => Err(entry.error(format!("it is not possible together with `{other}`"))),
+        None => Ok(()),
+    }
+}
