@@ -2,7 +2,7 @@
 
 use files::{Entry, Place, PlaceError, Table};
 
-use crate::matrix::MatrixEntry as _;
+use crate::matrix::matrix;
 use crate::read::{is_first, positive, refuse, within};
 use crate::signals::{Signal, description, name, position, positions, unit};
 
@@ -101,7 +101,7 @@ pub(crate) fn all_faults(
             entry_point: EntryPoint::Column(k - 1),
             ..Fault::constant(&entry.place)
         };
-        all.extend((1..=entry.matrix()?.ncols()).map(unnamed));
+        all.extend((1..=matrix(&entry)?.ncols()).map(unnamed));
     }
     if all.is_empty() {
         let message =

@@ -30,7 +30,7 @@ use crate::estimation::EstimationRequest;
 use crate::fallback::FallbackRequest;
 use crate::faults::{EntryPoint, Fault, all_faults};
 use crate::loop_shape::LoopShape;
-use crate::matrix::MatrixEntry as _;
+use crate::matrix::matrix;
 use crate::model::{linearised, stated};
 use crate::names::check_names;
 use crate::pid::Pid;
@@ -392,7 +392,7 @@ impl<'a> PlantFile<'a> {
         match file.get("F_a") {
             None => Ok(()),
             Some(entry) => {
-                let columns = entry.matrix()?.ncols();
+                let columns = matrix(&entry)?.ncols();
                 let message =
                     format!("expected {expected} columns, one per fault, found {columns}");
                 Err(entry.error(message))

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use nalgebra::DMatrix;
 
 use crate::Sampling;
-use crate::matrix::MatrixEntry as _;
+use crate::matrix::{matrix, shaped};
 use crate::read::{positive, refuse};
 use crate::sampled_matrices::SampledMatrices;
 use crate::signals::{Role, Signal, signals};
@@ -108,20 +108,19 @@ pub(crate) fn stated(
     refuse(file, &["operating_point"], advice)?;
     let meaning = "the plant x' = A x + B u + F_a f_a, y = C x + D u; or `plant`, an FMU";
     let entry = file.require("A", meaning)?;
-    let n = entry.matrix()?.nrows();
-    let a = entry.shaped(n, n, "states x states")?;
+    let n = matrix(&entry)?.nrows();
+    let a = shaped(&entry, [n, n], "states x states")?;
     let b = file.require("B", meaning)?;
-    let b = b.shaped(n, b.matrix()?.ncols(), "states x actuators")?;
+    let b = shaped(&b, [n, matrix(&b)?.ncols()], "states x actuators")?;
     let c = file.require("C", meaning)?;
-    let c = c.shaped(c.matrix()?.nrows(), n, "measurements x states")?;
+    let c = shaped(&c, [matrix(&c)?.nrows(), n], "measurements x states")?;
     let d = match file.get("D") {
-        Some(entry) => entry.shaped(c.nrows(), b.ncols(), "measurements x actuators")?,
+        Some(entry) => shaped(&entry, [c.nrows(), b.ncols()], "measurements x actuators")?,
         None => DMatrix::zeros(c.nrows(), b.ncols()),
     };
-    let f_a = file.get("F_a").map(|entry| {
-        let columns = entry.matrix()?.ncols();
-        entry.shaped(n, columns, "states x faults")
-    });
+    let f_a = file
+        .get("F_a")
+        .map(|entry| shaped(&entry, [n, matrix(&entry)?.ncols()], "states x faults"));
     let states = counted(file, "states", "x", n, "states, the rows of A")?;
     let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =

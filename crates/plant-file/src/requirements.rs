@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::matrix::MatrixEntry as _;
+use crate::matrix::matrix;
 use crate::read::{not_negative, positive, refuse, within};
 use nalgebra::{Complex, DMatrix};
 
@@ -320,7 +320,7 @@ const UNSYMMETRIC: f64 = 1e-12;
 fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
     let members = entry.list()?;
     if members.iter().any(Entry::is_list) {
-        let matrix = entry.matrix()?;
+        let matrix = matrix(entry)?;
         if !matrix.is_square() {
             let (rows, columns) = matrix.shape();
             return Err(

@@ -3,7 +3,7 @@
 
 use files::{Entry, Place, PlaceError, Table};
 
-use crate::matrix::MatrixEntry as _;
+use crate::matrix::shaped;
 use crate::read::{positive, refuse};
 use crate::references::References;
 use crate::signals::{Signal, description, name, unit};
@@ -237,8 +237,7 @@ fn variant(
             ];
             for (key, matrix) in matrices {
                 if let (Some(entry), Some(matrix)) = (table.get(key), matrix) {
-                    let (rows, columns) = matrix.shape();
-                    *matrix = entry.shaped(rows, columns, "as that of the file")?;
+                    *matrix = shaped(&entry, matrix.shape().into(), "as that of the file")?;
                 }
             }
             let (m, p) = (b.ncols(), c.nrows());
