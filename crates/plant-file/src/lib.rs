@@ -369,35 +369,22 @@ impl<'a> PlantFile<'a> {
         let columns = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Column(_));
         let expected = self.faults.iter().filter(columns).count();
         if let Some(fault) = self.faults.iter().find(columns) {
-            let Model::Matrices { f_a, .. } = &self.model else {
-                let message = format!(
-                    "fault `{}`: expected `actuator`, `sensor`, `loss_of` or `input`, as the plant \
-                     is an FMU",
-                    fault.name
-                );
-                return Err(self.error_at(&fault.place, message));
+            let expectation = match &self.model {
+                Model::Matrices { f_a: Some(f_a), .. } if f_a.ncols() == expected => return Ok(()),
+                Model::Matrices { f_a: Some(_), .. } => None,
+                Model::Matrices { f_a: None, .. } => {
+                    Some("`sensor` or `loss_of`, or a matrix F_a with a column for it")
+                }
+                Model::Fmu(_) => Some("`sensor`, `loss_of` or `input`, as the plant is an FMU"),
             };
-            let Some(f_a) = f_a else {
-                let message = format!(
-                    "fault `{}`: expected `actuator`, `sensor` or `loss_of`, or a matrix F_a with \
-                     a column for it",
-                    fault.name
-                );
+            if let Some(expectation) = expectation {
+                let message = format!("fault `{}`: expected `actuator`, {expectation}", fault.name);
                 return Err(self.error_at(&fault.place, message));
-            };
-            if f_a.ncols() == expected {
-                return Ok(());
             }
         }
-        match file.get("F_a") {
-            None => Ok(()),
-            Some(entry) => {
-                let columns = matrix(&entry)?.ncols();
-                let message =
-                    format!("expected {expected} columns, one per fault, found {columns}");
-                Err(entry.error(message))
-            }
-        }
+        let Some(entry) = file.get("F_a") else { return Ok(()) };
+        let columns = matrix(&entry)?.ncols();
+        Err(entry.error(format!("expected {expected} columns, one per fault, found {columns}")))
     }
 }
 

@@ -142,7 +142,7 @@ pub fn request(
     if let Some(entry) = region.as_ref().filter(|_| sampled) {
         refuse_unsampled(entry)?;
     }
-    let Some(one) = only_one(table, weights[0])? else {
+    let Some((method, one)) = only_one(table, weights[0])? else {
         let Some(entry) = region else {
             let message = format!("expected one of {}", known.join(", "));
             return Err(table.source.error(&table.place, message));
@@ -150,42 +150,35 @@ pub fn request(
         let requirement = Requirement::Region(self::region(&entry)?);
         return Ok(Request { requirement, place: entry.place, other: None });
     };
-    if one.name.ends_with(".h_infinity") {
-        let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
-        let channel = Channel::read(table, signals, domain)?;
-        let remedy = match weights[0] {
-            // In sampled time the gain of the least norm is finite: no gain knows the disturbance of the last
-            // sample.
-            _ if sampled || !channel.noise.is_empty() || region.disc.is_some() => None,
-            "W" => Some("`noise`, or a `region` with a disc"),
-            _ => Some("a `region` with a disc"),
-        };
-        let bound = bound(&one, remedy)?;
-        let requirement = Requirement::HInfinity { bound, region, channel };
-        return Ok(Request { requirement, place: one.place, other: None });
-    }
-    if let Some(entry) = region {
+    if let Some(entry) = region.as_ref().filter(|_| method != "h_infinity") {
         return Err(entry.error("a region can be combined with `h_infinity` only"));
     }
-    if one.name.ends_with(".bandwidth") {
-        let requirement = Requirement::Bandwidth(bandwidth(&one, domain)?);
-        return Ok(Request { requirement, place: one.place, other: None });
-    }
-    if one.name.ends_with(".eigenvalues") {
-        let requirement = Requirement::Eigenvalues(stable(&one, false)?);
-        return Ok(Request { requirement, place: one.place, other: None });
-    }
-    if one.name.ends_with(".sampled_eigenvalues") {
-        if !sampled {
-            return Err(one.error("the design has no `sample_time`"));
+    let mut second = None;
+    let requirement = match method {
+        "h_infinity" => {
+            let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
+            let channel = Channel::read(table, signals, domain)?;
+            let remedy = match weights[0] {
+                // In sampled time the gain of the least norm is finite: no gain knows the disturbance of the last
+                // sample.
+                _ if sampled || !channel.noise.is_empty() || region.disc.is_some() => None,
+                "W" => Some("`noise`, or a `region` with a disc"),
+                _ => Some("a `region` with a disc"),
+            };
+            Requirement::HInfinity { bound: bound(&one, remedy)?, region, channel }
         }
-        let requirement = Requirement::SampledEigenvalues(stable(&one, true)?);
-        return Ok(Request { requirement, place: one.place, other: None });
-    }
-    let other = table.require(weights[1], "the weight of the other signals")?;
-    let requirement = Requirement::Weights { states: weight(&one)?, channels: weight(&other)? };
-    let other = Some((weights[1].to_owned(), other.place));
-    Ok(Request { requirement, place: one.place, other })
+        "bandwidth" => Requirement::Bandwidth(bandwidth(&one, domain)?),
+        "eigenvalues" => Requirement::Eigenvalues(stable(&one, false)?),
+        "sampled_eigenvalues" if sampled => Requirement::SampledEigenvalues(stable(&one, true)?),
+        "sampled_eigenvalues" => return Err(one.error("the design has no `sample_time`")),
+        _ => {
+            let other = table.require(weights[1], "the weight of the other signals")?;
+            let (states, channels) = (weight(&one)?, weight(&other)?);
+            second = Some((weights[1].to_owned(), other.place));
+            Requirement::Weights { states, channels }
+        }
+    };
+    Ok(Request { requirement, place: one.place, other: second })
 }
 
 /// Rejects a disc or a sector for a sampled design: the map z = e^(s T) does not preserve their
@@ -194,15 +187,17 @@ fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
     refuse(&region.table()?, &["disc", "sector"], "a sampled design has a region by `decay` only")
 }
 
-/// Returns the only method of the table besides a region; several methods are an error.
-fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, PlaceError> {
+/// Returns the only method of the table besides a region, with its key; several methods are an error.
+fn only_one<'a, 'k>(
+    table: &Table<'a>,
+    weight: &'k str,
+) -> Result<Option<(&'k str, Entry<'a>)>, PlaceError> {
     let keys = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
-    let mut stated = keys.iter().filter_map(|key| table.get(key));
+    let mut stated = keys.into_iter().filter_map(|key| Some((key, table.get(key)?)));
     let first = stated.next();
     match stated.next() {
-        Some(second) => {
-            let keys = keys.join(", ");
-            Err(second.error(format!("only one of {keys} is possible")))
+        Some((_, second)) => {
+            Err(second.error(format!("only one of {} is possible", keys.join(", "))))
         }
         None => Ok(first),
     }
