@@ -3,29 +3,16 @@
 use maud::{Markup, html};
 
 use super::matrix::matrix;
-use super::table::{Cell, table};
-use design_report::{FreeP, Matrix, Report, Theorem1, Ultimate};
+use super::table::{Cell, Columns, table, table_of};
+use design_report::{Bound, FreeP, Matrix, Norm, Report, Theorem1, Ultimate};
 
 pub(super) fn bounds(report: &Report) -> Markup {
-    let rows: Vec<Vec<Cell>> = report
-        .bounds
-        .iter()
-        .map(|bound| {
-            vec![
-                format!("{} → {}", bound.fault, bound.error).as_str().into(),
-                (&bound.unit).into(),
-                bound.gain_of_fault.into(),
-                bound.gain_of_rate.into(),
-                bound.largest.into(),
-            ]
-        })
-        .collect();
-    let heads = [
-        "fault → quantity",
-        "unit of the quantity",
-        "gain of the fault",
-        "gain of its rate",
-        "bound of the quantity",
+    let columns: Columns<'_, Bound, 5> = [
+        ("fault → quantity", |bound| (&format!("{} → {}", bound.fault, bound.error)).into()),
+        ("unit of the quantity", |bound| (&bound.unit).into()),
+        ("gain of the fault", |bound| bound.gain_of_fault.into()),
+        ("gain of its rate", |bound| bound.gain_of_rate.into()),
+        ("bound of the quantity", |bound| bound.largest.into()),
     ];
     html! {
         p {
@@ -33,7 +20,7 @@ pub(super) fn bounds(report: &Report) -> Markup {
              the fault, or its rate, stays within plus and minus one. The bound is the smaller of \
              gain times bound, where the plant file bounds the fault or its rate."
         }
-        (table("Largest values", &heads, &rows))
+        (table_of("Largest values", &report.bounds, &columns))
     }
 }
 
@@ -63,7 +50,7 @@ pub(super) fn certificate(report: &Report) -> Markup {
             Ok(ultimate) => (self::ultimate(report, ultimate)),
             Err(reason) => p { strong { "It is not known: " } (reason) },
         }
-        (norms(report))
+        (norms(&certificate.norms))
     }
 }
 
@@ -154,25 +141,18 @@ fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> 
     }
 }
 
-fn norms(report: &Report) -> Markup {
-    let rows: Vec<Vec<Cell>> = report
-        .certificate
-        .norms
-        .iter()
-        .map(|norm| {
-            vec![
-                norm.name.as_str().into(),
-                norm.from.as_str().into(),
-                norm.to.as_str().into(),
-                norm.value.into(),
-                norm.method.as_str().into(),
-            ]
-        })
-        .collect();
+fn norms(norms: &[Norm]) -> Markup {
+    let columns: Columns<'_, Norm, 5> = [
+        ("norm", |norm| (&norm.name).into()),
+        ("from", |norm| (&norm.from).into()),
+        ("to", |norm| (&norm.to).into()),
+        ("value", |norm| norm.value.into()),
+        ("method", |norm| (&norm.method).into()),
+    ];
     html! {
-        @if !rows.is_empty() {
+        @if !norms.is_empty() {
             h3 { "Norms" }
-            (table("Norms of the error's dynamics", &["norm", "from", "to", "value", "method"], &rows))
+            (table_of("Norms of the error's dynamics", norms, &columns))
         }
     }
 }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::chart::{legend, line_sample};
 use super::number::number;
 use super::plots::{Line, Mark, Plot, Plots, Quantity};
-use super::table::{Cell, table};
+use super::table::table_of;
 use design_report::number::rounded;
 use design_report::{Curve, Frequency, Report, StepResponse};
 
@@ -136,18 +136,17 @@ fn response<'a>(id: &str, response: &'a StepResponse, plots: &mut Plots<'a>) -> 
 
 /// Shows peak and settling time of each curve in a table.
 pub(super) fn peaks(caption: &str, curves: &[Curve]) -> Markup {
-    let row = |curve: &Curve| {
-        vec![
-            curve.name.as_str().into(),
-            (&curve.unit).into(),
-            curve.peak.into(),
-            curve.peak_time.into(),
-            curve.settling_time.into(),
-        ]
-    };
-    let rows: Vec<Vec<Cell>> = curves.iter().map(row).collect();
-    let heads = ["signal", "unit", "largest magnitude", "at time (s)", "settled after (s)"];
-    table(caption, &heads, &rows)
+    table_of(
+        caption,
+        curves,
+        &[
+            ("signal", |curve| (&curve.name).into()),
+            ("unit", |curve| (&curve.unit).into()),
+            ("largest magnitude", |curve| curve.peak.into()),
+            ("at time (s)", |curve| curve.peak_time.into()),
+            ("settled after (s)", |curve| curve.settling_time.into()),
+        ],
+    )
 }
 
 /// Shows a curve; `after`: what changed; `size`: the size of that change in the unit of the curve.

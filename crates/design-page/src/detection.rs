@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::matrix::matrix;
 use super::number::number;
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table, table_of};
 use design_report::detection::{DecoupledInput, DetectedFault, Detection, Test};
 
 /// Shows tests, delays and structure.
@@ -32,39 +32,27 @@ pub(super) fn detection(section: &Detection) -> Markup {
 }
 
 fn tests(tests: &[Test]) -> Markup {
-    let decoupled = |inputs: &[DecoupledInput]| {
-        let one = |input: &DecoupledInput| {
-            let how = if input.exact { "" } else { " (approximately)" };
-            format!("{}{how}", input.name)
-        };
-        inputs.iter().map(one).collect::<Vec<_>>().join(", ")
-    };
     #[expect(clippy::cast_precision_loss, reason = "a number of residuals")]
-    let row = |test: &Test| {
-        vec![
-            Cell::from(test.name.as_str()),
-            Cell::from(test.residuals as f64),
-            Cell::from(test.drift),
-            Cell::from(test.window.map(f64::from)),
-            Cell::from(Some(test.model_error).filter(|error| *error > 0.0)),
-            Cell::from(test.interior_excess),
-            Cell::from(test.threshold),
-            Cell::from(test.false_alarm_interval),
-            Cell::from(decoupled(&test.decoupled).as_str()),
-        ]
-    };
-    let heads = [
-        "test",
-        "residuals",
-        "drift",
-        "window, samples",
-        "mean by model errors",
-        "of it above the corners, relative",
-        "threshold",
-        "between false alarms, s",
-        "insensitive to",
+    let columns: Columns<'_, Test, 9> = [
+        ("test", |test| (&test.name).into()),
+        ("residuals", |test| (test.residuals as f64).into()),
+        ("drift", |test| test.drift.into()),
+        ("window, samples", |test| test.window.map(f64::from).into()),
+        ("mean by model errors", |test| Some(test.model_error).filter(|error| *error > 0.0).into()),
+        ("of it above the corners, relative", |test| test.interior_excess.into()),
+        ("threshold", |test| test.threshold.into()),
+        ("between false alarms, s", |test| test.false_alarm_interval.into()),
+        ("insensitive to", |test| (&decoupled(&test.decoupled)).into()),
     ];
-    table("Tests", &heads, &tests.iter().map(row).collect::<Vec<_>>())
+    table_of("Tests", tests, &columns)
+}
+
+fn decoupled(inputs: &[DecoupledInput]) -> String {
+    let one = |input: &DecoupledInput| {
+        let how = if input.exact { "" } else { " (approximately)" };
+        format!("{}{how}", input.name)
+    };
+    inputs.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Says which parameters of an FMU the means by model errors are for.
@@ -81,29 +69,20 @@ fn examined(section: &Detection) -> Markup {
 }
 
 fn faults(faults: &[DetectedFault]) -> Markup {
-    let row = |fault: &DetectedFault| {
-        vec![
-            Cell::from(fault.fault.as_str()),
-            Cell::from(fault.size),
-            Cell::from(&fault.unit),
-            Cell::from(fault.mean),
-            Cell::from(fault.delay),
-            Cell::from(fault.delay_90),
-            Cell::from(fault.least),
-            Cell::from(fault.within),
-        ]
-    };
-    let heads = [
-        "fault",
-        "size of its step",
-        "unit",
-        "mean of the residuals",
-        "mean delay, s",
-        "90 % within, s",
-        "least detectable",
-        "within, s",
-    ];
-    table("Predicted detection", &heads, &faults.iter().map(row).collect::<Vec<_>>())
+    table_of(
+        "Predicted detection",
+        faults,
+        &[
+            ("fault", |fault| (&fault.fault).into()),
+            ("size of its step", |fault| fault.size.into()),
+            ("unit", |fault| (&fault.unit).into()),
+            ("mean of the residuals", |fault| fault.mean.into()),
+            ("mean delay, s", |fault| fault.delay.into()),
+            ("90 % within, s", |fault| fault.delay_90.into()),
+            ("least detectable", |fault| fault.least.into()),
+            ("within, s", |fault| fault.within.into()),
+        ],
+    )
 }
 
 fn reactions(section: &Detection) -> Markup {

@@ -3,12 +3,10 @@
 use maud::{Markup, html};
 
 use super::number::number;
-use super::table::{Cell, table};
-use design_report::robustness::Number;
-use design_report::{Check, Estimation, EstimationErrors, Report};
+use super::table::{Cell, Columns, table_of};
+use design_report::{Check, Estimation, EstimationErrors};
 
-pub(super) fn estimation(report: &Report) -> Markup {
-    let estimation = &report.estimation;
+pub(super) fn estimation(estimation: &Estimation) -> Markup {
     html! {
         p { "Law " code { (estimation.law) } " (" (estimation.sources) "), with the gains above:" }
         ul { @for line in &estimation.equations { li { code { (line) } } } }
@@ -19,57 +17,53 @@ pub(super) fn estimation(report: &Report) -> Markup {
 }
 
 pub(super) fn parameters(estimation: &Estimation) -> Markup {
-    let row = |one: &Number| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()];
-    let rows: Vec<Vec<Cell>> = estimation.parameters.iter().map(row).collect();
-    table("Parameters", &["parameter", "unit", "value"], &rows)
+    table_of(
+        "Parameters",
+        &estimation.parameters,
+        &[
+            ("parameter", |one| (&one.name).into()),
+            ("unit", |one| (&one.unit).into()),
+            ("value", |one| one.value.into()),
+        ],
+    )
 }
 
 pub(super) fn conditions(estimation: &Estimation) -> Markup {
-    let row = |one: &Check| {
-        vec![
-            one.condition.as_str().into(),
-            Cell::Holds(one.holds),
-            one.value.into(),
-            one.explanation.as_str().into(),
-        ]
-    };
-    let rows: Vec<Vec<Cell>> = estimation.conditions.iter().map(row).collect();
-    table("Conditions for its existence", &["condition", "holds", "value", "explanation"], &rows)
+    checked("Conditions for its existence", "value", &estimation.conditions)
+}
+
+/// Shows conditions; `number`: the head of their numbers.
+pub(super) fn checked(caption: &str, number: &str, checks: &[Check]) -> Markup {
+    table_of(
+        caption,
+        checks,
+        &[
+            ("condition", |one| (&one.condition).into()),
+            ("holds", |one| Cell::Holds(one.holds)),
+            (number, |one| one.value.into()),
+            ("explanation", |one| (&one.explanation).into()),
+        ],
+    )
 }
 
 /// Shows the errors of the estimates and their noise.
 pub(super) fn errors(errors: &[EstimationErrors]) -> Markup {
-    let rows: Vec<Vec<Cell>> = errors
-        .iter()
-        .map(|one| {
-            vec![
-                one.fault.as_str().into(),
-                one.constant.into(),
-                one.step_peak.into(),
-                one.step_settling.into(),
-                one.ramp.map_or_else(|| "grows".into(), Cell::Number),
-                one.sine.into(),
-                one.peak_gain.into(),
-                one.noise.into(),
-                one.noise_peak.into(),
-                (&one.unit).into(),
-            ]
-        })
-        .collect();
-    let heads = [
-        "fault",
-        "lasting error of a constant fault",
-        "largest error after a step",
-        "settling (s)",
-        "lasting error of a ramp (s)",
-        "error of a sine",
-        "peak gain",
-        "noise, root mean square",
-        "noise, peak",
-        "unit of the noise",
+    let columns: Columns<'_, EstimationErrors, 10> = [
+        ("fault", |one| (&one.fault).into()),
+        ("lasting error of a constant fault", |one| one.constant.into()),
+        ("largest error after a step", |one| one.step_peak.into()),
+        ("settling (s)", |one| one.step_settling.into()),
+        ("lasting error of a ramp (s)", |one| {
+            one.ramp.map_or_else(|| "grows".into(), Cell::Number)
+        }),
+        ("error of a sine", |one| one.sine.into()),
+        ("peak gain", |one| one.peak_gain.into()),
+        ("noise, root mean square", |one| one.noise.into()),
+        ("noise, peak", |one| one.noise_peak.into()),
+        ("unit of the noise", |one| (&one.unit).into()),
     ];
     html! {
-        (table("Errors of the estimates, relative to the fault, and their noise", &heads, &rows))
+        (table_of("Errors of the estimates, relative to the fault, and their noise", errors, &columns))
         @if let Some(one) = errors.first() {
             p {
                 "The sine has " (number(one.sine_frequency)) " rad/s, a tenth of the mean rate of the \

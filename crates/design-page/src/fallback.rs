@@ -3,16 +3,11 @@
 use maud::{Markup, html};
 
 use super::number::number;
-use super::table::{Cell, table};
-use design_report::Report;
+use super::table::{Cell, Columns, table, table_of};
 use design_report::fallback::{FallbackCase, FallbackReport};
-use design_report::robustness::{LoopPoint, Number};
+use design_report::robustness::Number;
 
-pub(super) fn fallback(report: &Report) -> Markup {
-    html! { @if let Some(fallback) = &report.fallback { (section(fallback)) } }
-}
-
-fn section(fallback: &FallbackReport) -> Markup {
+pub(super) fn fallback(fallback: &FallbackReport) -> Markup {
     html! {
         p {
             "The fall-back serves all cases below without knowing which one it is. It is in force while the \
@@ -54,37 +49,22 @@ fn section(fallback: &FallbackReport) -> Markup {
 }
 
 fn cases(cases: &[FallbackCase]) -> Markup {
-    let peak =
-        |points: &[LoopPoint], at: usize| Cell::from(points.get(at).map(|point| point.judged));
-    let row = |case: &FallbackCase| {
-        let price = case.worst_price();
-        vec![
-            case.name.as_str().into(),
-            case.decay.into(),
-            case.feedback_decay.into(),
-            peak(&case.points, 0),
-            peak(&case.points, 1),
-            case.delay_margin.into(),
-            price.map(|price| price.value).into(),
-            price.map_or("", |price| &price.name).into(),
-        ]
-    };
-    let heads = [
-        "case",
-        "decay of the loop, 1/s",
-        "decay of A + B K_x, 1/s",
-        "peak of S, input",
-        "peak of S, output",
-        "delay margin, s",
-        "price",
-        "of",
+    let columns: Columns<'_, FallbackCase, 8> = [
+        ("case", |case| (&case.name).into()),
+        ("decay of the loop, 1/s", |case| case.decay.into()),
+        ("decay of A + B K_x, 1/s", |case| case.feedback_decay.into()),
+        ("peak of S, input", |case| case.points.first().map(|point| point.judged).into()),
+        ("peak of S, output", |case| case.points.get(1).map(|point| point.judged).into()),
+        ("delay margin, s", |case| case.delay_margin.into()),
+        ("price", |case| case.worst_price().map(|price| price.value).into()),
+        ("of", |case| case.worst_price().map_or("", |price| &price.name).into()),
     ];
     html! {
         p {
             "The price is the root-mean-square value of a measurement under white noise on the commands, \
              relative to that of the intact plant with the intact controller: the largest one."
         }
-        (table("Cases of the fall-back", &heads, &cases.iter().map(row).collect::<Vec<_>>()))
+        (table_of("Cases of the fall-back", cases, &columns))
     }
 }
 

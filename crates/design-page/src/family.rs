@@ -4,16 +4,13 @@ use maud::{Markup, html};
 
 use super::matrix::{matrices, matrix};
 use super::number::number;
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table, table_of};
 use design_report::family::{CommonCertificate, FamilyReport, MemberReport};
+use design_report::robustness::{LoopPoint, Number, ToleranceResult};
 use design_report::schedule::{RateCertificate, ScheduleReport};
 use design_report::{Matrix, Report};
 
-pub(super) fn family(report: &Report) -> Markup {
-    html! { @if let Some(family) = &report.family { (members_section(report, family)) } }
-}
-
-fn members_section(report: &Report, family: &FamilyReport) -> Markup {
+pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
     html! {
         p {
             "One controller for all members; its observer has the model of the nominal plant. The worst \
@@ -48,11 +45,7 @@ fn members_section(report: &Report, family: &FamilyReport) -> Markup {
     }
 }
 
-pub(super) fn schedule(report: &Report) -> Markup {
-    html! { @if let Some(schedule) = &report.schedule { (schedule_section(report, schedule)) } }
-}
-
-fn schedule_section(report: &Report, schedule: &ScheduleReport) -> Markup {
+pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
     let unit = schedule.unit.as_deref().unwrap_or("1");
     let members: Vec<_> = schedule.points.iter().map(|point| &point.closed).collect();
     let (instant, figure, less) = match report.sampling {
@@ -106,37 +99,33 @@ fn schedule_section(report: &Report, schedule: &ScheduleReport) -> Markup {
 }
 
 fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
-    let heads = [
-        kind,
-        "stable",
-        "stability figure",
-        "peak of S, commands",
-        "peak of S, measurements",
-        "disk margin, commands",
-        "disk margin, measurements",
-        "delay margin (s)",
-        "stable cases (%)",
-        "unstable from (tolerances)",
+    let columns: Columns<'_, MemberReport, 10> = [
+        (kind, |member| (&member.name).into()),
+        ("stable", |member| Cell::Holds(member.margins.is_some())),
+        ("stability figure", |member| member.instability.into()),
+        ("peak of S, commands", |member| point(member, 0).map(|point| point.judged).into()),
+        ("peak of S, measurements", |member| point(member, 1).map(|point| point.judged).into()),
+        ("disk margin, commands", |member| point(member, 0).map(|at| at.together.alpha).into()),
+        ("disk margin, measurements", |member| point(member, 1).map(|at| at.together.alpha).into()),
+        ("delay margin (s)", |member| {
+            member.margins.as_ref().map(|margins| margins.delay_margin).into()
+        }),
+        ("stable cases (%)", |member| {
+            tolerance(member).and_then(|test| test.stable).map(|part| 100.0 * part).into()
+        }),
+        ("unstable from (tolerances)", |member| {
+            tolerance(member).map(|test| test.first_unstable).into()
+        }),
     ];
-    let row = |member: &&MemberReport| {
-        let margins = member.margins.as_ref();
-        let point = |at: usize| margins.and_then(|margins| margins.points.get(at));
-        let tolerance = margins.and_then(|margins| margins.tolerance.as_ref());
-        vec![
-            member.name.as_str().into(),
-            Cell::Holds(margins.is_some()),
-            member.instability.into(),
-            point(0).map(|point| point.judged).into(),
-            point(1).map(|point| point.judged).into(),
-            point(0).map(|point| point.together.alpha).into(),
-            point(1).map(|point| point.together.alpha).into(),
-            margins.map(|margins| margins.delay_margin).into(),
-            tolerance.and_then(|test| test.stable).map(|part| 100.0 * part).into(),
-            tolerance.map(|test| test.first_unstable).into(),
-        ]
-    };
-    let rows: Vec<Vec<Cell>> = members.iter().map(row).collect();
-    table(caption, &heads, &rows)
+    table_of(caption, members.iter().copied(), &columns)
+}
+
+fn point(member: &MemberReport, at: usize) -> Option<&LoopPoint> {
+    member.margins.as_ref()?.points.get(at)
+}
+
+fn tolerance(member: &MemberReport) -> Option<&ToleranceResult> {
+    member.margins.as_ref()?.tolerance.as_ref()
 }
 
 /// The effect of the measurement noise, a column for each member.
@@ -146,7 +135,7 @@ fn noise(members: &[&MemberReport]) -> Markup {
         .filter_map(|member| Some((&member.name, member.margins.as_ref()?)))
         .collect();
     let Some((_, first)) = stable.first() else { return html! {} };
-    let row = |(at, number): (usize, &design_report::robustness::Number)| {
+    let row = |(at, number): (usize, &Number)| {
         let name = match &number.unit {
             Some(unit) => format!("{} ({unit})", number.name),
             None => number.name.clone(),

@@ -143,72 +143,52 @@ struct Section {
 
 /// Returns the non-empty sections in reading order.
 fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
+    let Report { checks, gains, estimation, robustness, family, schedule, detection, .. } = report;
+    let Report { frequency, references, steps, bounds, assumptions, effectiveness, .. } = report;
+    let Report { reconfiguration, fallback, interface, .. } = report;
+    let family = family.as_ref().map(|family| family::family(report, family));
+    let schedule = schedule.as_ref().map(|schedule| family::schedule(report, schedule));
     let all = [
-        (true, "plant", "Plant", plant::plant(&report.plant)),
-        (!report.checks.is_empty(), "checks", "Checks", plant::checks(report)),
-        (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
-        (true, "poles", "Eigenvalues", loops::poles(report)),
-        (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        ("plant", "Plant", Some(plant::plant(&report.plant))),
+        ("checks", "Checks", any(checks, || plant::checks(report))),
+        ("gains", "Gains", any(gains, || plant::gains(report))),
+        ("poles", "Eigenvalues", Some(loops::poles(report))),
+        ("conditioning", "Condition and pole errors", Some(loops::conditioning(report))),
         (
-            !report.estimation.errors.is_empty(),
             "estimation",
             "Estimation of the faults",
-            estimation::estimation(report),
+            any(&estimation.errors, || estimation::estimation(estimation)),
         ),
         (
-            report.robustness.is_some(),
             "robustness",
             "Robustness",
-            robustness::robustness(report, plots),
+            robustness.as_ref().map(|figures| robustness::robustness(report, figures, plots)),
         ),
-        (report.family.is_some(), "family", "Family of plants", family::family(report)),
-        (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),
+        ("family", "Family of plants", family),
+        ("schedule", "Schedule", schedule),
+        ("detection", "Detection of faults", detection.as_ref().map(detection::detection)),
+        ("frequency", "Singular values", any(frequency, || curves::frequencies(report, plots))),
+        ("references", "References", any(references, || references::references(report, plots))),
+        ("steps", "Sudden faults", any(steps, || curves::responses(report, plots))),
+        ("bounds", "Bounds of the errors", any(bounds, || certificate::bounds(report))),
+        ("certificate", "Certificate", Some(certificate::certificate(report))),
+        ("assumptions", "Assumptions", any(assumptions, || plant::assumptions(report))),
+        ("effectiveness", "Loss of effectiveness", any(effectiveness, || losses::losses(report))),
         (
-            report.detection.is_some(),
-            "detection",
-            "Detection of faults",
-            report.detection.as_ref().map_or_else(Markup::default, detection::detection),
-        ),
-        (
-            !report.frequency.is_empty(),
-            "frequency",
-            "Singular values",
-            curves::frequencies(report, plots),
-        ),
-        (
-            !report.references.is_empty(),
-            "references",
-            "References",
-            references::references(report, plots),
-        ),
-        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report, plots)),
-        (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
-        (true, "certificate", "Certificate", certificate::certificate(report)),
-        (!report.assumptions.is_empty(), "assumptions", "Assumptions", plant::assumptions(report)),
-        (
-            !report.effectiveness.is_empty(),
-            "effectiveness",
-            "Loss of effectiveness",
-            losses::losses(report),
-        ),
-        (
-            report.reconfiguration.is_some(),
             "reconfiguration",
             "Without an actuator",
-            reconfiguration::reconfiguration(report),
+            reconfiguration.as_ref().map(reconfiguration::reconfiguration),
         ),
-        (report.fallback.is_some(), "fallback", "Fall-back", fallback::fallback(report)),
-        (
-            !report.interface.is_empty(),
-            "interface",
-            "Interface of the FMU",
-            plant::interface(report),
-        ),
+        ("fallback", "Fall-back", fallback.as_ref().map(fallback::fallback)),
+        ("interface", "Interface of the FMU", any(interface, || plant::interface(report))),
     ];
-    all.into_iter()
-        .filter(|(shown, ..)| *shown)
-        .map(|(_, id, title, content)| Section { id, title, content })
-        .collect()
+    let section = |(id, title, content)| Some(Section { id, title, content: content? });
+    all.into_iter().filter_map(section).collect()
+}
+
+/// The content of a section about a list; none if that is empty.
+fn any<T>(list: &[T], content: impl FnOnce() -> Markup) -> Option<Markup> {
+    (!list.is_empty()).then(content)
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@ use maud::{Markup, html};
 use super::number::number;
 use super::plane::{Plane, Pole, pairs};
 use super::pole_map::{Group, Map, Sign};
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table, table_of};
 use design_report::number::rounded;
-use design_report::{Loop, LowerBoundFor, Plant, Region, Report};
+use design_report::{Loop, LowerBoundFor, NormReport, Plant, Region, Report};
 
 /// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
@@ -150,24 +150,18 @@ fn open_loop(plant: &Plant) -> Markup {
 }
 
 /// Shows how the gains were found and how well conditioned the loops are.
-pub(super) fn conditioning(report: &Report) -> Markup {
-    let row = |name: &str, system: &Loop| {
-        vec![
-            name.into(),
-            system.matrix.as_str().into(),
-            system.method.as_str().into(),
-            system.condition.into(),
-            system.balanced_condition.into(),
-            system.pole_error.into(),
-        ]
-    };
-    let heads =
-        ["loop", "matrix", "method", "condition", "condition, balanced", "pole error, relative"];
+pub(super) fn conditioning<'a>(report: &'a Report) -> Markup {
+    let columns: Columns<'_, (&'a str, &'a Loop), 6> = [
+        ("loop", |(name, _)| (*name).into()),
+        ("matrix", |(_, system)| (&system.matrix).into()),
+        ("method", |(_, system)| (&system.method).into()),
+        ("condition", |(_, system)| system.condition.into()),
+        ("condition, balanced", |(_, system)| system.balanced_condition.into()),
+        ("pole error, relative", |(_, system)| system.pole_error.into()),
+    ];
+    let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
     html! {
-        (table("Condition of the eigenvectors, and distance from the required eigenvalues", &heads, &[
-            row("feedback", &report.feedback),
-            row("observer", &report.observer),
-        ]))
+        (table_of("Condition of the eigenvectors, and distance from the required eigenvalues", &loops, &columns))
         p {
             "A change of the matrix moves an eigenvalue by at most the condition number times the \
              norm of the change (Bauer and Fike, 1960). Balanced: in coordinates \
@@ -215,39 +209,24 @@ fn bound_for(all: LowerBoundFor) -> &'static str {
 }
 
 /// Shows the norms of gains that were designed by them, with their bounds.
-fn norms(report: &Report) -> Markup {
+fn norms<'a>(report: &'a Report) -> Markup {
     let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
-    let rows: Vec<_> = loops
-        .into_iter()
-        .filter_map(|(name, system)| {
-            let norm = system.norm.as_ref()?;
-            Some(vec![
-                name.into(),
-                norm.channel.as_str().into(),
-                Some(norm.norm).into(),
-                norm.certified.into(),
-                norm.lower_bound.into(),
-                norm.lower_bound_for.map_or("", bound_for).into(),
-                norm.gap.map(|gap| 100.0 * gap).into(),
-                norm.unweighted.into(),
-                Some(norm.gain).into(),
-            ])
-        })
-        .collect();
-    let heads = [
-        "loop",
-        "from, to",
-        "norm",
-        "proven bound",
-        "lower bound",
-        "lower bound for",
-        "gap (%)",
-        "without weights and noise",
-        "norm of the gain",
+    let norms = loops.into_iter().filter_map(|(name, system)| Some((name, system.norm.as_ref()?)));
+    let norms: Vec<_> = norms.collect();
+    let columns: Columns<'_, (&'a str, &'a NormReport), 9> = [
+        ("loop", |(name, _)| (*name).into()),
+        ("from, to", |(_, norm)| (&norm.channel).into()),
+        ("norm", |(_, norm)| norm.norm.into()),
+        ("proven bound", |(_, norm)| norm.certified.into()),
+        ("lower bound", |(_, norm)| norm.lower_bound.into()),
+        ("lower bound for", |(_, norm)| norm.lower_bound_for.map_or("", bound_for).into()),
+        ("gap (%)", |(_, norm)| norm.gap.map(|gap| 100.0 * gap).into()),
+        ("without weights and noise", |(_, norm)| norm.unweighted.into()),
+        ("norm of the gain", |(_, norm)| norm.gain.into()),
     ];
     html! {
-        @if !rows.is_empty() {
-            (table("H-infinity norms", &heads, &rows))
+        @if !norms.is_empty() {
+            (table_of("H-infinity norms", &norms, &columns))
             p {
                 "No gain has a norm below the lower bound, nor has a filter of any order: growing \
                  disturbances that the measurements do not show prove it. A lower bound marked \"disc\" holds \

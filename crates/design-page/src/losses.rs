@@ -4,9 +4,9 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::plant::effectiveness;
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table, table_of};
 use design_report::Report;
-use design_report::losses::{LossLoop, LossReport, described};
+use design_report::losses::{LossLoop, LossPeak, LossReport, described};
 
 pub(super) fn losses(report: &Report) -> Markup {
     html! {
@@ -45,10 +45,10 @@ fn of_loop(loop_losses: &LossLoop, losses: &LossReport) -> Markup {
                 at => format!("{} alone", losses.stated[at - 1].name),
             };
             vec![
-                case.as_str().into(),
-                certified.map_or(Cell::Missing, |bound| described(&bound.losses).as_str().into()),
+                (&case).into(),
+                certified.map_or(Cell::Missing, |bound| (&described(&bound.losses)).into()),
                 certified.map(|bound| bound.factor).into(),
-                described(&constant.losses).as_str().into(),
+                (&described(&constant.losses)).into(),
                 Some(constant.factor).filter(|_| !constant.stable).into(),
                 if constant.stable { "stable up to here" } else { "unstable beyond" }.into(),
             ]
@@ -61,6 +61,14 @@ fn of_loop(loop_losses: &LossLoop, losses: &LossReport) -> Markup {
         "largest constant losses",
         "their factor",
         "there",
+    ];
+    let peaks: Columns<'_, LossPeak, 4> = [
+        ("disturbance → state", |peak| {
+            (&format!("{} → {}", peak.disturbance, peak.state)).into()
+        }),
+        ("largest disturbance", |peak| peak.size.into()),
+        ("bound of the state", |peak| peak.largest.into()),
+        ("unit", |peak| (&peak.unit).into()),
     ];
     html! {
         h3 { "Losses, " (loop_losses.name) }
@@ -80,21 +88,8 @@ fn of_loop(loop_losses: &LossLoop, losses: &LossReport) -> Markup {
         }
         (table(&format!("Limits of the losses, {}", loop_losses.name), &heads, &limits))
         @if let Ok(proof) = &loop_losses.proof {
-            @let rows: Vec<Vec<Cell>> = proof
-                .peaks
-                .iter()
-                .map(|peak| vec![
-                    format!("{} → {}", peak.disturbance, peak.state).as_str().into(),
-                    peak.size.into(),
-                    peak.largest.into(),
-                    (&peak.unit).into(),
-                ])
-                .collect();
-            (table(
-                &format!("Largest states for all stated losses, {}", loop_losses.name),
-                &["disturbance → state", "largest disturbance", "bound of the state", "unit"],
-                &rows,
-            ))
+            @let caption = format!("Largest states for all stated losses, {}", loop_losses.name);
+            (table_of(&caption, &proof.peaks, &peaks))
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
+use super::estimation::checked;
 use super::matrix::{literals, matrices};
-use super::table::{Cell, table};
-use design_report::{PidController, Plant, Report, Signal};
+use super::table::{Columns, table_of};
+use design_report::{Effectiveness, PidController, Plant, Report, Signal};
 
 pub(super) fn plant(plant: &Plant) -> Markup {
     let kinds = [
@@ -21,37 +22,21 @@ pub(super) fn plant(plant: &Plant) -> Markup {
 }
 
 fn signals(caption: &str, signals: &[Signal]) -> Markup {
-    let row = |signal: &Signal| -> Vec<Cell> {
-        vec![
-            signal.name.as_str().into(),
-            (&signal.unit).into(),
-            signal.description.as_str().into(),
-            signal.operating.into(),
-            signal.notes.as_str().into(),
-        ]
-    };
-    let heads = ["name", "unit", "description", "operating point", "notes"];
-    table(caption, &heads, &signals.iter().map(row).collect::<Vec<_>>())
+    table_of(
+        caption,
+        signals,
+        &[
+            ("name", |signal| (&signal.name).into()),
+            ("unit", |signal| (&signal.unit).into()),
+            ("description", |signal| (&signal.description).into()),
+            ("operating point", |signal| signal.operating.into()),
+            ("notes", |signal| (&signal.notes).into()),
+        ],
+    )
 }
 
 pub(super) fn checks(report: &Report) -> Markup {
-    let rows: Vec<Vec<Cell>> = report
-        .checks
-        .iter()
-        .map(|check| {
-            vec![
-                check.condition.as_str().into(),
-                Cell::Holds(check.holds),
-                check.value.into(),
-                check.explanation.as_str().into(),
-            ]
-        })
-        .collect();
-    table(
-        "What must hold, and whether it does",
-        &["condition", "holds", "number", "explanation"],
-        &rows,
-    )
+    checked("What must hold, and whether it does", "number", &report.checks)
 }
 
 pub(super) fn gains(report: &Report) -> Markup {
@@ -68,26 +53,22 @@ fn pid(controllers: &[PidController]) -> Markup {
     if controllers.is_empty() {
         return Markup::default();
     }
-    let row = |one: &PidController| {
-        vec![
-            one.command.as_str().into(),
-            one.measurement.as_str().into(),
-            Some(one.proportional).into(),
-            Some(one.integral).into(),
-            one.derivative.into(),
-            one.set_point.into(),
-            Some(one.corner).into(),
-        ]
-    };
-    let rows: Vec<Vec<Cell>> = controllers.iter().map(row).collect();
-    let heads = ["command", "measurement", "K", "K_i (1/s)", "K_d (s)", "N_r", "ω (rad/s)"];
+    let columns: Columns<'_, PidController, 7> = [
+        ("command", |one| (&one.command).into()),
+        ("measurement", |one| (&one.measurement).into()),
+        ("K", |one| one.proportional.into()),
+        ("K_i (1/s)", |one| one.integral.into()),
+        ("K_d (s)", |one| one.derivative.into()),
+        ("N_r", |one| one.set_point.into()),
+        ("ω (rad/s)", |one| one.corner.into()),
+    ];
     html! {
         p {
             "u = N_r r − K y_f + K_i ∫ (r − y) dt − K_d y_f′ + K_f f_hat, in deviations from the operating point. \
              y_f is y behind the filter 1 / (1 + s/ω) of a PI controller, 1 / (1 + √2 s/ω + s²/ω²) of a PID controller. \
              K has the unit of the command per unit of the measurement."
         }
-        (table("PI and PID controllers", &heads, &rows))
+        (table_of("PI and PID controllers", controllers, &columns))
     }
 }
 
@@ -96,35 +77,30 @@ pub(super) fn assumptions(report: &Report) -> Markup {
 }
 
 pub(super) fn effectiveness(report: &Report) -> Markup {
-    let rows: Vec<Vec<Cell>> = report
-        .effectiveness
-        .iter()
-        .map(|entry| vec![entry.actuator.as_str().into(), entry.largest_stable_loss.into()])
-        .collect();
+    let columns: Columns<'_, Effectiveness, 2> = [
+        ("actuator", |entry| (&entry.actuator).into()),
+        ("largest stable loss", |entry| entry.largest_stable_loss.into()),
+    ];
     html! {
         p {
             "An actuator with loss E gives (1 − E) u. The loop is stable for every loss from 0 up \
              to the one stated."
         }
-        (table("Loss of effectiveness", &["actuator", "largest stable loss"], &rows))
+        (table_of("Loss of effectiveness", &report.effectiveness, &columns))
     }
 }
 
 pub(super) fn interface(report: &Report) -> Markup {
-    let rows: Vec<Vec<Cell>> = report
-        .interface
-        .iter()
-        .map(|variable| {
-            vec![
-                variable.name.as_str().into(),
-                variable.causality.as_str().into(),
-                variable.variability.as_str().into(),
-                (&variable.unit).into(),
-                (&variable.start).into(),
-                variable.description.as_str().into(),
-            ]
-        })
-        .collect();
-    let heads = ["name", "causality", "variability", "unit", "start", "description"];
-    table("Variables of the controller FMU", &heads, &rows)
+    table_of(
+        "Variables of the controller FMU",
+        &report.interface,
+        &[
+            ("name", |variable| (&variable.name).into()),
+            ("causality", |variable| (&variable.causality).into()),
+            ("variability", |variable| (&variable.variability).into()),
+            ("unit", |variable| (&variable.unit).into()),
+            ("start", |variable| (&variable.start).into()),
+            ("description", |variable| (&variable.description).into()),
+        ],
+    )
 }

@@ -3,15 +3,11 @@
 use maud::{Markup, html};
 
 use super::number::number;
-use super::table::{Cell, table};
-use design_report::Report;
-use design_report::reconfiguration::{Reconfigured, ServedByFallback};
+use super::table::{Cell, Columns, table, table_of};
+use design_report::reconfiguration::{ReconfigurationReport, Reconfigured, ServedByFallback};
 use design_report::robustness::Number;
 
-pub(super) fn reconfiguration(report: &Report) -> Markup {
-    let Some(section) = &report.reconfiguration else {
-        return html! {};
-    };
+pub(super) fn reconfiguration(section: &ReconfigurationReport) -> Markup {
     html! {
         p {
             "An actuator that is gone is stuck at a constant command. The controller FMU then uses that \
@@ -32,23 +28,19 @@ pub(super) fn reconfiguration(report: &Report) -> Markup {
 
 /// A table of the sets of actuators that have no gains of their own: when they are gone, the controller falls back.
 fn by_fallback(cases: &[ServedByFallback]) -> Markup {
-    let row = |case: &ServedByFallback| {
-        let stable = Cell::Holds(case.stable);
-        vec![case.actuators.join(", ").as_str().into(), case.decay.into(), stable]
-    };
-    let rows: Vec<Vec<Cell>> = cases.iter().map(row).collect();
+    let columns: Columns<'_, ServedByFallback, 3> = [
+        ("without", |case| (&case.actuators.join(", ")).into()),
+        ("decay of the loop, 1/s", |case| case.decay.into()),
+        ("stable", |case| Cell::Holds(case.stable)),
+    ];
     html! {
-        @if !rows.is_empty() {
+        @if !cases.is_empty() {
             h3 { "Without gains of their own" }
             p {
                 "While these actuators are gone the fall-back is in force; the observer knows their stuck \
                  commands."
             }
-            (table(
-                "Actuators that are gone in the fall-back",
-                &["without", "decay of the loop, 1/s", "stable"],
-                &rows,
-            ))
+            (table_of("Actuators that are gone in the fall-back", cases, &columns))
         }
     }
 }
@@ -64,17 +56,16 @@ fn without(name: &str, outcome: &Result<Reconfigured, String>) -> Markup {
 }
 
 fn controller(name: &str, case: &Reconfigured) -> Markup {
-    let numbers = |all: &[Number]| -> Vec<Vec<Cell>> {
-        let row = |signal: &Number| {
-            vec![signal.name.as_str().into(), signal.value.into(), (&signal.unit).into()]
-        };
-        all.iter().map(row).collect()
+    let numbers = |signal, value| -> Columns<'_, Number, 3> {
+        [
+            (signal, |signal| (&signal.name).into()),
+            (value, |signal| signal.value.into()),
+            ("unit", |signal| (&signal.unit).into()),
+        ]
     };
-    let eigenvalues: Vec<Vec<Cell>> = case
-        .eigenvalues
-        .iter()
-        .enumerate()
-        .map(|(at, value)| vec![(at + 1).to_string().as_str().into(), Some(*value).into()])
+    let eigenvalues = case.eigenvalues.iter().enumerate();
+    let eigenvalues: Vec<Vec<Cell>> = eigenvalues
+        .map(|(at, value)| vec![Cell::Text((at + 1).to_string()), Some(*value).into()])
         .collect();
     html! {
         p { (case.method) }
@@ -93,15 +84,15 @@ fn controller(name: &str, case: &Reconfigured) -> Markup {
             }
         }
         (table(&format!("Eigenvalues without {name}"), &["number", "eigenvalue of A + B K_x"], &eigenvalues))
-        (table(
+        (table_of(
             &format!("Commands at rest without {name}"),
-            &["actuator", "command", "unit"],
-            &numbers(&case.commands),
+            &case.commands,
+            &numbers("actuator", "command"),
         ))
-        (table(
+        (table_of(
             &format!("Measurements at rest without {name}"),
-            &["measurement", "deviation from the operating point", "unit"],
-            &numbers(&case.measurements),
+            &case.measurements,
+            &numbers("measurement", "deviation from the operating point"),
         ))
     }
 }

@@ -6,7 +6,8 @@ use super::chart::{legend, line_sample};
 use super::curves;
 use super::number::number;
 use super::plots::Plots;
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table_of};
+use design_report::robustness::Number;
 use design_report::{CommandPeak, ReferenceStep, Report};
 
 /// Shows the response to a step of each reference.
@@ -26,43 +27,28 @@ pub(super) fn references<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Marku
 fn step<'a>(id: &str, step: &'a ReferenceStep, plots: &mut Plots<'a>) -> Markup {
     let unit = step.unit.as_deref().unwrap_or_default();
     let caption = format!("Response to a step of {}", step.reference);
-    let heads = [
-        "rise time (s)",
-        "overshoot, relative",
-        "settled after (s)",
-        "steady-state error, relative",
-        "largest negative step",
-        "largest step",
+    let columns: Columns<'_, ReferenceStep, 6> = [
+        ("rise time (s)", |step| step.rise_time.into()),
+        ("overshoot, relative", |step| step.overshoot.into()),
+        ("settled after (s)", |step| step.settling_time.into()),
+        ("steady-state error, relative", |step| step.steady_state_error.into()),
+        ("largest negative step", |step| limit(step.largest_step[0])),
+        ("largest step", |step| limit(step.largest_step[1])),
     ];
-    let limit = |value: f64| if value.is_finite() { value.into() } else { Cell::from("no limit") };
-    let row = vec![
-        step.rise_time.into(),
-        step.overshoot.into(),
-        step.settling_time.into(),
-        step.steady_state_error.into(),
-        limit(step.largest_step[0]),
-        limit(step.largest_step[1]),
+    let of_commands: Columns<'_, CommandPeak, 7> = [
+        ("command", |peak| (&peak.name).into()),
+        ("unit", |peak| (&peak.unit).into()),
+        ("smallest", |peak| peak.range[0].into()),
+        ("largest", |peak| peak.range[1].into()),
+        ("finally", |peak| peak.final_value.into()),
+        ("lower limit", |peak| peak.limits.map(|limits| limits[0]).into()),
+        ("upper limit", |peak| peak.limits.map(|limits| limits[1]).into()),
     ];
-    let command = |peak: &CommandPeak| {
-        let [low, high] = peak.limits.map_or([None; 2], |limits| limits.map(Some));
-        vec![
-            peak.name.as_str().into(),
-            (&peak.unit).into(),
-            peak.range[0].into(),
-            peak.range[1].into(),
-            peak.final_value.into(),
-            low.into(),
-            high.into(),
-        ]
-    };
-    let commands: Vec<_> = step.commands.iter().map(command).collect();
-    let others = step
-        .others
-        .iter()
-        .map(|other| vec![other.name.as_str().into(), (&other.unit).into(), other.value.into()]);
-    let others: Vec<Vec<Cell>> = others.collect();
-    let command_heads =
-        ["command", "unit", "smallest", "largest", "finally", "lower limit", "upper limit"];
+    let of_others: Columns<'_, Number, 3> = [
+        ("output", |other| (&other.name).into()),
+        ("unit", |other| (&other.unit).into()),
+        ("largest magnitude", |other| other.value.into()),
+    ];
     let sized = |at: usize| (at == 0).then_some(step.size);
     let entries = [
         (line_sample("mark"), "settled, within 2 %".to_owned()),
@@ -72,7 +58,7 @@ fn step<'a>(id: &str, step: &'a ReferenceStep, plots: &mut Plots<'a>) -> Markup 
         h3 id=(id) {
             "A step of " (step.reference) " by " (number(step.size)) " " (unit)
         }
-        (table(&caption, &heads, &[row]))
+        (table_of(&caption, [step], &columns))
         div.figures.small {
             @for (index, curve) in step.curves.iter().enumerate() {
                 @let after = format!("a step of {}", step.reference);
@@ -81,13 +67,15 @@ fn step<'a>(id: &str, step: &'a ReferenceStep, plots: &mut Plots<'a>) -> Markup 
         }
         (legend(&entries))
         (curves::peaks(&format!("Peaks and settling after a step of {}", step.reference), &step.curves))
-        (table(&format!("Commands after a step of {}", step.reference), &command_heads, &commands))
-        @if !others.is_empty() {
-            (table(
-                &format!("Largest movement of other outputs after a step of {}", step.reference),
-                &["output", "unit", "largest magnitude"],
-                &others,
-            ))
-        }
+        (table_of(&format!("Commands after a step of {}", step.reference), &step.commands, &of_commands))
+        (table_of(
+            &format!("Largest movement of other outputs after a step of {}", step.reference),
+            &step.others,
+            &of_others,
+        ))
     }
+}
+
+fn limit(value: f64) -> Cell {
+    if value.is_finite() { value.into() } else { "no limit".into() }
 }

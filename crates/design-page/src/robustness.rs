@@ -6,18 +6,14 @@ use super::curves::frequency;
 use super::matrix::matrices;
 use super::number::number;
 use super::plots::Plots;
-use super::table::{Cell, table};
+use super::table::{Cell, Columns, table, table_of};
 use design_report::robustness::{
-    Disk, Parameter, PeakSensitivity, Robustness, ToleranceProof, ToleranceResult,
+    Compared, Disk, Number, Parameter, PeakSensitivity, Robustness, ToleranceProof, ToleranceResult,
 };
 use design_report::{Matrix, Report};
 
 /// Number of parameters in the table of the sensitivities.
 const SHOWN: usize = 12;
-
-pub(super) fn robustness<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
-    html! { @if let Some(robustness) = &report.robustness { (section(report, robustness, plots)) } }
-}
 
 /// Shows what the delays themselves change.
 fn delays(robustness: &Robustness) -> Markup {
@@ -41,7 +37,11 @@ fn delays(robustness: &Robustness) -> Markup {
     }
 }
 
-fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
+pub(super) fn robustness<'a>(
+    report: &Report,
+    robustness: &'a Robustness,
+    plots: &mut Plots<'a>,
+) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
     html! {
@@ -113,60 +113,45 @@ fn disks(robustness: &Robustness) -> Markup {
 }
 
 fn peaks(robustness: &Robustness) -> Markup {
-    let row = |point: &design_report::robustness::LoopPoint| {
-        vec![
-            format!("at the {}", point.point).as_str().into(),
-            point.s_peak.into(),
-            point.s_frequency.into(),
-            point.s_peak_scaled.into(),
-            point.t_peak.into(),
-            point.t_frequency.into(),
-            point.judged.into(),
-            point.judged_frequency.into(),
-        ]
-    };
-    let rows: Vec<Vec<Cell>> = robustness.points.iter().map(row).collect();
-    let heads = [
-        "loop opened",
-        "peak of S",
-        "at rad/s",
-        "peak of S in the best units",
-        "peak of T",
-        "at rad/s",
-        "judged",
-        "at rad/s",
-    ];
-    table("Peaks of the largest singular value", &heads, &rows)
+    table_of(
+        "Peaks of the largest singular value",
+        &robustness.points,
+        &[
+            ("loop opened", |point| (&format!("at the {}", point.point)).into()),
+            ("peak of S", |point| point.s_peak.into()),
+            ("at rad/s", |point| point.s_frequency.into()),
+            ("peak of S in the best units", |point| point.s_peak_scaled.into()),
+            ("peak of T", |point| point.t_peak.into()),
+            ("at rad/s", |point| point.t_frequency.into()),
+            ("judged", |point| point.judged.into()),
+            ("at rad/s", |point| point.judged_frequency.into()),
+        ],
+    )
 }
 
 fn channels(robustness: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = robustness
-        .points
-        .iter()
-        .flat_map(|point| &point.channels)
-        .map(|channel| {
-            vec![
-                channel.name.as_str().into(),
-                channel.gain[0].into(),
-                channel.gain[1].into(),
-                channel.phase.into(),
-                channel.delay.into(),
-            ]
-        })
-        .collect();
-    let heads = ["channel", "gain from", "gain to", "phase margin (degrees)", "delay margin (s)"];
-    table("One channel changes, the others are exact", &heads, &rows)
+    table_of(
+        "One channel changes, the others are exact",
+        robustness.points.iter().flat_map(|point| &point.channels),
+        &[
+            ("channel", |channel| (&channel.name).into()),
+            ("gain from", |channel| channel.gain[0].into()),
+            ("gain to", |channel| channel.gain[1].into()),
+            ("phase margin (degrees)", |channel| channel.phase.into()),
+            ("delay margin (s)", |channel| channel.delay.into()),
+        ],
+    )
 }
 
 fn noise(report: &Report, robustness: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = robustness
-        .noise_together
-        .iter()
-        .map(|one| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()])
-        .collect();
+    let columns: Columns<'_, Number, 3> = [
+        ("signal", |one| (&one.name).into()),
+        ("unit", |one| (&one.unit).into()),
+        ("root mean square", |one| one.value.into()),
+    ];
     let assumed = robustness.noise.columns.iter().zip(&robustness.noise_of_measurements);
     let assumed: Vec<Vec<Cell>> =
-        assumed.map(|(name, noise)| vec![name.as_str().into(), (*noise).into()]).collect();
+        assumed.map(|(name, noise)| vec![name.into(), (*noise).into()]).collect();
     html! {
         p {
             "Root-mean-square values under independent white noise of the measurements. "
@@ -178,24 +163,24 @@ fn noise(report: &Report, robustness: &Robustness) -> Markup {
             }
         }
         (table("Assumed noise", &["measurement", "noise"], &assumed))
-        (table("Under all noises", &["signal", "unit", "root mean square"], &rows))
+        (table_of("Under all noises", &robustness.noise_together, &columns))
         (matrices("noise-each", std::slice::from_ref(&robustness.noise)))
     }
 }
 
 fn comparison(robustness: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = robustness
-        .comparison
-        .iter()
-        .map(|one| vec![one.name.as_str().into(), one.design.into(), one.linear_quadratic.into()])
-        .collect();
+    let columns: Columns<'_, Compared, 3> = [
+        ("quantity", |one| (&one.name).into()),
+        ("this design", |one| one.design.into()),
+        ("linear-quadratic", |one| one.linear_quadratic.into()),
+    ];
     html! {
         p {
             "The linear-quadratic regulator and the Kalman filter whose eigenvalues have the same sum \
              of decay rates show what the required speed costs at least: a design that is many times \
              larger has eigenvalues that the plant resists."
         }
-        (table("Norms and peaks", &["quantity", "this design", "linear-quadratic"], &rows))
+        (table_of("Norms and peaks", &robustness.comparison, &columns))
     }
 }
 

@@ -20,6 +20,12 @@ impl From<&str> for Cell {
     }
 }
 
+impl From<&String> for Cell {
+    fn from(text: &String) -> Self {
+        text.as_str().into()
+    }
+}
+
 impl From<&Option<String>> for Cell {
     fn from(text: &Option<String>) -> Self {
         text.as_deref().map_or(Self::Missing, Self::from)
@@ -105,6 +111,20 @@ pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup
             }))
         }
     }
+}
+
+/// The columns of a table of items: each has a head and gives the cell of an item.
+pub(super) type Columns<'a, T, const N: usize> = [(&'a str, fn(&T) -> Cell); N];
+
+/// Returns the [`table`] with a row for each item.
+pub(super) fn table_of<'a, T: 'a, const N: usize>(
+    caption: &str,
+    items: impl IntoIterator<Item = &'a T>,
+    columns: &Columns<'_, T, N>,
+) -> Markup {
+    let heads = columns.map(|(head, _)| head);
+    let row = |item: &T| columns.iter().map(|(_, cell)| cell(item)).collect();
+    table(caption, &heads, &items.into_iter().map(row).collect::<Vec<_>>())
 }
 
 fn row_name(cell: &Cell) -> Markup {
