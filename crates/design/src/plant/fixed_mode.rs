@@ -4,34 +4,19 @@ use control::Domain;
 use control::rank::Mode;
 use nalgebra::Complex;
 
-/// Returns `the eigenvalue -2 1/s, which x2 dominates`; `name` returns the name of a state.
-pub(crate) fn described(mode: &Mode, name: impl Fn(usize) -> String) -> String {
-    described_at(mode.eigenvalue, " 1/s", mode, name)
-}
-
-/// The same with the eigenvalue in the plane in which the plant file states it: of the sampled loop
-/// if `sampled`, otherwise in 1/s.
+/// Returns `the eigenvalue -2 1/s, which x2 dominates`, with the eigenvalue in the plane in which the plant file states
+/// it: of the sampled loop if `sampled`, otherwise in 1/s; `name` returns the name of a state.
 pub(crate) fn described_in(
     mode: &Mode,
     domain: Domain,
     sampled: bool,
     name: impl Fn(usize) -> String,
 ) -> String {
-    match domain {
-        Domain::Sampled { period } if !sampled => {
-            described_at(mode.eigenvalue.ln() / period, " 1/s", mode, name)
-        }
-        Domain::Sampled { .. } => described_at(mode.eigenvalue, " of the sampled loop", mode, name),
-        Domain::Continuous => described(mode, name),
-    }
-}
-
-fn described_at(
-    eigenvalue: Complex<f64>,
-    unit: &str,
-    mode: &Mode,
-    name: impl Fn(usize) -> String,
-) -> String {
+    let (eigenvalue, unit) = match domain {
+        Domain::Sampled { period } if !sampled => (mode.eigenvalue.ln() / period, " 1/s"),
+        Domain::Sampled { .. } => (mode.eigenvalue, " of the sampled loop"),
+        Domain::Continuous => (mode.eigenvalue, " 1/s"),
+    };
     let states: Vec<_> = mode.dominant.iter().map(|&state| name(state)).collect();
     let verb = if states.len() == 1 { "dominates" } else { "dominate" };
     let kind = if eigenvalue.im == 0.0 { "the eigenvalue" } else { "the eigenvalues" };
