@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::analysis::Outputs;
+use crate::matrix::{beside, stacked};
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
 use crate::solve::solution::Solution;
@@ -114,9 +115,7 @@ impl<'a> ShownLoop<'a> {
         if let Domain::Sampled { period } = *domain {
             let n = designed.extended.states;
             let model = &designed.extended.plant;
-            let mut b = DMatrix::zeros(n, m + q);
-            b.columns_mut(0, m).copy_from(&model.b.rows(0, n));
-            b.columns_mut(m, q).copy_from(&model.f_a.rows(0, n));
+            let b = beside(&model.b.rows(0, n).into(), &model.f_a.rows(0, n).into());
             for time in designed.linear.times_between(period, PARTS) {
                 // x(t_k + time) from x(t_k), with command and fault constant since t_k.
                 let (phi, gamma) = designed.linear.held(&b, time)?;
@@ -250,12 +249,7 @@ fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
 
 /// Appends outputs to a system.
 pub(crate) fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix<f64>) {
-    let rows = system.c.nrows();
-    for (matrix, below) in [(&mut system.c, c), (&mut system.d, d)] {
-        let mut all = matrix.clone().resize_vertically(rows + below.nrows(), 0.0);
-        all.rows_mut(rows, below.nrows()).copy_from(below);
-        *matrix = all;
-    }
+    (system.c, system.d) = (stacked(&system.c, c), stacked(&system.d, d));
 }
 
 /// Returns the value with the largest modulus, its time, and the time from which the points stay

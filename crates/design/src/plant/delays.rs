@@ -1,12 +1,13 @@
 //! The delays of a plant: the states that approximate them, in the observer and for the judgement.
 
+use control::StateSpace;
 use control::delay::{Delays, pade};
 use control::eigen::eigenvalues;
 use control::robustness::Tolerances;
-use control::{Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
+use crate::matrix::beside;
 use crate::plant::filters::{self, with_filters};
 use crate::report::number::rounded;
 use plant_file::PlantFile;
@@ -82,11 +83,6 @@ pub(crate) fn with_delays(
     [f, g]: [&DMatrix<f64>; 2],
 ) -> Result<StateSpace, PlaceError> {
     let (m, q) = (plant.b.ncols(), f.ncols());
-    let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-        let mut both = left.clone().resize_horizontally(m + q, 0.0);
-        both.columns_mut(m, q).copy_from(right);
-        both
-    };
     let inputs = StateSpace { b: beside(&plant.b, f), d: beside(&plant.d, g), ..plant.clone() };
     let mut delays = of(file);
     delays.inputs.resize(m + q, 0.0);
@@ -96,11 +92,6 @@ pub(crate) fn with_delays(
         None => Ok(plant),
     });
     filtered.map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
-}
-
-/// The plant with the approximation of the judgement.
-pub(crate) fn judged(delays: &Delays, plant: &StateSpace) -> Result<StateSpace, Error> {
-    delays.approximated(plant, JUDGED)
 }
 
 /// Places the tolerances of a plant without its delays in the plant with approximations of `order`.

@@ -66,13 +66,7 @@ impl LinearPlant {
 
     /// The plant from the commands to the measurements.
     pub(crate) fn state_space(&self) -> StateSpace {
-        StateSpace {
-            a: self.a.clone(),
-            b: self.b.clone(),
-            c: self.c.clone(),
-            d: self.d.clone(),
-            domain: self.domain,
-        }
+        system([&self.a, &self.b, &self.c, &self.d], self.domain)
     }
 
     /// The matrix of the states in the condition of rest: A in A x + B u = 0, in sampled time A - I.
@@ -108,7 +102,7 @@ impl LinearPlant {
 
     /// The plant from the commands to the measurements for the judgement: with better approximations of its delays.
     pub(crate) fn judged(&self) -> Result<StateSpace, Error> {
-        delays::judged(&self.delays, &self.undelayed)
+        self.delays.approximated(&self.undelayed, delays::JUDGED)
     }
 
     /// The states without those of delays.
@@ -249,12 +243,9 @@ fn linearised(
         operating: Some(signal.value),
         ..Signal::named(signal.name.clone())
     };
-    let merged = |signals: &[Signal], from_fmu: &[linearise::Signal]| {
-        signals
-            .iter()
-            .zip(from_fmu)
-            .map(|(signal, known_signal)| signal.clone().or(known(known_signal)))
-            .collect::<Vec<_>>()
+    let merged = |signals: &[Signal], from_fmu: &[linearise::Signal]| -> Vec<_> {
+        let both = signals.iter().zip(from_fmu);
+        both.map(|(signal, known_signal)| signal.clone().or(known(known_signal))).collect()
     };
     let linearise::Matrices { a, b, c, d, f, g } = &linearised.matrices;
     let d = significant(d.clone(), c);
@@ -373,14 +364,14 @@ fn linearisation(
     let plant_file::PlantFmu { path, operating_point, .. } = fmu_table;
     let fmu = open(file, fmu_table)?;
     let linearised = linearise(&fmu, &request(file, fmu_table)).map_err(|error| {
-        let place = match &error {
-            LineariseError::UnknownVariable { name, .. } => stating(file, operating_point, name),
-            LineariseError::NoStep { .. } => "linearisation_step",
-            _ => "plant",
-        };
-        let help = match &error {
-            LineariseError::NoStep { .. } => " (`linearisation_step` states it)",
-            _ => "",
+        let (place, help) = match &error {
+            LineariseError::UnknownVariable { name, .. } => {
+                (stating(file, operating_point, name), "")
+            }
+            LineariseError::NoStep { .. } => {
+                ("linearisation_step", " (`linearisation_step` states it)")
+            }
+            _ => ("plant", ""),
         };
         file.error(&[place, "plant"], format!("{}: {error}{help}", path.display()))
     })?;

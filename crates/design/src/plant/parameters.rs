@@ -62,20 +62,15 @@ impl<'a> ParameterFamily<'a> {
         let end = |deviation: f64| {
             let mut deviations = vec![0.0; self.count()];
             deviations[at] = deviation;
-            self.undelayed(&deviations)
+            self.at_operating_point(&deviations)
         };
-        let (high, low) = (end(1.0)?, end(-1.0)?);
+        let ((high, ..), (low, ..)) = (end(1.0)?, end(-1.0)?);
         let half = |high, low| (high - low) * 0.5;
         Ok([half(high.a, low.a), half(high.b, low.b), half(high.c, low.c), half(high.d, low.d)])
     }
 
-    /// The plant without its delays.
-    fn undelayed(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
-        Ok(self.at_operating_point(deviations)?.0)
-    }
-
-    /// Linearises the FMU at the operating point of the plant file, with other parameters; returns also the
-    /// rates of its states there, and its measurements.
+    /// Linearises the FMU at the operating point of the plant file, with other parameters: the plant without its
+    /// delays; returns also the rates of its states there, and its measurements.
     pub(crate) fn at_operating_point(
         &self,
         deviations: &[f64],
@@ -95,15 +90,9 @@ impl<'a> ParameterFamily<'a> {
         })?;
         let measured = linearised.outputs.iter().map(|signal| signal.value);
         let measured = DVector::from_iterator(linearised.outputs.len(), measured);
-        let matrices = linearised.matrices;
-        let d = significant(matrices.d, &matrices.c);
-        let plant = StateSpace {
-            a: matrices.a,
-            b: matrices.b,
-            c: matrices.c,
-            d,
-            domain: Domain::Continuous,
-        };
+        let linearise::Matrices { a, b, c, d, .. } = linearised.matrices;
+        let d = significant(d, &c);
+        let plant = StateSpace { a, b, c, d, domain: Domain::Continuous };
         Ok((plant, DVector::from_vec(linearised.rates), measured))
     }
 
@@ -200,7 +189,8 @@ impl PlantFamily for ParameterFamily<'_> {
 
     /// Linearises the FMU at the operating point of the plant file, with other parameters.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
-        Ok(delays::judged(&delays::of(self.file), &self.undelayed(deviations)?)?)
+        let (undelayed, ..) = self.at_operating_point(deviations)?;
+        Ok(delays::of(self.file).approximated(&undelayed, JUDGED)?)
     }
 
     /// `entries`: those of the plant with its delays, as [`Self::plant`] has them.

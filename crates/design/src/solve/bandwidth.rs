@@ -5,6 +5,7 @@ use control::bandwidth::{ByBandwidth, NaturalUnits, filter, regulator};
 use control::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
+use crate::matrix::stacked;
 use crate::report::number::rounded;
 use crate::solve::gain::{FeedbackProblem, GainResult, Noise, Refusal, unique};
 use crate::solve::norm_gains::ObserverProblem;
@@ -117,16 +118,10 @@ fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -
     StateSpace { a, b: b.clone(), c: c.clone(), d, domain }
 }
 
-/// The time of one step of an integral.
-fn step(domain: Domain) -> f64 {
+/// The time of one step of an integral: 1 in continuous time.
+pub(crate) fn step(domain: Domain) -> f64 {
     match domain {
         Domain::Continuous => 1.0,
         Domain::Sampled { period } => period,
     }
-}
-
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut all = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
-    all.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    all
 }

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
+use crate::solve::bandwidth::step;
 use crate::solve::gain::{GainResult, unique};
 use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
@@ -185,13 +186,9 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let (to, from) = (inverse(&units.commands), inverse(&units.measurements));
         let (p, t) = (from.ncols(), units.references.ncols());
         // The integrals are the last states: T r enters them.
-        let step = match self.domain {
-            Domain::Continuous => 1.0,
-            Domain::Sampled { period } => period,
-        };
         let mut b = (&controller.b * &from).resize_horizontally(p + t, 0.0);
         let first = b.nrows() - t;
-        b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * step));
+        b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * step(self.domain)));
         Ok(StateSpace {
             b,
             c: &to * &controller.c,

@@ -13,6 +13,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::plant::linear::LinearPlant;
+use crate::solve::bandwidth::step;
 use crate::solve::family::check_states;
 use crate::solve::solution::{Solution, solve};
 use plant_file::PlantFile;
@@ -285,15 +286,11 @@ impl Slopes {
     /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
     fn move_references(&self, design: &Solution, controller: &mut StateSpace, j: usize) {
         let Some(tracking) = &design.tracking else { return };
-        let period = match design.domain {
-            Domain::Continuous => 1.0,
-            Domain::Sampled { period } => period,
-        };
         let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let t = design.gains.integrals();
         let first = controller.b.nrows() - t;
         for k in 0..t {
-            controller.b[(first + k, j)] -= period * moved[k];
+            controller.b[(first + k, j)] -= step(design.domain) * moved[k];
         }
         if let Some(n_r) = tracking.feedforward() {
             let command = n_r * moved;

@@ -13,6 +13,7 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
+use crate::matrix::beside;
 use crate::plant::linear::LinearPlant;
 use plant_file::PlantFile;
 use plant_file::references::References;
@@ -217,14 +218,6 @@ impl TrackingProblem<'_> {
     }
 }
 
-/// The columns of `left`, then those of `right`.
-fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    let (n, t) = (left.ncols(), right.ncols());
-    let mut all = left.clone().resize_horizontally(n + t, 0.0);
-    all.columns_mut(n, t).copy_from(right);
-    all
-}
-
 /// The refusal of a feedforward beside integrals.
 fn without_feedforward(references: &References, file: &PlantFile<'_>, reason: &str) -> PlaceError {
     let message = format!(
@@ -254,11 +247,7 @@ impl Tracking {
 
 /// The decay rate of the slowest eigenvalue, 1/s.
 pub(crate) fn decay(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
-    let rate = -instability(dynamics, domain)?;
-    Ok(match domain {
-        Domain::Continuous => rate,
-        Domain::Sampled { period } => -(-rate).ln_1p() / period,
-    })
+    Ok(domain.decay_rate(instability(dynamics, domain)?))
 }
 
 /// The loop of the design: a plant, and the controller from its measurements to its commands.
