@@ -15,6 +15,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::report::LowerBoundFor;
+use crate::solve::bandwidth::step;
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal};
 use crate::solve::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH};
 use plant_file::channel::{Channel, ChannelWeight};
@@ -71,8 +72,7 @@ impl ObserverProblem<'_> {
         let (order, p, q) = (self.a_0.nrows(), self.c_0.nrows(), self.faults);
         let noises = required.channel.noise.len();
         let mut disturbance = DMatrix::zeros(order, q + noises);
-        let period = if let Domain::Sampled { period } = domain { period } else { 1.0 };
-        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(period);
+        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(step(domain));
         let mut feedthrough = DMatrix::zeros(p, q + noises);
         for (at, noise) in required.channel.noise.iter().enumerate() {
             match self.filter {
@@ -142,14 +142,7 @@ impl ObserverProblem<'_> {
             return filter.gain(bound);
         }
         let norm = |gain: &DMatrix<f64>| -> Result<f64, Error> {
-            let system = StateSpace {
-                a: self.a_0 - gain * &output,
-                b: &performance.disturbance - gain * &performance.feedthrough,
-                c: performance.output.clone(),
-                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-                domain,
-            };
-            Ok(h_infinity(&system, WIDTH)?.upper)
+            Ok(h_infinity(&self.closed(gain, &output, &performance, domain), WIDTH)?.upper)
         };
         let mut high = norm(&filter.kalman_gain())? * RELAXED;
         let mut low = high / RANGE;
@@ -175,22 +168,14 @@ impl ObserverProblem<'_> {
         if !required.channel.noise.is_empty() {
             return Ok(self.noisy_lower_bound(required, domain)?.map(LowerBound::for_filters));
         }
-        let output = self.estimator.output_matrix(self.a_0, self.c_0);
-        let performance = self.performance(required, domain);
-        let of_filters = match self.weights(required.channel, domain)? {
-            None => noiseless_norm_lower_bound(self.a_0, &output, &performance, domain),
-            Some(weights) => {
-                let (a, c, performance) = weights.extend(self.a_0, &output, &performance);
-                noiseless_norm_lower_bound(&a, &c, &performance, domain)
-            }
-        };
+        let (a, c, performance) = self.extended(required, domain)?;
         // A bound whose computation fails is not known; the gain does not depend on it.
-        let of_filters = of_filters.unwrap_or(None);
+        let of_filters = noiseless_norm_lower_bound(&a, &c, &performance, domain).unwrap_or(None);
         let Region { decay, disc, .. } = required.region;
         let of_disc = match disc.filter(|_| !required.channel.has_states()) {
             Some((center, radius)) => {
                 let (disc, decay) = (lmi::Disc { center, radius }, decay.unwrap_or(0.0));
-                disc_norm_lower_bound(self.a_0, &output, &performance, disc, decay).unwrap_or(None)
+                disc_norm_lower_bound(&a, &c, &performance, disc, decay).unwrap_or(None)
             }
             None => None,
         };
@@ -215,15 +200,8 @@ impl ObserverProblem<'_> {
             return Ok(None);
         }
         let Some(filter) = self.filter else {
-            let output = self.estimator.output_matrix(self.a_0, self.c_0);
-            let performance = self.performance(required, domain);
-            return match self.weights(required.channel, domain)? {
-                None => observer_norm_lower_bound(self.a_0, &output, &performance, domain),
-                Some(weights) => {
-                    let (a, c, performance) = weights.extend(self.a_0, &output, &performance);
-                    observer_norm_lower_bound(&a, &c, &performance, domain)
-                }
-            };
+            let (a, c, performance) = self.extended(required, domain)?;
+            return observer_norm_lower_bound(&a, &c, &performance, domain);
         };
         let first = order - self.faults - filter.len();
         let states: Vec<_> =
@@ -240,6 +218,37 @@ impl ObserverProblem<'_> {
             estimator: Estimator::Prediction,
         };
         unfiltered.noisy_lower_bound(required, domain)
+    }
+
+    /// The error dynamics with a gain of `output`, from w to z of a performance.
+    fn closed(
+        &self,
+        gain: &DMatrix<f64>,
+        output: &DMatrix<f64>,
+        performance: &Performance,
+        domain: Domain,
+    ) -> StateSpace {
+        StateSpace {
+            a: self.a_0 - gain * output,
+            b: &performance.disturbance - gain * &performance.feedthrough,
+            c: performance.output.clone(),
+            d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
+            domain,
+        }
+    }
+
+    /// A, C and the performance of [`Self::performance`] with the states of its weights, if there are any.
+    fn extended(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>, Performance), Error> {
+        let output = self.estimator.output_matrix(self.a_0, self.c_0);
+        let performance = self.performance(required, domain);
+        Ok(match self.weights(required.channel, domain)? {
+            None => (self.a_0.clone(), output, performance),
+            Some(weights) => weights.extend(self.a_0, &output, &performance),
+        })
     }
 
     /// Computes L; for a current estimator the gain of the correction.
@@ -260,13 +269,7 @@ impl ObserverProblem<'_> {
                 }
             },
             weights: weights.as_ref(),
-            system: &|gain, performance| StateSpace {
-                a: self.a_0 - gain * &output,
-                b: &performance.disturbance - gain * &performance.feedthrough,
-                c: performance.output.clone(),
-                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-                domain,
-            },
+            system: &|gain, performance| self.closed(gain, &output, performance, domain),
             performance: self.performance(required, domain),
             unweighted,
             required,
