@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::robustness::{Margins, Physical, by_entries, margins};
+use crate::assess::verdict::peak_reason_with;
 use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
@@ -130,18 +131,8 @@ pub(crate) fn judge(
     let peaks =
         stable().flat_map(|(name, margins)| margins.points.iter().map(move |point| (name, point)));
     if let Some((name, point)) = peaks.max_by(|x, y| x.1.judged.total_cmp(&y.1.judged)) {
-        let peak = point.judged;
-        let reached = match peak {
-            peak if peak > limits.red => Some((limits.red, Level::Red)),
-            peak if peak > limits.amber => Some((limits.amber, Level::Amber)),
-            _ => None,
-        };
-        if let Some((limit, level)) = reached {
-            let text = format!(
-                "the peak of S at the {} with the {kind} {name} is {peak:.3}, above {limit} ({})",
-                point.point,
-                level.word()
-            );
+        let reason = peak_reason_with(point, &format!(" with the {kind} {name}"), limits);
+        if let Some((level, text)) = reason {
             verdict.add(level, text);
         }
     }

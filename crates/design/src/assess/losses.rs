@@ -115,35 +115,20 @@ struct Variant {
 fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
     let Solution { linear, plant, gains, domain, .. } = designed;
     let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
-    let off = if designed.monitor {
-        Variant {
-            name: "compensation off",
-            meaning: "u = K_x x_hat; the faults are estimated, but not compensated",
-            closed: DesignLoop::of(
-                linear,
-                plant,
-                &uncompensated,
-                designed.filter.as_deref(),
-                *domain,
-            )?,
-        }
+    let (meaning, closed) = if designed.monitor {
+        let filter = designed.filter.as_deref();
+        let closed = DesignLoop::of(linear, plant, &uncompensated, filter, *domain)?;
+        ("u = K_x x_hat; the faults are estimated, but not compensated", closed)
     } else {
-        Variant {
-            name: "compensation off",
-            meaning: "u = K_x x_hat; the estimates of the faults are held",
-            closed: DesignLoop {
-                plant: plant.clone(),
-                controller: without_estimates(plant, &uncompensated, designed)?,
-            },
-        }
+        let controller = without_estimates(plant, &uncompensated, designed)?;
+        let closed = DesignLoop { plant: plant.clone(), controller };
+        ("u = K_x x_hat; the estimates of the faults are held", closed)
     };
+    let off = Variant { name: "compensation off", meaning, closed };
     let on = Variant {
         name: ON,
         meaning: "u = K_x x_hat + K_f f_hat, with the estimates f_hat that the observer computes",
-        closed: DesignLoop {
-            plant: designed.whole.plant.clone(),
-            controller: designed.whole.controller.clone(),
-        },
+        closed: designed.whole.clone(),
     };
     // With integral action the estimates are not held while the integrals go on.
     let held_integrals = gains.integral.is_some() && !designed.monitor;
@@ -178,11 +163,9 @@ struct Examination<'a> {
 
 impl Examination<'_> {
     fn report(&self, variant: &Variant) -> Result<LossLoop, Error> {
-        let constant: Vec<_> = self
-            .boxes()
-            .iter()
-            .map(|losses| self.constant(losses))
-            .collect::<Result<_, Error>>()?;
+        let boxes = self.boxes();
+        let constant = boxes.iter().map(|losses| self.constant(losses));
+        let constant = constant.collect::<Result<Vec<_>, _>>()?;
         let proof = match self.obstacle(&constant[0]) {
             Some(reason) => Err(reason),
             None => self.proof(variant.name == ON)?,

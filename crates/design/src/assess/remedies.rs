@@ -47,12 +47,10 @@ pub(crate) fn remedies(
         reasons.push(Reason { text: instability(&robustness.tolerance), aim: Aim::Stable });
     }
     // The search for other gains takes long.
-    let quick = [&file.feedback, &file.observer].iter().all(|request| {
-        let searched =
-            matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. });
-        !searched
+    let searched = [&file.feedback, &file.observer].iter().any(|request| {
+        matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
-    let single = quick && file.family.is_empty() && file.schedule.is_none();
+    let single = !searched && file.family.is_empty() && file.schedule.is_none();
     let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
     if reasons.is_empty() || !single || order > LARGEST_ORDER || budget.is_over() {
         return Vec::new();
@@ -171,11 +169,9 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
         }
         Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => {
             let rate = short(factor * rate);
+            let bandwidth = Bandwidth { rate: Some(rate), is_stated: true };
             Some(Scaled {
-                requirement: Requirement::Bandwidth(Bandwidth {
-                    rate: Some(rate),
-                    is_stated: true,
-                }),
+                requirement: Requirement::Bandwidth(bandwidth),
                 line: format!("{name}.bandwidth = {}", rounded(rate)),
                 words: format!("{name}.bandwidth {factor} times as large"),
             })
@@ -189,11 +185,12 @@ impl Variant {
     fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
         let Self { observer, feedback, factor } = self;
         let mut other = file.clone();
-        if let Some(observer) = &observer {
-            other.observer.requirement = observer.requirement.clone();
-        }
-        if let Some(feedback) = &feedback {
-            other.feedback.requirement = feedback.requirement.clone();
+        for (request, scaled) in
+            [(&mut other.observer, &observer), (&mut other.feedback, &feedback)]
+        {
+            if let Some(scaled) = scaled {
+                request.requirement = scaled.requirement.clone();
+            }
         }
         let nominal = design(&other).ok()?.nominal;
         let judged = Judged::of(&nominal, varies.then_some(&file.robustness)).ok().flatten()?;

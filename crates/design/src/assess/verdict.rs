@@ -41,14 +41,23 @@ pub(crate) fn verdict(
 
 /// The sentence about a peak of S above a limit, and the level of the verdict.
 pub(crate) fn peak_reason(point: &LoopPoint, limits: &RobustnessLimits) -> Option<(Level, String)> {
-    let peak = point.judged;
-    let (limit, level) = match peak {
+    peak_reason_with(point, "", limits)
+}
+
+/// The same with text after the place, such as a plant.
+pub(crate) fn peak_reason_with(
+    point: &LoopPoint,
+    plant: &str,
+    limits: &RobustnessLimits,
+) -> Option<(Level, String)> {
+    let LoopPoint { point: at, judged: peak, .. } = point;
+    let (limit, level) = match *peak {
         peak if peak > limits.red => (limits.red, Level::Red),
         peak if peak > limits.amber => (limits.amber, Level::Amber),
         _ => return None,
     };
-    let (at, word) = (&point.point, level.word());
-    Some((level, format!("the peak of S at the {at} is {peak:.3}, above {limit} ({word})")))
+    let word = level.word();
+    Some((level, format!("the peak of S at the {at}{plant} is {peak:.3}, above {limit} ({word})")))
 }
 
 /// The sentence about a loop that parameters within their tolerances make unstable.

@@ -24,8 +24,7 @@ pub(crate) fn plant_file(
     let unwritable = |error: &dyn std::fmt::Display| crate::Error::Invalid(error.to_string());
     let mut table: Table = file.text().parse().map_err(|error| unwritable(&error))?;
     for matrix in &robustness.tolerance.worst {
-        let row = |row: &Vec<f64>| Value::Array(row.iter().map(|x| Value::Float(*x)).collect());
-        let rows = matrix.values.iter().map(row).collect();
+        let rows = matrix.values.iter().map(floats).collect();
         table.insert(matrix.name.clone(), Value::Array(rows));
     }
     if let Model::Matrices { f_a, sampled: Some(sampled), .. } = &file.model
@@ -53,9 +52,8 @@ pub(crate) fn plant_file(
 /// Replaces what is of sampled time; the worst matrices are of continuous time.
 fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix<f64>>) {
     table.remove("matrices");
-    let floats = |numbers: Vec<f64>| Value::Array(numbers.into_iter().map(Value::Float).collect());
     if let Some(f_a) = f_a {
-        let rows = f_a.row_iter().map(|row| floats(row.iter().copied().collect()));
+        let rows = f_a.row_iter().map(|row| floats(row.iter()));
         table.insert("F_a".to_owned(), Value::Array(rows.collect()));
     }
     let Some(Value::Array(disturbances)) = table.get_mut("disturbances") else { return };
@@ -63,7 +61,7 @@ fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix
         if let (Value::Table(disturbance), DisturbanceEntry::Column(e)) =
             (disturbance, &read.entry_point)
         {
-            disturbance.insert("E".to_owned(), floats(e.iter().copied().collect()));
+            disturbance.insert("E".to_owned(), floats(e));
         }
     }
 }
@@ -98,11 +96,12 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
         }
     }
     if !columns.is_empty() {
-        let row = |at: usize| {
-            Value::Array(columns.iter().map(|column| Value::Float(column[at])).collect())
-        };
-        let rows = (0..n).map(row).collect();
-        table.insert("F_a".to_owned(), Value::Array(rows));
+        let rows = (0..n).map(|at| floats(columns.iter().map(|column| &column[at])));
+        table.insert("F_a".to_owned(), Value::Array(rows.collect()));
     }
     true
+}
+
+fn floats<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Value {
+    Value::Array(numbers.into_iter().copied().map(Value::Float).collect())
 }

@@ -1,6 +1,7 @@
 //! The text of a new plant file.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use nalgebra::DMatrix;
 
@@ -181,6 +182,11 @@ impl Draft {
         let names = names.collect::<Vec<_>>().join(", ");
         let _ = writeln!(text, "actuator_faults = [{names}]");
     }
+}
+
+/// The name of a file without its folder.
+pub(super) fn shown(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn line(text: &mut String, key: &str, value: f64) {

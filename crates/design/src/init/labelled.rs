@@ -16,12 +16,12 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named, shown};
 
 /// Reads the table.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let text = fs::read_to_string(path).map_err(Error::file("read", path))?;
-    table(&text, &path.file_name().unwrap_or_default().to_string_lossy())
+    table(&text, &shown(path))
         .map_err(|reason| Error::Invalid(format!("{}: {reason}", path.display())))
 }
 

@@ -5,12 +5,12 @@ mod fit;
 mod judge;
 mod read;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use control::StateSpace;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named, shown};
 use estimate::Estimate;
 use fit::Fit;
 use read::Log;
@@ -71,10 +71,6 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
             warnings,
         },
     })
-}
-
-fn shown(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The states: measurements and rates, if they are the states.

@@ -7,7 +7,7 @@ use matfile::{Array, MatFile, NumericData};
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named, shown};
 
 /// Reads the matrices.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
@@ -58,10 +58,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         (1..=count).map(one).collect()
     };
     Ok(Draft {
-        origin: format!(
-            "the matrices of {}",
-            path.file_name().unwrap_or_default().to_string_lossy()
-        ),
+        origin: format!("the matrices of {}", shown(path)),
         actuators: numbered("u", m),
         measurements: numbered("y", p),
         left_out: Vec::new(),

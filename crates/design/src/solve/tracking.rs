@@ -251,6 +251,7 @@ pub(crate) fn decay(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Erro
 }
 
 /// The loop of the design: a plant, and the controller from its measurements to its commands.
+#[derive(Clone)]
 pub(crate) struct DesignLoop {
     /// The model in the observer; with integral action, which receives the measurements before their
     /// filter, the plant without filter.

@@ -2,7 +2,9 @@
 
 use control::eigen::eigenvalues;
 use control::identification::Windows;
+use nalgebra::DMatrix;
 
+use crate::init::draft::Named;
 use crate::init::log::estimate::Estimate;
 use crate::init::log::fit::{Fit, estimation};
 use crate::init::log::read::Log;
@@ -29,38 +31,36 @@ pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
             return Err(format!("expected at least {SAMPLES} rows, found {count}"));
         }
     }
-    let range = |of: &dyn Fn(&Log) -> (f64, f64)| {
-        let all = logs.iter().map(of);
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (l, h)| {
-            (low.min(l), high.max(h))
-        })
-    };
-    for (at, input) in logs[0].inputs.iter().enumerate() {
-        let (low, high) = range(&|log| bounds(log.record.inputs.row(at).iter(), log));
-        if high - low <= CONSTANT * high.abs() {
-            let name = &input.name;
-            return Err(format!(
-                "command {name} is {low} throughout; expected a log in which it changes: its effect cannot be identified"
-            ));
-        }
+    let Log { inputs, outputs, .. } = &logs[0];
+    let commands = unmoved(inputs, logs, |log| &log.record.inputs);
+    if let Some((name, value)) = commands {
+        return Err(format!(
+            "command {name} is {value} throughout; expected a log in which it changes: its effect cannot be identified"
+        ));
     }
-    for (at, output) in logs[0].outputs.iter().enumerate() {
-        let (low, high) = range(&|log| bounds(log.record.outputs.row(at).iter(), log));
-        if high - low <= CONSTANT * high.abs() {
-            let name = &output.name;
-            return Err(format!(
-                "measurement {name} is {low} throughout; expected a log in which it moves, or --outputs without it"
-            ));
-        }
+    let measurements = unmoved(outputs, logs, |log| &log.record.outputs);
+    if let Some((name, value)) = measurements {
+        return Err(format!(
+            "measurement {name} is {value} throughout; expected a log in which it moves, or --outputs without it"
+        ));
     }
     Ok(())
 }
 
-/// The smallest and the largest value among the samples that estimate.
-fn bounds<'a>(values: impl Iterator<Item = &'a f64>, log: &Log) -> (f64, f64) {
-    let values = values.take(estimation(log).end).copied();
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
+/// The first signal that does not change among the samples that estimate, with its smallest value.
+fn unmoved<'a>(
+    signals: &'a [Named],
+    logs: &[Log],
+    rows: impl Fn(&Log) -> &DMatrix<f64>,
+) -> Option<(&'a str, f64)> {
+    signals.iter().enumerate().find_map(|(at, signal)| {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for log in logs {
+            for value in rows(log).row(at).iter().take(estimation(log).end) {
+                (low, high) = (low.min(*value), high.max(*value));
+            }
+        }
+        (high - low <= CONSTANT * high.abs()).then_some((signal.name.as_str(), low))
     })
 }
 
