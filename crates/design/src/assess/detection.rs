@@ -11,9 +11,8 @@ use aso_controller::design::detection::DetectionDesign;
 use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
-use crate::matrix::rows;
+use crate::assess::matrices::matrix;
 use crate::plant::parameters::ParameterFamily;
-use crate::report::Matrix;
 use crate::report::detection::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
 };
@@ -270,13 +269,13 @@ fn report(
         false_alarm_interval: 1.0 / rate,
         noise: request.noise.clone(),
         process_noise: problem.origin_of_process_noise.clone(),
-        structure: Matrix {
-            name: "structure".to_owned(),
-            meaning: "largest mean of the residuals, in standard deviations".to_owned(),
-            rows: reported.iter().map(|test| test.name.clone()).collect(),
-            columns: (0..q).map(|fault| problem.names[problem.fault_at(fault)].clone()).collect(),
-            values: rows(&structure),
-        },
+        structure: matrix(
+            "structure",
+            "largest mean of the residuals, in standard deviations",
+            &structure,
+            &reported.iter().map(|test| test.name.clone()).collect::<Vec<_>>(),
+            &problem.names[problem.fault_at(0)..],
+        ),
         tests: reported,
         faults,
         reacts,

@@ -3,6 +3,7 @@
 use control::Domain;
 use nalgebra::DMatrix;
 
+use crate::plant::linear::LinearPlant;
 use crate::report::Matrix;
 use crate::solve::names::fault_names;
 use crate::solve::solution::Solution;
@@ -26,9 +27,6 @@ pub(crate) struct Names {
 impl Names {
     pub(crate) fn of(designed: &Solution) -> Self {
         let linear = &designed.linear;
-        let names = |signals: &[Signal]| {
-            signals.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>()
-        };
         let (states, measurements) = (names(&linear.states), names(&linear.measurements));
         let mut extended = states.clone();
         if designed.filter.is_some() {
@@ -122,7 +120,30 @@ impl Names {
     }
 }
 
-fn matrix(
+pub(crate) fn names(signals: &[Signal]) -> Vec<String> {
+    signals.iter().map(|signal| signal.name.clone()).collect()
+}
+
+/// Matrices of the shapes of A, B, C and D of the plant without its delays; that of D if the plant has one.
+pub(crate) fn of_plant(
+    linear: &LinearPlant,
+    meaning: &str,
+    [a, b, c, d]: &[DMatrix<f64>; 4],
+) -> Vec<Matrix> {
+    let states = &names(linear.plant_states());
+    let (actuators, measurements) = (&names(&linear.actuators), &names(&linear.measurements));
+    let mut all = vec![
+        matrix("A", meaning, a, states, states),
+        matrix("B", meaning, b, states, actuators),
+        matrix("C", meaning, c, measurements, states),
+    ];
+    if linear.undelayed.d.amax() > 0.0 {
+        all.push(matrix("D", meaning, d, measurements, actuators));
+    }
+    all
+}
+
+pub(crate) fn matrix(
     name: &str,
     meaning: &str,
     values: &DMatrix<f64>,

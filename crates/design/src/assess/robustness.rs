@@ -21,8 +21,8 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::assess::matrices::of_plant;
 use crate::budget::{Budget, TimeLimits};
-use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
 use crate::progress::{Step, Steps};
@@ -116,12 +116,9 @@ pub(crate) fn margins(
 ) -> Result<Margins, crate::Error> {
     let opened = POINTS.into_par_iter().map(|(at, _)| OpenedLoop::new(closed_loop, at));
     let opened = opened.collect::<Result<Vec<_>, Error>>()?;
-    let point = |(opened, (point, name)): (&OpenedLoop, (Point, &str))| {
-        let signals = match point {
-            Point::Input => &designed.linear.actuators,
-            Point::Output => &designed.linear.measurements,
-        };
-        self::point(opened, name, signals)
+    let LinearPlant { actuators, measurements, .. } = &designed.linear;
+    let point = |(opened, (at, name)): (&OpenedLoop, (Point, &str))| {
+        point(opened, name, signals_at(at, actuators, measurements))
     };
     let Physical { plant, controller, .. } = physical;
     let at_input = &opened[0];
@@ -152,13 +149,17 @@ pub(crate) fn loop_points(
     outputs: &[Signal],
 ) -> Result<Vec<LoopPoint>, Error> {
     let point = |(at, name): (Point, &str)| {
-        let signals = match at {
-            Point::Input => inputs,
-            Point::Output => outputs,
-        };
-        self::point(&OpenedLoop::new(closed_loop, at)?, name, signals)
+        point(&OpenedLoop::new(closed_loop, at)?, name, signals_at(at, inputs, outputs))
     };
     POINTS.into_par_iter().map(point).collect()
+}
+
+/// The signals at a point of the loop.
+fn signals_at<'a>(at: Point, inputs: &'a [Signal], outputs: &'a [Signal]) -> &'a [Signal] {
+    match at {
+        Point::Input => inputs,
+        Point::Output => outputs,
+    }
 }
 
 /// The plant without filters, and the controller with its filters and integrals.
@@ -248,10 +249,7 @@ fn slopes(
     points: &[LoopPoint],
 ) -> Result<Vec<[DMatrix<f64>; 4]>, Error> {
     let one = |((point, _), loop_point): ((Point, &str), &LoopPoint)| {
-        let signals = match point {
-            Point::Input => &linear.actuators,
-            Point::Output => &linear.measurements,
-        };
+        let signals = signals_at(point, &linear.actuators, &linear.measurements);
         let frequency = loop_point.judged_frequency;
         let peak = SensitivityPeak { point, frequency, scaled: !same_unit(signals) };
         let slopes = peak_derivatives(&physical.plant, &physical.controller, &peak)?;
@@ -268,33 +266,19 @@ fn sensitivity(designed: &Solution, slopes: &[[DMatrix<f64>; 4]]) -> Vec<PeakSen
         let [to_a, to_b, to_c, to_d] = &linear.of_plant(slopes);
         // One for the entries that are not structural.
         let [in_a, in_b, in_c, in_d] = Tolerances::unless_structural(plant, [1.0; 4]).of;
-        let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
-            name: name.to_owned(),
-            meaning: "entry times derivative of the peak of S".to_owned(),
-            rows: names(of.0),
-            columns: names(of.1),
-            values: rows(effects),
-        };
+        let meaning = "entry times derivative of the peak of S";
         let times = |varied: DMatrix<f64>, values: &DMatrix<f64>, slopes: &DMatrix<f64>| {
             varied.component_mul(values).component_mul(slopes)
         };
-        let LinearPlant { actuators, measurements, .. } = linear;
-        let states = linear.plant_states();
-        let mut matrices = vec![
-            matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
-            matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
-            matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
+        let effects = [
+            times(in_a, &plant.a, to_a),
+            times(in_b, &plant.b, to_b),
+            times(in_c, &plant.c, to_c),
+            times(in_d, &plant.d, to_d),
         ];
-        if plant.d.amax() > 0.0 {
-            matrices.push(matrix("D", (measurements, actuators), &times(in_d, &plant.d, to_d)));
-        }
-        PeakSensitivity { point: name.to_owned(), matrices }
+        PeakSensitivity { point: name.to_owned(), matrices: of_plant(linear, meaning, &effects) }
     };
     POINTS.into_iter().zip(slopes).map(one).collect()
-}
-
-fn names(signals: &[Signal]) -> Vec<String> {
-    signals.iter().map(|signal| signal.name.clone()).collect()
 }
 
 fn disk(margin: &DiskMargin) -> Disk {

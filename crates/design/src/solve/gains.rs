@@ -51,11 +51,8 @@ pub(crate) fn feedback(
         Requirement::Region(region) => {
             let part = controllable_part(a, b)?;
             require(*region, &part.fixed, domain)?;
-            let outcome = if part.fixed.is_empty() {
-                lmi::state_feedback(a, b, &region.stated(), None, domain)?
-            } else {
-                lmi::state_feedback(&part.a, &part.b, &region.stated(), None, domain)?
-            };
+            let (a_1, b_1) = if part.fixed.is_empty() { (*a, *b) } else { (&part.a, &part.b) };
+            let outcome = lmi::state_feedback(a_1, b_1, &region.stated(), None, domain)?;
             let result = synthesised(outcome, IN_REGION)?;
             Ok(if part.fixed.is_empty() { result } else { result.mapped(|gain| part.gain(gain)) })
         }
@@ -173,13 +170,9 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
 fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResult {
     let method = "Eigenvalues assigned, with eigenvectors as well-conditioned as was found.";
     let result = |placement: &Placement| GainResult {
-        gain: placement.gain.clone(),
-        method: method.to_owned(),
         required: required.to_vec(),
         quality: Some(placement.quality),
-        norm: None,
-        noise: None,
-        choice: None,
+        ..unique(placement.gain.clone(), method.to_owned())
     };
     let candidates = alternatives.candidates().map(|gains| gains.into_iter().map(result).collect());
     let standard = alternatives

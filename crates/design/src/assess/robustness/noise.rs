@@ -5,8 +5,9 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::assess::analysis::largest_gain;
+use crate::assess::matrices::{matrix, names};
 use crate::assess::robustness::Physical;
-use crate::matrix::rows;
+use crate::matrix::stacked;
 use crate::report::Matrix;
 use crate::report::robustness::Number;
 use crate::solve::solution::Solution;
@@ -33,24 +34,18 @@ pub(super) fn noise(
     let estimated = linear.faults.iter();
     let estimated =
         estimated.map(|fault| (format!("estimate of {}", fault.name), fault.unit.clone()));
-    let names: Vec<_> = named.chain(estimated).collect();
+    let affected: Vec<_> = named.chain(estimated).collect();
     let all = commands.row_iter().chain(faults.row_iter());
-    let together = names.iter().zip(all).map(|((name, unit), row)| Number {
+    let together = affected.iter().zip(all).map(|((name, unit), row)| Number {
         name: name.clone(),
         unit: unit.clone(),
         value: row.norm(),
     });
     let together: Vec<_> = together.collect();
-    let mut values = rows(&commands);
-    values.extend(rows(&faults));
-    let matrix = Matrix {
-        name: "noise".to_owned(),
-        meaning: "root-mean-square values under the noise of each measurement".to_owned(),
-        rows: names.into_iter().map(|(name, _)| name).collect(),
-        columns: linear.measurements.iter().map(|signal| signal.name.clone()).collect(),
-        values,
-    };
-    Ok((matrix, together))
+    let affected: Vec<_> = affected.into_iter().map(|(name, _)| name).collect();
+    let meaning = "root-mean-square values under the noise of each measurement";
+    let (values, measurements) = (stacked(&commands, &faults), names(&linear.measurements));
+    Ok((matrix("noise", meaning, &values, &affected, &measurements), together))
 }
 
 /// [`noise_gains`], infinite where a direct term passes white noise of continuous time.

@@ -7,12 +7,11 @@ use control::robustness::{
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::assess::robustness::{Physical, names};
-use crate::matrix::rows;
+use crate::assess::matrices::of_plant;
+use crate::assess::robustness::Physical;
 use crate::plant::delays::JUDGED;
 use crate::plant::entries::{EntryTolerances, tolerances};
 use crate::plant::parameters::ParameterFamily;
-use crate::report::Matrix;
 use crate::report::robustness::{ToleranceResult, VaryingEntries};
 use crate::solve::solution::Solution;
 use plant_file::robustness::{MATRICES, RobustnessLimits};
@@ -79,25 +78,8 @@ fn stable(test: &ToleranceTest) -> Option<f64> {
 
 fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) -> ToleranceResult {
     let linear = &designed.linear;
-    let (states, actuators) = (names(linear.plant_states()), names(&linear.actuators));
-    let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
-        name: name.to_owned(),
-        meaning: "worst plant within the tolerances".to_owned(),
-        rows: of.to_vec(),
-        columns: by.to_vec(),
-        values: rows(values),
-    };
-    let measurements = names(&linear.measurements);
     let StateSpace { a, b, c, d, .. } = test.worst.clone();
-    let [a, b, c, d] = linear.of_plant(&[a, b, c, d]);
-    let mut worst = vec![
-        matrix("A", &a, &states, &states),
-        matrix("B", &b, &states, &actuators),
-        matrix("C", &c, &measurements, &states),
-    ];
-    if linear.undelayed.d.amax() > 0.0 {
-        worst.push(matrix("D", &d, &measurements, &actuators));
-    }
+    let worst = linear.of_plant(&[a, b, c, d]);
     ToleranceResult {
         entries: 0,
         varying: Vec::new(),
@@ -107,6 +89,6 @@ fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) 
         stable: stable(test),
         worst_instability: test.worst_instability,
         first_unstable: test.first_unstable.unwrap_or(f64::INFINITY),
-        worst,
+        worst: of_plant(linear, "worst plant within the tolerances", &worst),
     }
 }
