@@ -5,7 +5,7 @@ use control::tracking::{Action, reference_system};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::assess::responses::{PARTS, SETTLED, add_outputs};
+use crate::assess::responses::{PARTS, SETTLED, add_outputs, points};
 use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::solve::solution::Solution;
@@ -103,25 +103,11 @@ impl<'a> ReferenceLoop<'a> {
 
     /// The points of an output, each a time and a value; for a sampled loop also between samples.
     fn points(&self, trace: &TimeResponse, output: usize) -> Vec<(f64, f64)> {
-        let at = |k: usize| (trace.time[k], trace.output[(output, k)]);
-        let Domain::Sampled { period } = self.designed.domain else {
-            return (0..trace.time.len()).map(at).collect();
-        };
         let first = self.outputs.len() + self.designed.plant.b.ncols();
-        let mut points = Vec::new();
-        for (k, &time) in trace.time.iter().enumerate() {
-            points.push(at(k));
-            if trace.time.get(k + 1).is_none_or(|next| next - time > 1.5 * period) {
-                continue;
-            }
-            for (part, between) in
-                self.designed.linear.times_between(period, PARTS).iter().enumerate()
-            {
-                let row = first + part * self.outputs.len() + output;
-                points.push((time + between, trace.output[(row, k)]));
-            }
-        }
-        points
+        let between = |part: usize| first + part * self.outputs.len() + output;
+        points(self.designed, trace, |k, part| {
+            Some(trace.output[(part.map_or(output, between), k)])
+        })
     }
 
     /// The response to a step of reference `at`.

@@ -150,7 +150,7 @@ impl<'a> ShownLoop<'a> {
         for (at, ((name, unit), &row)) in signals.enumerate() {
             let between = |part: usize| first_between + part * extended.states + at;
             let is_state = at < linear.plant_states().len();
-            let times = self.times(trace, |k, part| match part {
+            let times = points(self.designed, trace, |k, part| match part {
                 None => Some(trace.output[(row, k)]),
                 Some(part) if is_state => Some(trace.output[(between(part), k)]),
                 Some(_) => None,
@@ -160,40 +160,12 @@ impl<'a> ShownLoop<'a> {
         }
         for (at, actuator) in linear.actuators.iter().enumerate() {
             let row = first_command + at;
-            let times = self.times(trace, |k, _| Some(trace.output[(row, k)]));
+            let times = points(self.designed, trace, |k, _| Some(trace.output[(row, k)]));
             let name = format!("command {}", actuator.name);
             let shown = ShownSignal { name, unit: actuator.unit.clone(), row };
             curves.push(self.curve(shown, trace, factor, &times));
         }
         curves
-    }
-
-    /// Returns the points of a curve, each a time and a value.
-    ///
-    /// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time
-    /// after it. Times between samples are added where the trace has neighbouring samples.
-    fn times(
-        &self,
-        trace: &TimeResponse,
-        value: impl Fn(usize, Option<usize>) -> Option<f64>,
-    ) -> Vec<(f64, f64)> {
-        let mut points = Vec::with_capacity(trace.time.len());
-        let period = match self.designed.domain {
-            Domain::Continuous => 0.0,
-            Domain::Sampled { period } => period,
-        };
-        let between = self.designed.linear.times_between(period, PARTS);
-        for (k, &time) in trace.time.iter().enumerate() {
-            points.extend(value(k, None).map(|value| (time, value)));
-            let next = trace.time.get(k + 1).filter(|next| **next - time < 1.5 * period);
-            if next.is_none() {
-                continue;
-            }
-            for (part, later) in between.iter().enumerate() {
-                points.extend(value(k, Some(part)).map(|value| (time + later, value)));
-            }
-        }
-        points
     }
 
     fn curve(
@@ -220,6 +192,34 @@ impl<'a> ShownLoop<'a> {
             values: shown.iter().map(|point| factor * point.1).collect(),
         }
     }
+}
+
+/// Returns the points of a curve, each a time and a value.
+///
+/// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time
+/// after it. Times between samples are added where the trace has neighbouring samples.
+pub(crate) fn points(
+    designed: &Solution,
+    trace: &TimeResponse,
+    value: impl Fn(usize, Option<usize>) -> Option<f64>,
+) -> Vec<(f64, f64)> {
+    let mut points = Vec::with_capacity(trace.time.len());
+    let period = match designed.domain {
+        Domain::Continuous => 0.0,
+        Domain::Sampled { period } => period,
+    };
+    let between = designed.linear.times_between(period, PARTS);
+    for (k, &time) in trace.time.iter().enumerate() {
+        points.extend(value(k, None).map(|value| (time, value)));
+        let next = trace.time.get(k + 1).filter(|next| **next - time < 1.5 * period);
+        if next.is_none() {
+            continue;
+        }
+        for (part, later) in between.iter().enumerate() {
+            points.extend(value(k, Some(part)).map(|value| (time + later, value)));
+        }
+    }
+    points
 }
 
 /// Returns the first, the lowest, the highest and the last point of each of `parts` parts of the logarithmic
