@@ -61,10 +61,7 @@ impl Designed {
             longest_hold: signal.longest_hold,
         };
         let signals = |all: &[PlantSignal]| all.iter().map(signal).collect::<Vec<_>>();
-        let sampled = match nominal.domain {
-            Domain::Continuous => None,
-            Domain::Sampled { period } => Some(period),
-        };
+        let sampled = file.sampling.map(|sampling| sampling.period);
         let mut states = signals(&linear.states);
         if nominal.filter.is_some() {
             states.extend(linear.measurements.iter().map(|measurement| Signal {
@@ -77,6 +74,7 @@ impl Designed {
         let Gains { k_x, k_f, l_x, l_f, p_f, integral, .. } = &nominal.gains;
         let injection = nominal.law.injection.as_ref();
         let tracking = nominal.tracking.as_ref();
+        let Reconfigurations { single, combinations, fallback } = reconfigurations;
         Ok(Design {
             description: description.to_owned(),
             t_on: file.t_on,
@@ -111,17 +109,9 @@ impl Designed {
             measurements: linear.measurements.iter().map(measurement).collect(),
             faults: nominal.fault_entries(),
             references: tracking.map_or(Vec::new(), |tracking| signals(&tracking.signals)),
-            reconfigurations: reconfigurations
-                .single
-                .iter()
-                .map(|single| nominal.reconfigured(single))
-                .collect(),
-            combinations: reconfigurations
-                .combinations
-                .iter()
-                .map(|combination| nominal.combined(combination))
-                .collect(),
-            fallback: reconfigurations.fallback.as_ref().map(|fallback| Fallback {
+            reconfigurations: single.iter().map(|single| nominal.reconfigured(single)).collect(),
+            combinations: combinations.iter().map(|several| nominal.combined(several)).collect(),
+            fallback: fallback.as_ref().map(|fallback| Fallback {
                 k_x: matrix(&fallback.k_x),
                 k_f: fallback.k_f.as_ref().map(matrix),
             }),

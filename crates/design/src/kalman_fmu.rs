@@ -12,6 +12,7 @@ use crate::matrix::matrix;
 use crate::plant::linear::request;
 use crate::solve::designed::Designed;
 use crate::solve::gain::Noise;
+use crate::solve::names::joined;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::faults::EntryPoint;
@@ -88,12 +89,11 @@ pub(crate) fn kalman_design(
         unit: fault.unit.clone(),
         description: fault.description.clone(),
         enters: match &stated.entry_point {
-            EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-                Entry::Actuator(*at)
-            }
+            EntryPoint::Actuator(at)
+            | EntryPoint::Loss { actuator: at, .. }
+            | EntryPoint::Column(at) => Entry::Actuator(*at),
             EntryPoint::Sensor(at) => Entry::Sensor(*at),
             EntryPoint::Input(name) => Entry::Input(name.clone()),
-            EntryPoint::Column(at) => Entry::Actuator(*at),
         },
         rate: channel.rate,
     });
@@ -101,17 +101,14 @@ pub(crate) fn kalman_design(
     let states = signals(&linear.states);
     let is_state = |name: &String| states.iter().any(|state| state.name == *name);
     let settings = fmu.operating_point.iter().filter(|(name, _)| !is_state(name));
-    let names: Vec<_> = linear.faults.iter().map(|fault| fault.name.as_str()).collect();
+    let names = joined(linear.faults.iter().map(|fault| fault.name.as_str()));
     let fastest =
         eigenvalues(&linear.a).map_or(0.0, |all| all.iter().map(|p| p.norm()).fold(0.0, f64::max));
     let steps = (period * fastest / RESOLUTION).ceil();
     #[expect(clippy::cast_possible_truncation, reason = "from 1 to MOST_STEPS")]
     let integration_steps = steps.clamp(1.0, MOST_STEPS) as i32;
     Ok(KalmanDesign {
-        description: format!(
-            "Kalman filter that estimates the states of its plant and {}",
-            names.join(", ")
-        ),
+        description: format!("Kalman filter that estimates the states of its plant and {names}"),
         sample_time: period,
         integration_steps,
         stop_time,

@@ -52,6 +52,7 @@ use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
 use progress::{Step, Steps};
 use report::identity;
+use solve::names::joined;
 use solve::solution::Solution;
 use solve::{designed, fallback, reconfiguration};
 
@@ -128,10 +129,8 @@ fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Res
     let gains = || budget.run(|| designed::design(&file));
     let mut designed = steps.run(Step::Gains, gains).map_err(in_time)?;
     if budget.is_over() {
-        let text = format!(
-            "more time may give better gains: a part of the search was {}",
-            budget.reason()
-        );
+        let reason = budget.reason();
+        let text = format!("more time may give better gains: a part of the search was {reason}");
         designed.warnings.push(file.error(&["feedback"], text));
     }
     let description = description(&file, &designed.nominal);
@@ -222,10 +221,9 @@ impl Design {
 
 /// The user's sentence, or one that names the faults.
 fn description(file: &PlantFile<'_>, solution: &Solution) -> String {
-    let faults: Vec<_> = solution.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
-    file.description.clone().unwrap_or_else(|| {
-        format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))
-    })
+    let faults = joined(solution.linear.faults.iter().map(|fault| fault.name.as_str()));
+    let default = || format!("Fault-tolerant controller that estimates and compensates {faults}");
+    file.description.clone().unwrap_or_else(default)
 }
 
 #[cfg(doctest)]

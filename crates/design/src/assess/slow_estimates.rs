@@ -5,6 +5,7 @@ use control::{Domain, Error};
 use nalgebra::Complex;
 
 use crate::report::number::rounded;
+use crate::solve::names::joined;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::requirements::Requirement;
@@ -29,13 +30,10 @@ pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Optio
         return Ok(None);
     }
     let faults = &solution.linear.faults;
-    let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
-    let cause = match names[..] {
-        [name] => format!("{name} hardly acts on the measurements if it is constant"),
-        _ => format!(
-            "a constant combination of {} hardly acts on the measurements",
-            names.join(", ")
-        ),
+    let names = joined(faults.iter().map(|fault| fault.name.as_str()));
+    let cause = match faults.len() {
+        1 => format!("{names} hardly acts on the measurements if it is constant"),
+        _ => format!("a constant combination of {names} hardly acts on the measurements"),
     };
     Ok(Some(format!(
         "the estimates settle in {} s, the feedback in {} s: {cause}; expected fewer faults or another measurement",

@@ -5,7 +5,9 @@ use files::PlaceError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::plant::linear::LinearPlant;
+use crate::solve::names::{joined, signal_names};
 use control::faults::ExtendedPlant;
+use plant_file::signals::Signal;
 use plant_file::{FAULTS, PlantFile};
 
 /// A column counts as a combination of others if they leave less than this of its length; rows and
@@ -20,14 +22,16 @@ pub(crate) fn check_limits(
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, PlaceError> {
     let mut warnings = Vec::new();
+    let about = |what: &str, signal: &Signal, value: f64| {
+        let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        format!("the operating point of the {what} `{}`, {value}{unit}", signal.name)
+    };
     for actuator in &linear.actuators {
         let (Some([low, high]), [_, Some(place), _]) = (actuator.limits, &actuator.places) else {
             continue;
         };
         let value = actuator.operating.unwrap_or(0.0);
-        let unit = actuator.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-        let about =
-            format!("the operating point of the actuator `{}`, {value}{unit}", actuator.name);
+        let about = about("actuator", actuator, value);
         if value < low || value > high {
             let message = format!(
                 "{about}, is outside of its limits {low} and {high}; expected limits around it, or \
@@ -48,11 +52,10 @@ pub(crate) fn check_limits(
         };
         let value = signal.operating.unwrap_or(0.0);
         if !(low..=high).contains(&value) {
-            let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             let message = format!(
-                "the operating point of the measurement `{}`, {value}{unit}, is outside of its range from {low} \
-                 to {high}; expected a range that contains it, or another `operating` or `operating_point`",
-                signal.name
+                "{}, is outside of its range from {low} to {high}; expected a range that contains it, or another \
+                 `operating` or `operating_point`",
+                about("measurement", signal, value)
             );
             return Err(file.error_at(place, message));
         }
@@ -101,16 +104,14 @@ pub(crate) fn check_faults(
     if faults.len() <= independent {
         return Ok(());
     }
-    let names =
-        |all: Vec<&String>| all.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
     let kind = if dependent.is_empty() { "" } else { "independent " };
     let message = format!(
         "{} faults ({}) cannot be estimated from {independent} {kind}measurement{} ({}): expected at \
          least as many independent measurements as faults",
         faults.len(),
-        names(faults.iter().map(|fault| &fault.name).collect()),
+        joined(faults.iter().map(|fault| fault.name.as_str())),
         if independent == 1 { "" } else { "s" },
-        names(linear.measurements.iter().map(|signal| &signal.name).collect()),
+        signal_names(&linear.measurements),
     );
     let place = faults.get(independent).map(|fault| &fault.place);
     Err(place.map_or_else(|| file.error(&FAULTS, &message), |at| file.error_at(at, &message)))

@@ -12,7 +12,7 @@ use plant_file::{FAULTS, PlantFile};
 
 use crate::plant::fixed_mode::described_in;
 use crate::plant::linear::LinearPlant;
-use crate::solve::names::{fault_names, joined, state_name};
+use crate::solve::names::{fault_names, signal_names, state_name};
 
 /// Checks that the commands reach every mode that is not stable; the error names the mode.
 pub(crate) fn check_controllable(
@@ -32,7 +32,7 @@ pub(crate) fn check_controllable(
         }
         let message = format!(
             "the commands {} reach {} of {} states only: no feedback moves {}{}",
-            joined(linear.actuators.iter().map(|signal| signal.name.as_str())),
+            signal_names(&linear.actuators),
             rank.rank,
             rank.n,
             described_in(&mode, linear.domain, true, state),
@@ -55,7 +55,7 @@ pub(crate) fn check_detectable(
     detectability: &Detectability,
     warnings: &mut Vec<PlaceError>,
 ) -> Result<(), crate::Error> {
-    let measurements = joined(linear.measurements.iter().map(|signal| signal.name.as_str()));
+    let measurements = signal_names(&linear.measurements);
     let modes = detectability.unobservable.iter();
     let shown =
         |(mode, _): &&(Mode, bool)| above_or_on_the_real_axis(mode) && !linear.is_of_delays(mode);
@@ -106,10 +106,8 @@ pub(crate) fn check_detectable(
         );
         return Err(at_fault(file, linear, faults[0], message).into());
     }
-    extended
-        .plant
-        .check_detectable(linear.domain)
-        .map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    let outcome = extended.plant.check_detectable(linear.domain);
+    outcome.map_err(|error| file.error(&FAULTS, error.to_string()))?;
     Ok(())
 }
 

@@ -142,16 +142,14 @@ impl Search<'_> {
         if let Some(reason) = self.obstacle()? {
             return Ok(Err(reason));
         }
-        let intact = decay(
-            &self.cases.whole(&self.cases.designed.gains, None)?,
-            self.cases.designed.domain,
-        )?;
+        let Cases { designed, request } = self.cases;
+        let intact = decay(&self.cases.whole(&designed.gains, None)?, designed.domain)?;
         if intact <= 0.0 {
             return Ok(Err("the loop of the intact plant is not stable".to_owned()));
         }
         let by_default =
             RATES.map(|part| Region { decay: Some(part * intact), ..Region::default() });
-        let regions = self.cases.request.region.map_or(by_default.to_vec(), |region| vec![region]);
+        let regions = request.region.map_or(by_default.to_vec(), |region| vec![region]);
         let mut best = Err(String::new());
         for region in regions {
             best = better(best, self.within(region)?);
@@ -164,19 +162,19 @@ impl Search<'_> {
 
     /// Why no gain can exist, or why none is searched.
     fn obstacle(&self) -> Result<Option<String>, Error> {
-        let linear = &self.cases.designed.linear;
-        let order = self.cases.designed.whole.plant.a.nrows()
-            + self.cases.designed.whole.controller.a.nrows();
+        let Cases { designed, request } = self.cases;
+        let Solution { linear, whole, .. } = designed;
+        let order = whole.plant.a.nrows() + whole.controller.a.nrows();
         if order > LARGEST_ORDER {
             return Ok(Some(format!(
                 "linear matrix inequalities are solved for up to {LARGEST_ORDER} states of plant and \
                  controller, found {order}"
             )));
         }
-        if self.cases.request.loss < 1.0 {
+        if request.loss < 1.0 {
             return Ok(None);
         }
-        for &actuator in &self.cases.request.actuators {
+        for &actuator in &request.actuators {
             let b = remaining(&linear.b, Some(actuator), 1.0);
             if let Some(mode) = unreachable_mode(linear, &b)? {
                 let name = &linear.actuators[actuator].name;
@@ -208,9 +206,7 @@ impl Search<'_> {
         }
         for factor in FASTER {
             let faster = Region { decay: region.decay.map(|decay| decay * factor), ..region };
-            let compensates = best
-                .as_ref()
-                .is_some_and(|outcome| outcome.as_ref().is_ok_and(|design| design.k_f.is_some()));
+            let compensates = matches!(&best, Some(Ok(design)) if design.k_f.is_some());
             if compensates || factor > 1.0 && faster == region {
                 break;
             }
@@ -221,10 +217,10 @@ impl Search<'_> {
                         vertices.len()
                     );
                     let design = self.verified(&gain, region, certificate, method)?;
-                    best = Some(best.map_or_else(
-                        || design.clone(),
-                        |previous| better(previous, design.clone()),
-                    ));
+                    best = Some(match best {
+                        Some(previous) => better(previous, design),
+                        None => design,
+                    });
                 }
                 _ if best.is_some() => break,
                 Outcome::Infeasible { conflict } => {
@@ -260,16 +256,11 @@ impl Search<'_> {
         let k_x = gain.clone().resize_horizontally(gains.k_x.ncols(), 0.0);
         let mut design = Fallback { k_x, k_f: None, region, certificate, method };
         if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &design)? {
+            let size = rounded(rate.abs());
             let slowest = if rate < 0.0 {
-                format!(
-                    "the loop of the case \"{name}\" is unstable and grows with {} 1/s",
-                    rounded(-rate)
-                )
+                format!("the loop of the case \"{name}\" is unstable and grows with {size} 1/s")
             } else {
-                format!(
-                    "the slowest eigenvalue of the case \"{name}\" decays with {} 1/s",
-                    rounded(rate)
-                )
+                format!("the slowest eigenvalue of the case \"{name}\" decays with {size} 1/s")
             };
             return Ok(Err(format!(
                 "a state feedback meets the region in all cases, but together with the observer, which \

@@ -7,11 +7,11 @@ use files::PlaceError;
 
 use crate::plant::linear::{AT_REST, LinearPlant};
 use crate::solve::gain::{GainResult, Refusal, unique};
+use crate::solve::names::signal_names;
 use crate::solve::tracking::{check_member, feedback_pair};
 use plant_file::PlantFile;
 use plant_file::references::References;
 use plant_file::requirements::Region;
-use plant_file::signals::Signal;
 use plant_file::variants::Variant;
 
 /// The name of the plant of the file among the members.
@@ -68,11 +68,7 @@ pub(crate) fn check_states(
     nominal: &LinearPlant,
     linear: &LinearPlant,
 ) -> Result<(), PlaceError> {
-    let names = |signals: &[Signal]| {
-        let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
-        names.join(", ")
-    };
-    let (expected, states) = (names(&nominal.states), names(&linear.states));
+    let (expected, states) = (signal_names(&nominal.states), signal_names(&linear.states));
     if expected == states {
         return Ok(());
     }

@@ -2,6 +2,7 @@
 
 use control::faults::ExtendedPlant;
 use plant_file::PlantFile;
+use plant_file::signals::Signal;
 
 use crate::plant::linear::LinearPlant;
 
@@ -22,6 +23,11 @@ pub(crate) fn state_name(linear: &LinearPlant, state: usize) -> &str {
     let n = linear.states.len();
     let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
     signal.map_or("", |signal| signal.name.as_str())
+}
+
+/// The names of signals, separated by commas.
+pub(crate) fn signal_names(signals: &[Signal]) -> String {
+    joined(signals.iter().map(|signal| signal.name.as_str()))
 }
 
 pub(crate) fn joined<'a>(list: impl Iterator<Item = &'a str>) -> String {

@@ -15,6 +15,7 @@ use nalgebra::DMatrix;
 
 use crate::matrix::beside;
 use crate::plant::linear::LinearPlant;
+use crate::solve::names::signal_names;
 use plant_file::PlantFile;
 use plant_file::references::References;
 use plant_file::requirements::Requirement;
@@ -61,7 +62,7 @@ pub(crate) fn check_references(
         return Ok(());
     };
     let count = signals.len();
-    let names = signals.iter().map(|signal| signal.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names = signal_names(signals);
     let commands = linear.actuators.len();
     if count > commands {
         let message = format!(
