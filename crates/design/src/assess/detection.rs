@@ -178,11 +178,9 @@ impl Planner<'_> {
                 Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
             }
             Method::ChiSquare { window } => {
-                let means = faults
-                    .iter()
-                    .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
-                    .collect::<Result<Vec<_>, _>>()
-                    .map_err(refuse)?;
+                let means = |&fault: &usize| problem.means(decoupling, problem.fault_at(fault));
+                let means: Result<Vec<_>, _> = faults.iter().map(means).collect();
+                let means = means.map_err(refuse)?;
                 let count = u32::try_from(rows).unwrap_or(u32::MAX);
                 let rows = DMatrix::identity(rows, rows);
                 let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
@@ -307,11 +305,7 @@ fn test_report(
         interior_excess: test.interior_excess,
         threshold: test.kind.threshold(),
         false_alarm_interval: test.kind.between_false_alarms(test.bias) * problem.period,
-        decoupled: decoupling
-            .inputs()
-            .iter()
-            .map(decoupled)
-            .collect::<Result<_, control::Error>>()?,
+        decoupled: decoupling.inputs.iter().map(decoupled).collect::<Result<_, _>>()?,
     })
 }
 

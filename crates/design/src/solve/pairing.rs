@@ -2,12 +2,12 @@
 
 use control::aso::{FaultyPlant, Gains, pairs};
 use control::robustness::{Loop, least_sensitive};
-use control::{Domain, Error, StateSpace};
+use control::{Domain, Error};
 use nalgebra::DMatrix;
 
 use crate::plant::linear::LinearPlant;
 use crate::solve::gain::GainResult;
-use crate::solve::tracking::DesignLoop;
+use crate::solve::tracking::{DesignLoop, commanded};
 
 /// The plant of a pair of gains.
 pub(crate) struct PairProblem<'a> {
@@ -52,8 +52,6 @@ impl PairProblem<'_> {
         let Self { linear, plant, filter, domain } = *self;
         let DesignLoop { plant, controller } =
             DesignLoop::of(linear, plant, gains, filter, domain)?;
-        let FaultyPlant { a, b, c, .. } = plant;
-        let d = DMatrix::zeros(c.nrows(), b.ncols());
-        Loop::new(StateSpace { a, b, c, d, domain }, controller)
+        Loop::new(commanded(plant, domain), controller)
     }
 }

@@ -1,13 +1,13 @@
 //! Designs the controllers without actuators that are gone.
 
 use control::allocation::{Actuators, allocate, equilibrium};
-use control::aso::{FaultyPlant, Gains};
+use control::aso::Gains;
 use control::controller::controller;
 use control::eigen::eigenvalues;
 use control::faults::FaultChannel;
 use control::robustness::{Loop, least_sensitive};
 use control::stability::instability;
-use control::{Error, StateSpace, sampled};
+use control::{Error, sampled};
 use nalgebra::{DMatrix, DVector};
 
 use crate::matrix::{pairs, rows};
@@ -20,7 +20,7 @@ use crate::solve::fallback::Fallback;
 use crate::solve::gain::{FeedbackProblem, GainChoice, Refusal};
 use crate::solve::gains::feedback;
 use crate::solve::solution::Solution;
-use crate::solve::tracking::decay;
+use crate::solve::tracking::{commanded, decay};
 use plant_file::PlantFile;
 use plant_file::faults::EntryPoint;
 use plant_file::reconfiguration::ReconfigurationRequest;
@@ -230,9 +230,7 @@ impl Without<'_> {
         reduced.b = self.without_columns(&plant.b);
         let reduced_gains = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
         let controller = controller(&reduced, &reduced_gains, *domain)?;
-        let FaultyPlant { a, b, c, .. } = reduced;
-        let d = DMatrix::zeros(c.nrows(), b.ncols());
-        Loop::new(StateSpace { a, b, c, d, domain: *domain }, controller)
+        Loop::new(commanded(reduced, *domain), controller)
     }
 
     /// What the fall-back does in this case, for which there are no other gains.
@@ -392,9 +390,8 @@ impl Without<'_> {
     }
 
     fn is_estimated(&self, gone: usize) -> bool {
-        self.designed.linear.faults.iter().any(|fault| match fault.entry_point {
-            EntryPoint::Loss { actuator, .. } => actuator == gone,
-            _ => false,
+        self.designed.linear.faults.iter().any(|fault| {
+            matches!(fault.entry_point, EntryPoint::Loss { actuator, .. } if actuator == gone)
         })
     }
 }

@@ -96,9 +96,10 @@ pub(crate) fn check_references(
         );
         return Err(file.error(&["reference"], message));
     }
-    let norm = matches!(&file.feedback.requirement,
-        Requirement::HInfinity { region, .. } if region.decay.is_none());
-    if *integral && norm {
+    if *integral
+        && let Requirement::HInfinity { region, .. } = &file.feedback.requirement
+        && region.decay.is_none()
+    {
         let message = "with integral action, `h_infinity` also needs `region` with `decay`: the norm from \
                        faults to measurements and commands alone leaves the integrals arbitrarily slow";
         return Err(file.error_at(&file.feedback.place, message));
@@ -187,13 +188,13 @@ impl TrackingProblem<'_> {
         };
         let refuse = |error: Error| file.error(&["reference"], error.to_string());
         let output = &references.h * &linear.c;
+        let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
         let action = if let Some(integral) = &gains.integral {
             let rate = references.windup_time.map(f64::recip);
             let rate = rate.map_or_else(|| decay(feedback, domain), Ok).map_err(refuse)?;
             let range = |signal: &Signal| signal.limits.map(|[low, high]| high - low);
             let ranges: Vec<_> = linear.actuators.iter().map(range).collect();
             let windup = windup_gain(&integral.gain, &ranges, rate, domain).map_err(refuse)?;
-            let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
             let k = beside(&k_x, &integral.gain);
             let feedforward = references.feedforward.then(|| {
                 let gain = integral_feedforward(a, b, &output, &k, domain).map_err(refuse)?;
@@ -205,7 +206,6 @@ impl TrackingProblem<'_> {
                 feedforward: feedforward.transpose()?,
             }
         } else {
-            let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
             let n_r = feedforward(a, b, &output, &k_x, domain).map_err(refuse)?;
             TrackingAction::Feedforward(n_r)
         };
@@ -259,6 +259,13 @@ pub(crate) struct DesignLoop {
     pub(crate) plant: FaultyPlant,
     /// The controller, with integral action together with the filter.
     pub(crate) controller: StateSpace,
+}
+
+/// A plant without direct term, from its commands to its measurements.
+pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
+    let FaultyPlant { a, b, c, .. } = plant;
+    let d = DMatrix::zeros(c.nrows(), b.ncols());
+    StateSpace { a, b, c, d, domain }
 }
 
 impl DesignLoop {

@@ -24,7 +24,7 @@ pub(super) struct Decoupling {
     /// The number of states of the plant with the random walks.
     pub(super) states: usize,
     /// Each decoupled input, and whether it is decoupled exactly.
-    inputs: Vec<(usize, bool)>,
+    pub(super) inputs: Vec<(usize, bool)>,
 }
 
 impl Decoupling {
@@ -48,11 +48,6 @@ impl Decoupling {
             Err(Error::NotDetectable { .. } | Error::Unweighted { .. }) => Ok(None),
             other => other,
         }
-    }
-
-    /// The decoupled inputs, and whether each is decoupled exactly.
-    pub(super) fn inputs(&self) -> &[(usize, bool)] {
-        &self.inputs
     }
 
     pub(super) fn has(&self, input: usize) -> bool {
@@ -181,8 +176,7 @@ impl Problem {
     }
 
     fn effect(&self, decoupling: &Decoupling, input: usize) -> Result<StateSpace, Error> {
-        let entry = self.inputs[input].extended(decoupling.states);
-        decoupling.filter.effect(&entry)
+        decoupling.filter.effect(&self.inputs[input].extended(decoupling.states))
     }
 
     /// The mean of the residuals long after a step of an input by its size.

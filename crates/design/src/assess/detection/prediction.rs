@@ -125,10 +125,8 @@ pub(super) fn best_window(
         }
         window *= 2;
     }
-    match best {
-        Some((_, test)) => Ok(test),
-        None => WindowTest::with_false_alarms(residuals, 1, samples, bias),
-    }
+    let shortest = || WindowTest::with_false_alarms(residuals, 1, samples, bias);
+    best.map_or_else(shortest, |(_, test)| Ok(test))
 }
 
 /// A positive number rounded to a whole one, at most 2^31.

@@ -42,10 +42,9 @@ impl Problem {
         let linear = &designed.linear;
         let refuse = |error: Error| file.error_at(&request.place, error.to_string());
         let n = linear.a.nrows();
+        let of_fault = |model| unknown_input(model, &linear.b, &linear.c);
         let mut inputs = linear.disturbances.clone();
-        let of_faults =
-            linear.models.iter().map(|model| unknown_input(model, &linear.b, &linear.c));
-        inputs.extend(of_faults);
+        inputs.extend(linear.models.iter().map(of_fault));
         let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
         if let Domain::Sampled { period } = designed.domain {
             let columns: Vec<DVector<f64>> = b
