@@ -95,27 +95,15 @@ fn schedule_input<'a>(file: &'a PlantFile<'_>) -> Option<&'a Signal> {
 
 /// Checks that the elements of each array are adjacent and in order. In the FMU, references,
 /// `compensate` and the input of a schedule are between measurements and actuators.
-fn check_arrays(file: &PlantFile<'_>, references: &[Signal]) -> Result<(), PlaceError> {
-    let names = |signals: &'_ [Signal]| signals.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
-    let mut all = names(&file.measurements);
-    all.extend(names(references));
-    all.push("compensate".to_owned());
-    let scheduled = schedule_input(file);
-    all.extend(scheduled.map(|signal| signal.name.clone()));
-    all.extend(names(&file.actuators));
-    let Some((at, text)) = misplaced_elements(all.iter().map(String::as_str)).into_iter().next()
-    else {
+fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result<(), PlaceError> {
+    let signals = file.measurements.iter().chain(references).map(Some).chain([None]);
+    let signals = signals.chain(schedule_input(file).map(Some));
+    let signals: Vec<_> = signals.chain(file.actuators.iter().map(Some)).collect();
+    let name = |signal: &Option<&'a Signal>| signal.map_or("compensate", |signal| &signal.name);
+    let Some((at, text)) = misplaced_elements(signals.iter().map(name)).into_iter().next() else {
         return Ok(());
     };
-    let inputs = file
-        .measurements
-        .iter()
-        .chain(references)
-        .map(Some)
-        .chain([None])
-        .chain(scheduled.map(Some));
-    let mut signals = inputs.chain(file.actuators.iter().map(Some));
-    let Some(signal) = signals.nth(at).flatten() else {
+    let Some(signal) = signals[at] else {
         return Err(file.error(&["actuators", "measurements"], text));
     };
     let message =
@@ -150,91 +138,67 @@ fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError
     }
 }
 
-/// The variables that the controller FMU has besides actuators and measurements.
-struct OwnVariables {
-    scalars: Vec<&'static str>,
-    /// Signals with the number of their channels, if it is known before linearisation: with one
-    /// channel a scalar, otherwise an array.
-    signals: Vec<(&'static str, Option<usize>)>,
-    matrices: Vec<&'static str>,
-}
+/// The number of elements of a scalar.
+const SCALAR: Option<usize> = Some(1);
+/// That of a matrix, of which only matters that it is no scalar.
+const MATRIX: Option<usize> = Some(2);
+
+/// The variables that the controller FMU has besides actuators and measurements, with the number of their elements, if
+/// it is known before linearisation: with one element a scalar, otherwise an array.
+struct OwnVariables(Vec<(&'static str, Option<usize>)>);
 
 impl OwnVariables {
     fn of(file: &PlantFile<'_>) -> Self {
-        let states = match &file.model {
-            Model::Matrices { a, .. } => Some(a.nrows()),
-            Model::Fmu(_) => None,
+        let (states, fed) = match &file.model {
+            Model::Matrices { a, d, .. } => (Some(a.nrows()), d.amax() > 0.0),
+            Model::Fmu(_) => (None, file.filter.is_some()),
         };
         let (m, p) = (Some(file.actuators.len()), Some(file.measurements.len()));
+        let t = file.references.as_ref().map(|references| references.signals.len());
         let ramps =
             file.faults.iter().filter(|fault| fault.dynamics == FaultDynamics::Ramp).count();
         let q = Some(file.faults.len() + ramps);
         let lossy = |fault: &Fault| matches!(fault.entry_point, EntryPoint::Loss { .. });
-        let mut variables = Self {
-            scalars: vec!["time", "compensate", "t_on", "monitor"],
-            signals: vec![("x_hat", states), ("f_hat", q), ("x_hat_0", states), ("f_hat_0", q)],
-            matrices: MATRICES.to_vec(),
-        };
-        if file.sampling.is_some() {
-            variables.scalars.extend(["T_s", "sample_clock"]);
-        }
-        if file.schedule.is_some() {
-            variables.scalars.push("schedule_at");
-        }
-        if ramps > 0 {
-            variables.matrices.push("A_f");
-        }
-        let fed = match &file.model {
-            Model::Matrices { d, .. } => d.amax() > 0.0,
-            Model::Fmu(_) => file.filter.is_some(),
-        };
-        if fed {
-            variables.matrices.push("D");
-        }
-        let t = file.references.as_ref().map(|references| references.signals.len());
-        if file.references.is_some() {
-            variables.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);
-        }
-        if file.detection.is_some() {
-            variables.scalars.extend(DETECTION);
-        }
         let operating = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
         let stated = states.is_none() || file.signals().any(operating);
-        let mut add = |present: bool, signals: &[(&'static str, Option<usize>)]| {
-            variables.signals.extend_from_slice(if present { signals } else { &[] });
-        };
-        add(
-            file.detection.is_some(),
-            &[("residual", None), ("statistic", None), ("threshold", None)],
-        );
-        add(file.faults.iter().any(lossy), &[("E_hat", q)]);
-        add(file.transfer_time.is_some(), &[("u_t", m)]);
-        add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
-        add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);
-        add(t.is_some(), &[("x_i", t), ("x_i_0", t), ("r_op", t)]);
-        match &file.estimation.law {
-            Law::Augmented => {}
-            Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. } => {
-                add(true, &[("f_hat_i", q)]);
-                variables.matrices.push("P_f");
-            }
-            Law::SlidingMode { .. } => {
-                add(true, &[("rho", q), ("delta", q)]);
-                variables.matrices.push("A_f");
-            }
-            Law::Learning { .. } => variables.matrices.push("A_f"),
-        }
         let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
-        add(limited, &[("u_min", m), ("u_max", m)]);
-        let reconfigured = file.reconfiguration.is_some();
-        add(reconfigured, &[("actuator_gone", m), ("u_stuck", m)]);
-        let fallback = file.fallback.is_some();
-        if file.checks_measurements() {
-            variables.scalars.extend(["measurement_held", "measurement_lost"]);
-        }
-        variables.scalars.extend((reconfigured || fallback).then_some("reconfiguration"));
-        variables.scalars.extend(fallback.then_some("fall_back"));
-        variables
+        let (reconfigured, fallback) = (file.reconfiguration.is_some(), file.fallback.is_some());
+        let (detection, filtered) = (file.detection.is_some(), file.filter.is_some());
+        let law = &file.estimation.law;
+        let direct = matches!(law, Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. });
+        let sliding = matches!(law, Law::SlidingMode { .. });
+        let own_model = sliding || matches!(law, Law::Learning { .. });
+        let mut all = Vec::new();
+        let mut add = |is_present: bool, names: &[&'static str], count: Option<usize>| {
+            all.extend(names.iter().filter(|_| is_present).map(|name| (*name, count)));
+        };
+        add(true, &["time", "compensate", "t_on", "monitor"], SCALAR);
+        add(true, &["x_hat", "x_hat_0"], states);
+        add(true, &["f_hat", "f_hat_0"], q);
+        add(true, &MATRICES, MATRIX);
+        add(file.sampling.is_some(), &["T_s", "sample_clock"], SCALAR);
+        add(file.schedule.is_some(), &["schedule_at"], SCALAR);
+        add(ramps > 0 || own_model, &["A_f"], MATRIX);
+        add(fed, &["D"], MATRIX);
+        add(t.is_some(), &["H", "K_i", "F_i", "L_w", "N_r"], MATRIX);
+        add(t.is_some(), &["x_i", "x_i_0", "r_op"], t);
+        add(detection, &DETECTION, SCALAR);
+        add(detection, &["residual", "statistic", "threshold"], None);
+        add(file.faults.iter().any(lossy), &["E_hat"], q);
+        add(file.transfer_time.is_some(), &["u_t"], m);
+        add(filtered, &["y_f", "filter"], p);
+        add(stated, &["x_op"], states);
+        add(stated, &["u_op"], m);
+        add(stated, &["y_op"], p);
+        add(direct, &["f_hat_i"], q);
+        add(direct, &["P_f"], MATRIX);
+        add(sliding, &["rho", "delta"], q);
+        add(limited, &["u_min", "u_max"], m);
+        add(reconfigured, &["actuator_gone", "u_stuck"], m);
+        add(file.checks_measurements(), &["measurement_held", "measurement_lost"], SCALAR);
+        add(reconfigured || fallback, &["reconfiguration"], SCALAR);
+        add(fallback, &["fall_back"], SCALAR);
+        Self(all)
     }
 
     /// Whether `name` is one of these variables, their derivatives, or an element of their arrays.
@@ -242,23 +206,20 @@ impl OwnVariables {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
             let states = ["x_hat", "f_hat", "f_hat_i", "y_f", "x_i"];
-            let signals = self.signals.iter().filter(|(signal, _)| states.contains(signal));
-            return !self.scalars.contains(&"T_s") && Self::is_among(state, signals);
+            let is_sampled = self.0.iter().any(|(variable, _)| *variable == "T_s");
+            return !is_sampled && self.has(state, |variable| states.contains(&variable));
         }
-        let indexed = array_element(name).map(|(array, _)| array);
-        self.scalars.contains(&name)
-            || indexed.is_some_and(|array| self.matrices.contains(&array))
-            || Self::is_among(name, self.signals.iter())
+        self.has(name, |_| true)
     }
 
-    fn is_among<'a>(
-        name: &str,
-        mut signals: impl Iterator<Item = &'a (&'static str, Option<usize>)>,
-    ) -> bool {
+    /// Whether `name` is one of the variables that are `examined`, or an element of one.
+    fn has(&self, name: &str, examined: impl Fn(&str) -> bool) -> bool {
         let array = array_element(name).map(|(array, _)| array);
-        signals.any(|(signal, count)| match array {
-            None => name == *signal && count.is_none_or(|count| count == 1),
-            Some(array) => array == *signal && count.is_none_or(|count| count > 1),
-        })
+        self.0.iter().filter(|(variable, _)| examined(variable)).any(
+            |(variable, count)| match array {
+                None => name == *variable && count.is_none_or(|count| count == 1),
+                Some(array) => array == *variable && count.is_none_or(|count| count > 1),
+            },
+        )
     }
 }

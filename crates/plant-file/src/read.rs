@@ -1,6 +1,6 @@
 //! What several tables of a plant file have in common: numbers in a range, one of two texts, one number for all.
 
-use std::ops::RangeBounds;
+use std::ops::{RangeBounds, RangeInclusive};
 
 use files::{Entry, PlaceError, Table};
 
@@ -24,6 +24,17 @@ pub(crate) fn within(
 /// Reads a number of at least 0.
 pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     within(entry, 0.0.., "expected no less than 0")
+}
+
+/// Reads a whole number.
+pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32, PlaceError> {
+    let (least, most) = range.into_inner();
+    let number = entry.number()?;
+    if number.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&number) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+        return Ok(number as u32);
+    }
+    Err(entry.error(format!("expected a whole number from {least} to {most}, found {number}")))
 }
 
 /// Reads one of two texts: whether it is the first.

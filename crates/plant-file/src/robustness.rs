@@ -5,7 +5,7 @@ use files::{Entry, PlaceError, Table};
 
 use crate::Model;
 use crate::parameters::{self, ParameterTolerance, fraction};
-use crate::read::{each, not_negative, within};
+use crate::read::{each, not_negative, whole, within};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,10 +97,10 @@ impl RobustnessLimits {
             limits.tolerance = [0.0; 4];
         }
         if let Some(entry) = table.get("cases") {
-            limits.cases = whole(&entry, 100_000)?;
+            limits.cases = whole(&entry, 0..=100_000)?;
         }
         if let Some(entry) = table.get("seed") {
-            limits.seed = whole(&entry, u32::MAX)?;
+            limits.seed = whole(&entry, 0..=u32::MAX)?;
         }
         if let Some(entry) = table.get("noise") {
             limits.noise =
@@ -182,13 +182,4 @@ fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
         }
     }
     Ok(all)
-}
-
-fn whole(entry: &Entry<'_>, largest: u32) -> Result<u32, PlaceError> {
-    let number = entry.number()?;
-    if number.fract() == 0.0 && (0.0..=f64::from(largest)).contains(&number) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-        return Ok(number as u32);
-    }
-    Err(entry.error(format!("expected a whole number from 0 to {largest}, found {number}")))
 }

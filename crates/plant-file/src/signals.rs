@@ -3,7 +3,7 @@
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
 
-use crate::read::within;
+use crate::read::{whole, within};
 use files::{Entry, Place, PlaceError, Table};
 
 /// A state, an actuator or a measurement.
@@ -59,7 +59,7 @@ impl Signal {
 /// Number of states of the observer for each delay, unless stated.
 const DELAY_ORDER: usize = 3;
 /// The largest number of them.
-const MOST_DELAY_ORDER: f64 = 8.0;
+const MOST_DELAY_ORDER: u32 = 8;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits", "delay"];
 const MEASUREMENT: [&str; 7] =
@@ -175,17 +175,7 @@ pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<u
     if signals.into_iter().flatten().all(|signal| signal.delay <= 0.0) {
         return Err(entry.error("no actuator and no measurement has a `delay`"));
     }
-    match entry.number()? {
-        order if order.fract() == 0.0 && (1.0..=MOST_DELAY_ORDER).contains(&order) => {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-            let order = order as usize;
-            Ok(order)
-        }
-        other => {
-            let most = MOST_DELAY_ORDER;
-            Err(entry.error(format!("expected a whole number from 1 to {most}, found {other}")))
-        }
-    }
+    Ok(whole(&entry, 1..=MOST_DELAY_ORDER)? as usize)
 }
 
 fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
