@@ -39,26 +39,16 @@ impl Designed {
         let linear = &nominal.linear;
         let at_origin = nominal.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
         let operating = |signal: &PlantSignal| signal.operating.filter(|_| !at_origin);
-        let signal = |signal: &PlantSignal| Signal {
-            name: signal.name.clone(),
-            unit: signal.unit.clone(),
-            description: signal.description.clone(),
-            operating: operating(signal),
+        let signal =
+            |stated: &PlantSignal| Signal { operating: operating(stated), ..signal(stated) };
+        let actuator = |stated: &PlantSignal| {
+            let Signal { name, unit, description, operating } = signal(stated);
+            Actuator { name, unit, description, operating, limits: stated.limits }
         };
-        let actuator = |signal: &PlantSignal| Actuator {
-            name: signal.name.clone(),
-            unit: signal.unit.clone(),
-            description: signal.description.clone(),
-            operating: operating(signal),
-            limits: signal.limits,
-        };
-        let measurement = |signal: &PlantSignal| Measurement {
-            name: signal.name.clone(),
-            unit: signal.unit.clone(),
-            description: signal.description.clone(),
-            operating: operating(signal),
-            range: signal.limits,
-            longest_hold: signal.longest_hold,
+        let measurement = |stated: &PlantSignal| {
+            let Signal { name, unit, description, operating } = signal(stated);
+            let (range, longest_hold) = (stated.limits, stated.longest_hold);
+            Measurement { name, unit, description, operating, range, longest_hold }
         };
         let signals = |all: &[PlantSignal]| all.iter().map(signal).collect::<Vec<_>>();
         let sampled = file.sampling.map(|sampling| sampling.period);
@@ -119,6 +109,16 @@ impl Designed {
             schedule: schedule.as_ref().map(|schedule| nominal.scheduled(schedule)),
             detection: detection.cloned(),
         })
+    }
+}
+
+/// A signal as the design file has it.
+pub(crate) fn signal(signal: &PlantSignal) -> Signal {
+    Signal {
+        name: signal.name.clone(),
+        unit: signal.unit.clone(),
+        description: signal.description.clone(),
+        operating: signal.operating,
     }
 }
 

@@ -1,6 +1,5 @@
 //! Writes `filter.toml` of the Kalman filter that carries the plant's FMU.
 
-use aso_controller::design::Signal;
 use aso_controller::kalman::{CarriedFault, Entry, KalmanDesign};
 use control::Domain;
 use control::eigen::eigenvalues;
@@ -8,6 +7,7 @@ use files::PlaceError;
 use linearise::PlantEquations;
 use nalgebra::DMatrix;
 
+use crate::design_file::signal;
 use crate::matrix::matrix;
 use crate::plant::linear::request;
 use crate::solve::designed::Designed;
@@ -134,13 +134,4 @@ fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
     #[expect(clippy::cast_precision_loss, reason = "a number of measurements")]
     let count = variances.len() as f64;
     limits.noise_is_stated.then(|| (logarithms.sum::<f64>() / count).exp())
-}
-
-fn signal(signal: &PlantSignal) -> Signal {
-    Signal {
-        name: signal.name.clone(),
-        unit: signal.unit.clone(),
-        description: signal.description.clone(),
-        operating: signal.operating,
-    }
 }

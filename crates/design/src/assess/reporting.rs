@@ -372,21 +372,14 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
         ));
     }
     all.extend(tracking_assumption(nominal));
-    if nominal.linear.faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
-        all.push(
-            "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
-             causes the errors."
-                .to_owned(),
-        );
-    }
-    if nominal.law.injection.is_some() {
-        all.push(
-            "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
-             those of its linearisation within the boundary layer, for faults and noise small against \
-             rho; larger faults leave rho / (rho - |f|) times the lasting error."
-                .to_owned(),
-        );
-    }
+    let is_constant = |fault: &Fault| fault.dynamics == FaultDynamics::Constant;
+    let lagging = "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
+                   causes the errors.";
+    all.extend(nominal.linear.faults.iter().any(is_constant).then(|| lagging.to_owned()));
+    let linearised = "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
+                      those of its linearisation within the boundary layer, for faults and noise small against \
+                      rho; larger faults leave rho / (rho - |f|) times the lasting error.";
+    all.extend(nominal.law.injection.as_ref().map(|_| linearised.to_owned()));
     if let Domain::Sampled { period } = nominal.domain {
         all.push(if file.model.only_samples().is_some() {
             format!(
@@ -401,28 +394,18 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
             )
         });
     }
-    if family.is_some() {
-        all.push(
-            "Responses, bounds and certificates of the estimation errors are those of the nominal \
-             plant; the estimation error of another member also depends on its states."
-                .to_owned(),
-        );
-    }
-    if schedule.is_some() {
-        all.push(
-            "Gains, responses and bounds are those of the plant of the file; between the points of the \
-             schedule, plant and controller are interpolated linearly. A change of the operating point \
-             acts like a disturbance."
-                .to_owned(),
-        );
-    }
-    if nominal.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_))) {
-        all.push(
-            "The loss of effectiveness is constant; it is estimated only while the command is well \
-             above its threshold."
-                .to_owned(),
-        );
-    }
+    let of_nominal = "Responses, bounds and certificates of the estimation errors are those of the nominal \
+                      plant; the estimation error of another member also depends on its states.";
+    all.extend(family.as_ref().map(|_| of_nominal.to_owned()));
+    let of_file = "Gains, responses and bounds are those of the plant of the file; between the points of the \
+                   schedule, plant and controller are interpolated linearly. A change of the operating point \
+                   acts like a disturbance.";
+    all.extend(schedule.as_ref().map(|_| of_file.to_owned()));
+    let loses =
+        |model: &control::faults::Fault| matches!(model.entry, FaultEntry::LossOfEffectiveness(_));
+    let lost = "The loss of effectiveness is constant; it is estimated only while the command is well \
+                above its threshold.";
+    all.extend(nominal.linear.models.iter().any(loses).then(|| lost.to_owned()));
     all
 }
 

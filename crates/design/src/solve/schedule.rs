@@ -112,39 +112,35 @@ impl Point {
     /// The matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
     fn between(&self, other: &Self, t: f64) -> Self {
         let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
-        let (plant, next) = (&self.physical, &other.physical);
-        let (model, gains) = (&self.model, &self.gains);
+        let (plant, next_plant) = (&self.physical, &other.physical);
+        let (model, next_model) = (&self.model, &other.model);
+        let (gains, next) = (&self.gains, &other.gains);
+        let mixed = |(from, to): (&IntegralAction, &IntegralAction)| IntegralAction {
+            output: mix(&from.output, &to.output),
+            gain: mix(&from.gain, &to.gain),
+            ..from.clone()
+        };
         Self {
             physical: StateSpace {
-                a: mix(&plant.a, &next.a),
-                b: mix(&plant.b, &next.b),
-                c: mix(&plant.c, &next.c),
+                a: mix(&plant.a, &next_plant.a),
+                b: mix(&plant.b, &next_plant.b),
+                c: mix(&plant.c, &next_plant.c),
                 ..plant.clone()
             },
             model: FaultyPlant {
-                a: mix(&model.a, &other.model.a),
-                b: mix(&model.b, &other.model.b),
-                c: mix(&model.c, &other.model.c),
-                f_a: mix(&model.f_a, &other.model.f_a),
+                a: mix(&model.a, &next_model.a),
+                b: mix(&model.b, &next_model.b),
+                c: mix(&model.c, &next_model.c),
+                f_a: mix(&model.f_a, &next_model.f_a),
                 a_f: model.a_f.clone(),
             },
             gains: Gains {
-                k_x: mix(&gains.k_x, &other.gains.k_x),
-                k_f: mix(&gains.k_f, &other.gains.k_f),
-                l_x: mix(&gains.l_x, &other.gains.l_x),
-                l_f: mix(&gains.l_f, &other.gains.l_f),
-                p_f: gains
-                    .p_f
-                    .as_ref()
-                    .zip(other.gains.p_f.as_ref())
-                    .map(|(matrix, next)| mix(matrix, next)),
-                integral: gains.integral.as_ref().zip(other.gains.integral.as_ref()).map(
-                    |(action, next)| IntegralAction {
-                        output: mix(&action.output, &next.output),
-                        gain: mix(&action.gain, &next.gain),
-                        ..action.clone()
-                    },
-                ),
+                k_x: mix(&gains.k_x, &next.k_x),
+                k_f: mix(&gains.k_f, &next.k_f),
+                l_x: mix(&gains.l_x, &next.l_x),
+                l_f: mix(&gains.l_f, &next.l_f),
+                p_f: gains.p_f.as_ref().zip(next.p_f.as_ref()).map(|(from, to)| mix(from, to)),
+                integral: gains.integral.as_ref().zip(next.integral.as_ref()).map(mixed),
                 ..gains.clone()
             },
         }
@@ -170,10 +166,7 @@ impl ScheduledLoop {
         let all: Vec<_> = scheduled.points(nominal).collect();
         Ok(Self {
             at: all.iter().map(|(at, _)| *at).collect(),
-            points: all
-                .iter()
-                .map(|(_, solution)| Point::of(solution))
-                .collect::<Result<_, _>>()?,
+            points: all.iter().map(|(_, design)| Point::of(design)).collect::<Result<_, _>>()?,
             filter: nominal.filter.clone(),
         })
     }
