@@ -8,7 +8,7 @@ use files::{Entry, PlaceError, Table};
 use crate::read::{each, refuse};
 
 /// The entries of a plant file that belong to `h_infinity`.
-pub const CHANNEL: [&str; 2] = ["weights", "noise"];
+pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
 
 /// What the H-infinity norm weights.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,11 +32,11 @@ pub struct ChannelWeight {
 }
 
 /// The signals that the norm of a gain is about.
-pub struct ChannelSignals<'a> {
+pub(crate) struct ChannelSignals<'a> {
     /// Names of its outputs.
-    pub outputs: Vec<&'a str>,
+    pub(crate) outputs: Vec<&'a str>,
     /// Names of the measurements whose noise the norm can have.
-    pub noises: Option<Vec<&'a str>>,
+    pub(crate) noises: Option<Vec<&'a str>>,
 }
 
 impl ChannelWeight {
@@ -60,11 +60,7 @@ impl Channel {
     }
 
     /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         table: &Table<'_>,
         signals: &ChannelSignals<'_>,
         domain: Domain,

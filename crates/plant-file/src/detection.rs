@@ -113,11 +113,7 @@ const DISTURBANCE: [&str; 6] = ["name", "E", "actuator", "sensor", "input", "bou
 
 impl DetectionRequest {
     /// Reads the table, if the file has one.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         measurements: usize,
@@ -257,11 +253,7 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
 }
 
 /// Reads the list `[[disturbances]]`.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn disturbances(
+pub(crate) fn disturbances(
     file: &Table<'_>,
     actuators: &[Signal],
     measurements: &[Signal],

@@ -140,11 +140,7 @@ impl Law {
 
 impl EstimationRequest {
     /// Reads the table; without it the law is the augmented observer. `faults`: their number.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
+    pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
         let Some(entry) = file.get("estimation") else {
             return Ok(Self { law: Law::Augmented, place: file.place.clone() });
         };

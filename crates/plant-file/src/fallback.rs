@@ -22,11 +22,7 @@ const KEYS: [&str; 3] = ["actuators", "loss", "region"];
 
 impl FallbackRequest {
     /// Reads the table, if there is one.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         sampled: bool,

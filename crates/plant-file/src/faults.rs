@@ -113,11 +113,7 @@ pub(crate) fn all_faults(
 
 /// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
 /// turn.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn faults(
+pub(crate) fn faults(
     entry: &Entry<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
@@ -226,8 +222,11 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
 }
 
 /// Returns one additive fault for each actuator at `positions`.
-#[must_use]
-pub fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place) -> Vec<Fault> {
+pub(crate) fn actuator_faults(
+    actuators: &[Signal],
+    positions: &[usize],
+    place: &Place,
+) -> Vec<Fault> {
     let fault = |&at: &usize| Fault {
         name: format!("f_{}", actuators[at].name),
         unit: actuators[at].unit.clone(),
@@ -240,8 +239,7 @@ pub fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place)
 
 impl Fault {
     /// Returns a constant fault on the first column of F_a with no other data.
-    #[must_use]
-    pub fn constant(place: &Place) -> Self {
+    pub(crate) fn constant(place: &Place) -> Self {
         Self {
             name: String::new(),
             unit: None,

@@ -46,11 +46,7 @@ pub struct LoopShape {
 
 impl LoopShape {
     /// Reads the table, if there is one; `signals` are actuators and measurements.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         file: &Table<'_>,
         signals: [&[Signal]; 2],
         domain: Domain,

@@ -26,11 +26,7 @@ pub enum Tolerance {
 }
 
 /// Reads a table of parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
+pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
     let one = |(name, entry): (&str, Entry<'_>)| {
         let tolerance = if entry.is_list() {
             match entry.list()?.as_slice() {
@@ -55,10 +51,6 @@ pub fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
 }
 
 /// Reads a fraction from 0 to below 1.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     within(entry, 0.0..1.0, "expected a number from 0 to below 1")
 }

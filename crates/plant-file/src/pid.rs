@@ -42,11 +42,7 @@ pub struct Pair {
 
 impl Pid {
     /// Reads the entries, if there are any; `corner` is that of the filters, in rad/s.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         file: &Table<'_>,
         table: &Table<'_>,
         [actuators, measurements]: [&[Signal]; 2],

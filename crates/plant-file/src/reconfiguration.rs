@@ -28,11 +28,7 @@ const MOST_SETS: usize = 200;
 
 impl ReconfigurationRequest {
     /// Reads the table, if there is one.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(
+    pub(crate) fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         measurements: &[Signal],

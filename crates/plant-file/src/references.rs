@@ -31,11 +31,10 @@ const REFERENCE: [&str; 6] = ["measurement", "combination", "name", "unit", "des
 
 impl References {
     /// Reads the table, if there is one.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(file: &Table<'_>, measurements: &[Signal]) -> Result<Option<Self>, PlaceError> {
+    pub(crate) fn read(
+        file: &Table<'_>,
+        measurements: &[Signal],
+    ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = file.get("reference") else {
             return Ok(None);
         };

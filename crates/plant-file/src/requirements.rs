@@ -120,11 +120,7 @@ impl Requirement {
 const KEYS: [&str; 5] = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn request(
+pub(crate) fn request(
     table: &Table<'_>,
     weights: [&str; 2],
     signals: &ChannelSignals<'_>,
@@ -249,11 +245,7 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
 }
 
 /// Reads a region that is stated alone; that of a sampled design has a decay rate only.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
+pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
     if sampled {
         refuse_unsampled(entry)?;
     }

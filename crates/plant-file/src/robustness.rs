@@ -51,11 +51,11 @@ const RED: f64 = 4.0;
 
 impl RobustnessLimits {
     /// Reads the table, or returns the defaults for a plant with that many measurements.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(file: &Table<'_>, model: &Model, measurements: usize) -> Result<Self, PlaceError> {
+    pub(crate) fn read(
+        file: &Table<'_>,
+        model: &Model,
+        measurements: usize,
+    ) -> Result<Self, PlaceError> {
         // A sampled A has entries that mean nothing each, so that a part of each is no tolerance that anybody has.
         let of_a = if model.only_samples().is_some() { 0.0 } else { TOLERANCE };
         let mut limits = Self {

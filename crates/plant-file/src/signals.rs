@@ -65,11 +65,7 @@ const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits
 const MEASUREMENT: [&str; 7] =
     ["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
 /// Reads the signals under `key`: texts (names) or tables.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
+pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one"));
@@ -118,11 +114,7 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
 }
 
 /// Reads a name of one line.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
+pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
         name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
@@ -135,11 +127,7 @@ pub fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
 }
 
 /// Reads the entry `description`, in which XML allows all characters.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn description(table: &Table<'_>) -> Result<String, PlaceError> {
+pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     let Some(entry) = table.get("description") else {
         return Ok(String::new());
     };
@@ -154,11 +142,7 @@ pub fn description(table: &Table<'_>) -> Result<String, PlaceError> {
 }
 
 /// Reads the entry `unit`, which has to be a unit of FMI.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
+pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     let Some(entry) = table.get("unit") else {
         return Ok(None);
     };
@@ -189,11 +173,11 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
 }
 
 /// Returns the index of the signal that the entry names.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
+pub(crate) fn position(
+    entry: &Entry<'_>,
+    signals: &[Signal],
+    what: &str,
+) -> Result<usize, PlaceError> {
     position_of(entry.text()?, entry, signals, what)
 }
 
@@ -211,11 +195,7 @@ pub(crate) fn position_of(
 }
 
 /// Reads names of signals, or the text "all".
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn positions(
+pub(crate) fn positions(
     entry: &Entry<'_>,
     signals: &[Signal],
     what: &str,

@@ -99,11 +99,7 @@ impl PlantFile<'_> {
 }
 
 /// Reads `[[family]]`.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
+pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
     let message = "expected `family` (one gain) or `schedule` (gains by a variable)";
     refuse(file, &["schedule"], message)?;
@@ -135,11 +131,7 @@ pub fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceErro
 }
 
 /// Reads `[schedule]`.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn schedule(
+pub(crate) fn schedule(
     file: &Table<'_>,
     model: &Model,
     measurements: &[Signal],
@@ -263,11 +255,7 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
 }
 
 /// Checks that the members of a family reach their references.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let references = file
         .references
         .as_ref()
