@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::matrix::{matrices, matrix};
 use super::number::number;
-use super::table::{Cell, Columns, table, table_of};
+use super::table::{Cell, Columns, table, table_of, with_unit};
 use design_report::family::{CommonCertificate, FamilyReport, MemberReport};
 use design_report::robustness::{LoopPoint, Number, ToleranceResult};
 use design_report::schedule::{RateCertificate, ScheduleReport};
@@ -40,7 +40,9 @@ pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
                 "One P proves the region of the state feedback for all members (margin "
                 (number(certificate.margin)) ")."
             }
-            (p_matrix("family-feedback-P", &feedback_names(report), certificate))
+            // The states that K = [K_x, K_i] feeds back.
+            @let names = [state_names(report), integral_names(report)].concat();
+            (p_matrix("family-feedback-P", &names, certificate))
         }
     }
 }
@@ -136,13 +138,8 @@ fn noise(members: &[&MemberReport]) -> Markup {
         .collect();
     let Some((_, first)) = stable.first() else { return html! {} };
     let row = |(at, number): (usize, &Number)| {
-        let name = match &number.unit {
-            Some(unit) => format!("{} ({unit})", number.name),
-            None => number.name.clone(),
-        };
-        let values =
-            stable.iter().map(|(_, margins)| Cell::Number(margins.noise_together[at].value));
-        std::iter::once(Cell::Text(name)).chain(values).collect()
+        let values = stable.iter().map(|(_, margins)| margins.noise_together[at].value.into());
+        std::iter::once(with_unit(&number.name, number.unit.as_ref())).chain(values).collect()
     };
     let rows: Vec<Vec<Cell>> = first.noise_together.iter().enumerate().map(row).collect();
     let heads: Vec<&str> =
@@ -182,11 +179,6 @@ fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
 
 fn state_names(report: &Report) -> Vec<String> {
     report.plant.states.iter().map(|signal| signal.name.clone()).collect()
-}
-
-/// The states that K = [K_x, K_i] feeds back.
-fn feedback_names(report: &Report) -> Vec<String> {
-    state_names(report).into_iter().chain(integral_names(report)).collect()
 }
 
 /// The integrals of the distances from references.

@@ -60,11 +60,6 @@ impl Plane {
     pub(super) fn slowest(self, system: &Loop) -> Option<f64> {
         system.eigenvalues.iter().map(|pole| self.rate(*pole)[0]).max_by(f64::total_cmp)
     }
-
-    /// Whether all eigenvalues of a loop are stable.
-    pub(super) fn is_stable_loop(self, system: &Loop) -> bool {
-        system.eigenvalues.iter().all(|pole| self.is_stable(*pole))
-    }
 }
 
 /// A required eigenvalue and an actual one.

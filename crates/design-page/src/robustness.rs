@@ -6,7 +6,7 @@ use super::curves::frequency;
 use super::matrix::matrices;
 use super::number::number;
 use super::plots::Plots;
-use super::table::{Cell, Columns, table, table_of};
+use super::table::{Cell, Columns, table, table_of, with_unit};
 use design_report::robustness::{
     Compared, Disk, Number, Parameter, PeakSensitivity, Robustness, ToleranceProof, ToleranceResult,
 };
@@ -302,13 +302,10 @@ fn limits(all: &[Parameter]) -> Markup {
         "change at the measurements",
     ];
     let row = |parameter: &Parameter| {
-        let name = match &parameter.unit {
-            Some(unit) => format!("{} ({unit})", parameter.name),
-            None => parameter.name.clone(),
-        };
+        let name = with_unit(&parameter.name, parameter.unit.as_ref());
         let values = [parameter.value, parameter.limits[0], parameter.limits[1], parameter.worst];
         let numbers = values.iter().chain(&parameter.effects).map(|value| Cell::Number(*value));
-        std::iter::once(Cell::Text(name)).chain(numbers).collect()
+        std::iter::once(name).chain(numbers).collect()
     };
     let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
     html! {

@@ -51,14 +51,6 @@ impl From<Option<[f64; 2]>> for Cell {
 }
 
 impl Cell {
-    fn is_missing(&self) -> bool {
-        matches!(self, Self::Missing)
-    }
-
-    fn is_number(&self) -> bool {
-        matches!(self, Self::Number(_) | Self::Complex(_))
-    }
-
     fn render(&self, numeric: bool) -> Markup {
         match self {
             Self::Text(text) => html! { td { (text) } },
@@ -78,8 +70,9 @@ impl Cell {
 /// Returns a table whose first column names its rows. Empty columns are left out; a table without
 /// rows is empty.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
-    let filled = |column: usize| rows.iter().any(|row| !row[column].is_missing());
-    let numeric = |column: usize| rows.iter().any(|row| row[column].is_number());
+    let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
+    let is_number = |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Complex(_));
+    let numeric = |column: usize| rows.iter().any(|row| is_number(&row[column]));
     let columns: Vec<usize> =
         (0..heads.len()).filter(|column| *column == 0 || filled(*column)).collect();
     html! {
@@ -125,6 +118,11 @@ pub(super) fn table_of<'a, T: 'a, const N: usize>(
     let heads = columns.map(|(head, _)| head);
     let row = |item: &T| columns.iter().map(|(_, cell)| cell(item)).collect();
     table(caption, &heads, &items.into_iter().map(row).collect::<Vec<_>>())
+}
+
+/// A name with its unit, if there is one.
+pub(super) fn with_unit(name: &str, unit: Option<&String>) -> Cell {
+    Cell::Text(unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})")))
 }
 
 fn row_name(cell: &Cell) -> Markup {

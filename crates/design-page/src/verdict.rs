@@ -143,7 +143,10 @@ fn sign(level: Level) -> &'static str {
 
 fn failures(report: &Report) -> Vec<(&str, &str)> {
     let plane = Plane::of(report);
-    let unstable = |system: &Loop, name| (!plane.is_stable_loop(system)).then_some((name, ""));
+    let unstable = |system: &Loop, name| {
+        let is_stable = system.eigenvalues.iter().all(|pole| plane.is_stable(*pole));
+        (!is_stable).then_some((name, ""))
+    };
     report
         .checks
         .iter()
