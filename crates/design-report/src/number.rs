@@ -6,13 +6,11 @@ pub fn rounded(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    if !value.is_finite() {
-        return if value.is_nan() {
-            "undefined"
-        } else {
-            ["∞", "-∞"][usize::from(value < 0.0)]
-        }
-        .to_owned();
+    if value.is_nan() {
+        return "undefined".to_owned();
+    }
+    if value.is_infinite() {
+        return if value < 0.0 { "-∞" } else { "∞" }.to_owned();
     }
     if value.abs() < 1e7 && value.fract() == 0.0 {
         return format!("{value:.0}");
