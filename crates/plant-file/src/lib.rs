@@ -200,9 +200,10 @@ impl<'a> PlantFile<'a> {
         };
         let faults = all_faults(file, &actuators, &measurements)?;
         let references = References::read(file, &measurements)?;
-        let domain = sampling
-            .as_ref()
-            .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
+        let domain = match sampling {
+            Some(Sampling { period, .. }) => Domain::Sampled { period },
+            None => Domain::Continuous,
+        };
         let loop_shape = LoopShape::read(file, [&actuators, &measurements], domain)?;
         let read = |key: &str, weights| {
             let Some(entry) = file.get(key) else { return Ok(Request::open(file.place.clone())) };
@@ -339,16 +340,16 @@ impl<'a> PlantFile<'a> {
     fn check_holds(&self) -> Result<(), PlaceError> {
         for signal in &self.measurements {
             let [_, range, hold] = &signal.places;
-            match (&self.sampling, range.as_ref().or(hold.as_ref())) {
-                (None, Some(place)) if self.schedule.is_some() => {
-                    let message = format!(
-                        "`{}` has a range or a longest time of a hold, which a continuous controller with a \
-                         schedule cannot have; expected `sample_time`, or none of them",
-                        signal.name
-                    );
-                    return Err(self.error_at(place, message));
-                }
-                _ => {}
+            if self.sampling.is_none()
+                && self.schedule.is_some()
+                && let Some(place) = range.as_ref().or(hold.as_ref())
+            {
+                let message = format!(
+                    "`{}` has a range or a longest time of a hold, which a continuous controller with a \
+                     schedule cannot have; expected `sample_time`, or none of them",
+                    signal.name
+                );
+                return Err(self.error_at(place, message));
             }
             if let (Some(Sampling { period, .. }), Some(longest), Some(place)) =
                 (&self.sampling, signal.longest_hold, hold)
