@@ -43,9 +43,8 @@ impl DesignedFmu {
         }
         for (name, bytes) in content.resources {
             let path = unpacked.resources().join(name);
-            let written =
-                fs::create_dir_all(unpacked.resources()).and_then(|()| fs::write(&path, bytes));
-            written.map_err(Error::file("write", &path))?;
+            fs::create_dir_all(unpacked.resources()).map_err(Error::file("write", &path))?;
+            write(&path, bytes)?;
         }
         let identifier = unpacked.description.co_simulation.as_ref();
         let identifier = identifier.map(|interface| interface.model_identifier.clone());
@@ -55,15 +54,12 @@ impl DesignedFmu {
         let mut package = Package::new(xml);
         let documentation = unpacked.folder().join("documentation");
         let fragment = fs::read_to_string(documentation.join(FRAGMENT)).unwrap_or_default();
-        let index = documentation.join("index.html");
-        fs::write(&index, page(&description, &fragment)).map_err(Error::file("write", &index))?;
-        let plant = documentation.join("plant.toml");
-        fs::write(&plant, content.plant).map_err(Error::file("write", &plant))?;
+        write(&documentation.join("index.html"), page(&description, &fragment).as_bytes())?;
+        write(&documentation.join("plant.toml"), content.plant.as_bytes())?;
         let folder = unpacked.folder();
         let described = folder.join(terminals::PATH);
         if described.is_file() {
-            fs::write(&described, terminals::render(&description))
-                .map_err(Error::file("write", &described))?;
+            write(&described, terminals::render(&description).as_bytes())?;
         }
         for entry in fs::read_dir(folder).map_err(Error::file("read", folder))? {
             let path = entry.map_err(Error::file("read", folder))?.path();
@@ -88,4 +84,8 @@ impl DesignedFmu {
             .write(path)
             .map_err(|error| Error::from(error).within(format!("cannot write {}", path.display())))
     }
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    fs::write(path, bytes).map_err(Error::file("write", path))
 }

@@ -66,7 +66,9 @@ pub fn new_plant_file(
         }
     }
     let refusal = refusal.unwrap_or_default();
-    let text = draft.text(&Settings::of_all(&draft), &refusal.lines().collect::<Vec<_>>());
+    let faulty = (0..draft.actuators.len()).collect();
+    let settings = Settings { faulty, filter: None, bandwidths: None };
+    let text = draft.text(&settings, &refusal.lines().collect::<Vec<_>>());
     Ok(NewPlantFile { text, refusal: Some(refusal), warnings })
 }
 

@@ -47,16 +47,9 @@ pub(crate) fn errors(
         figures.noise_together[commands..].iter().map(|number| number.value).collect::<Vec<_>>()
     });
     let estimation = Errors::of(designed)?;
-    let errors = designed.linear.faults.par_iter().enumerate().map(|(at, fault)| {
-        Ok::<_, Error>(EstimationErrors {
-            noise: noise.as_ref().map(|list| list[at]),
-            noise_peak: peaks.as_ref().map(|list| list[at]),
-            fault: fault.name.clone(),
-            unit: fault.unit.clone(),
-            ..estimation.of_fault(at)?
-        })
-    });
-    errors.collect()
+    let of = |list: &Option<Vec<f64>>, at: usize| list.as_ref().map(|list| list[at]);
+    let faults = (0..designed.linear.faults.len()).into_par_iter();
+    faults.map(|at| estimation.of_fault(at, of(&noise, at), of(&peaks, at))).collect()
 }
 
 /// The error dynamics, from the faults to the errors of their estimates.
@@ -83,9 +76,14 @@ impl<'a> Errors<'a> {
         })
     }
 
-    fn of_fault(&self, at: usize) -> Result<EstimationErrors, Error> {
-        let Solution { plant, extended, law, .. } = self.designed;
-        let channel = extended.channels[at];
+    fn of_fault(
+        &self,
+        at: usize,
+        noise: Option<f64>,
+        noise_peak: Option<f64>,
+    ) -> Result<EstimationErrors, Error> {
+        let Solution { plant, extended, law, linear, .. } = self.designed;
+        let (fault, channel) = (&linear.faults[at], extended.channels[at]);
         let row = 2 * plant.a.nrows() + channel.estimate;
         let to_error = |system: &StateSpace| StateSpace {
             b: system.b.columns(channel.estimate, 1).into(),
@@ -105,8 +103,8 @@ impl<'a> Errors<'a> {
         let point = frequency_response(&of_fault, &[self.frequency])?;
         let gain = peak_gain(&of_fault, WIDTH)?;
         Ok(EstimationErrors {
-            fault: String::new(),
-            unit: None,
+            fault: fault.name.clone(),
+            unit: fault.unit.clone(),
             constant: step.final_value[0].abs(),
             step_settling: transient.settling_time,
             step_peak: transient.peak.abs(),
@@ -114,8 +112,8 @@ impl<'a> Errors<'a> {
             sine: point[0].singular_values[0],
             sine_frequency: self.frequency,
             peak_gain: gain.upper[0],
-            noise: None,
-            noise_peak: None,
+            noise,
+            noise_peak,
         })
     }
 }

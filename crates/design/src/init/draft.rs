@@ -67,12 +67,6 @@ pub(super) struct Settings {
     pub(super) bandwidths: Option<(f64, f64)>,
 }
 
-impl Settings {
-    pub(super) fn of_all(draft: &Draft) -> Self {
-        Self { faulty: (0..draft.actuators.len()).collect(), filter: None, bandwidths: None }
-    }
-}
-
 impl Draft {
     /// The plant file. `refusal`: why there is no controller for it.
     pub(super) fn text(&self, settings: &Settings, refusal: &[&str]) -> String {

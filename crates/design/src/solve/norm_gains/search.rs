@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use crate::report::{LowerBoundFor, NormReport, NormWeight};
 use crate::solve::gain::{GainResult, Refusal, synthesised, unique};
 use crate::solve::norm_gains::NormRequirement;
-use plant_file::channel::Channel;
+use plant_file::channel::{Channel, ChannelWeight};
 use plant_file::requirements::Region;
 
 /// Relative width of a norm.
@@ -192,17 +192,12 @@ impl Search<'_> {
 /// Returns the weights over frequency, for the report.
 fn weights_over_frequency(channel: &Channel, domain: Domain) -> Vec<NormWeight> {
     let over_frequency = channel.all().filter(|one| one.weight.as_constant().is_none());
-    over_frequency
-        .map(|one| {
-            let (numerator, denominator) = one.weight.polynomials(domain);
-            NormWeight {
-                signal: one.signal.clone(),
-                numerator,
-                denominator,
-                table_deviation: one.deviation,
-            }
-        })
-        .collect()
+    let reported = |ChannelWeight { signal, weight, deviation }: &ChannelWeight| {
+        let (numerator, denominator) = weight.polynomials(domain);
+        let (signal, table_deviation) = (signal.clone(), *deviation);
+        NormWeight { signal, numerator, denominator, table_deviation }
+    };
+    over_frequency.map(reported).collect()
 }
 
 /// Says the norm and its bounds.
@@ -226,21 +221,12 @@ fn sentence(report: &NormReport) -> String {
         }
         (None, _) => "A lower bound is not known.".to_owned(),
     };
-    let fits: Vec<_> = report
-        .weights
-        .iter()
-        .filter_map(|weight| {
-            let decibels = 20.0 * weight.table_deviation?.log10();
-            Some(format!(
-                " The weight of {} is within {decibels:.2} dB of its table.",
-                weight.signal
-            ))
-        })
-        .collect();
-    format!(
-        "Norm {norm:.4e}{plain}; Frobenius norm of the gain {gain:.4e}. {bound}{}",
-        fits.concat()
-    )
+    let fit = |NormWeight { signal, table_deviation, .. }: &NormWeight| {
+        let decibels = 20.0 * table_deviation.as_ref()?.log10();
+        Some(format!(" The weight of {signal} is within {decibels:.2} dB of its table."))
+    };
+    let fits: String = report.weights.iter().filter_map(fit).collect();
+    format!("Norm {norm:.4e}{plain}; Frobenius norm of the gain {gain:.4e}. {bound}{fits}")
 }
 
 /// What "least" means: with a region the inequalities are sufficient, not necessary.
