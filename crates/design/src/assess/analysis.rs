@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::budget::Budget;
 use crate::report::{Bound, Frequency, Norm};
+use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::faults::Fault;
 
@@ -88,10 +89,8 @@ impl<'a> Loops<'a> {
     pub(crate) fn of(designed: &'a Solution) -> Result<Self, Error> {
         let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
-        if let Domain::Sampled { period } = domain {
-            // The change of a fault per sample is its rate times the sample time.
-            of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(*period);
-        }
+        // The change of a fault per sample is its rate times the sample time.
+        of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(step(*domain));
         let of_faults = fault_system(plant, gains, *domain)?;
         Ok(Self { designed, outputs: Outputs::of(designed), of_faults, of_rates })
     }

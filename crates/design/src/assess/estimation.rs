@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::assess::robustness::noise_peaks;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
+use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
@@ -65,9 +66,7 @@ impl<'a> Errors<'a> {
     fn of(designed: &'a Solution) -> Result<Self, Error> {
         let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
-        if let Domain::Sampled { period } = domain {
-            of_rates.b.scale_mut(*period);
-        }
+        of_rates.b.scale_mut(step(*domain));
         Ok(Self {
             of_faults: error_part(plant, &fault_system(plant, gains, *domain)?),
             of_rates: error_part(plant, &of_rates),

@@ -216,11 +216,9 @@ impl Examination<'_> {
         let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
         let limit = self.lossy.constant_limit(largest, most)?;
         let losses = self.stated.iter().zip(&limit.loss);
+        let losses = losses.map(|(stated, loss)| number(&stated.name, *loss));
         Ok(ConstantLoss {
-            losses: losses
-                .map(|(stated, loss)| number(&stated.name, *loss))
-                .filter(|loss| loss.value > 0.0)
-                .collect(),
+            losses: losses.filter(|loss| loss.value > 0.0).collect(),
             stable: limit.factor >= most,
             factor: limit.factor,
         })
@@ -261,14 +259,9 @@ impl Examination<'_> {
             if self.budget.is_over() {
                 break;
             }
-            let losses = numbers(self.stated, |_| 0.0).into_iter().zip(largest);
-            all.push(CertifiedLoss {
-                losses: losses
-                    .filter(|(_, largest)| **largest > 0.0)
-                    .map(|(number, largest)| Number { value: largest * bound.factor, ..number })
-                    .collect(),
-                factor: bound.factor,
-            });
+            let losses = self.stated.iter().zip(largest).filter(|(_, largest)| **largest > 0.0);
+            let losses = losses.map(|(loss, largest)| number(&loss.name, largest * bound.factor));
+            all.push(CertifiedLoss { losses: losses.collect(), factor: bound.factor });
         }
         Ok(all)
     }

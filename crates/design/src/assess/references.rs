@@ -134,8 +134,8 @@ impl<'a> ReferenceLoop<'a> {
         let mut commands = Vec::new();
         for (k, actuator) in linear.actuators.iter().enumerate() {
             let row = self.outputs.len() + k;
-            let output =
-                Output { name: format!("command {}", actuator.name), unit: actuator.unit.clone() };
+            let name = format!("command {}", actuator.name);
+            let output = Output { name, unit: actuator.unit.clone() };
             let curve = self.curve(&trace, row, size, &output);
             let values = curve.values.iter().chain([&curve.peak]);
             let range =

@@ -173,7 +173,10 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
             Some(&file.observer.requirement).filter(|_| nominal.law.keeps_error_dynamics()),
         )?,
         estimation: estimation::estimation(nominal, errors),
-        sampling: sampling(nominal),
+        sampling: file.sampling.map(|sampling| Sampled {
+            sample_time: sampling.period,
+            estimator: estimator(gains.estimator).to_owned(),
+        }),
         family: family_report,
         schedule,
         detection,
@@ -189,17 +192,6 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         assumptions: assumptions(file, designed),
         interface: Vec::new(),
     })
-}
-
-/// Returns the sampling of the controller; none in continuous time.
-fn sampling(solution: &Solution) -> Option<Sampled> {
-    match solution.domain {
-        Domain::Continuous => None,
-        Domain::Sampled { period } => Some(Sampled {
-            sample_time: period,
-            estimator: estimator(solution.gains.estimator).to_owned(),
-        }),
-    }
 }
 
 /// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.

@@ -11,6 +11,7 @@ use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
+use crate::solve::bandwidth::step;
 use crate::solve::designed::Designed;
 use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
 use crate::solve::solution::Solution;
@@ -92,12 +93,9 @@ fn bounded(
     }
     let shortest = intervals.iter().map(|interval| interval.length).fold(f64::INFINITY, f64::min);
     // The time in which the variable changes once: a sample, or a second.
-    let (time, is_sampled) = match domain {
-        Domain::Continuous => (1.0, false),
-        Domain::Sampled { period } => (period, true),
-    };
+    let time = step(domain);
     let certificate = match scheduled.rate_bound {
-        Some(rate) if is_sampled && rate * time > shortest => {
+        Some(rate) if domain != Domain::Continuous && rate * time > shortest => {
             return Ok(Err(format!(
                 "at the stated rate the variable passes the shortest interval, {shortest}, in less \
                  than a sample"
@@ -139,13 +137,9 @@ pub(crate) fn judge_schedule(
         }
     }
     if report.worst_instability >= 0.0 {
-        verdict.add(
-            Level::Red,
-            format!(
-                "the interpolated loop is not stable with {} = {}",
-                report.variable, report.worst_at
-            ),
-        );
+        let (variable, at) = (&report.variable, report.worst_at);
+        let text = format!("the interpolated loop is not stable with {variable} = {at}");
+        verdict.add(Level::Red, text);
     }
     for point in &report.points {
         if point.coupled_instability.is_some_and(|value| value >= -NEUTRAL) {

@@ -7,6 +7,7 @@ use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
 use crate::report::number::round;
+use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
@@ -159,10 +160,9 @@ impl Problem {
         }
         // Not always that with the most noise: a sampled filter approaches the zeros of the sampled plant.
         let fastest = slower.iter().map(|(_, decay_rate)| *decay_rate).fold(0.0, f64::max);
-        slower
-            .into_iter()
-            .find(|(_, decay_rate)| *decay_rate >= NEARLY * fastest)
-            .map(|(factor, _)| factor)
+        let (factor, _) =
+            slower.into_iter().find(|(_, decay_rate)| *decay_rate >= NEARLY * fastest)?;
+        Some(factor)
     }
 
     /// Process noise by which each fault that acts on the states varies by its size within a time
@@ -180,10 +180,7 @@ impl Problem {
         #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
         let mean = commands.trace() / n as f64;
         let states = &commands + DMatrix::from_diagonal_element(n, n, mean);
-        let time = match self.plant.domain {
-            Domain::Continuous => self.rate,
-            Domain::Sampled { period } => self.rate * period,
-        };
+        let time = self.rate * step(self.plant.domain);
         [
             ("Faults", faults / time),
             ("Faults, and commands by one,", commands / time),
