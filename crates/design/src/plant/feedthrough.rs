@@ -17,19 +17,13 @@ pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), Pl
     let entries = || (0..d.nrows()).flat_map(|row| (0..d.ncols()).map(move |column| (row, column)));
     let Some((row, column)) = entries().find(|at| d[*at] != 0.0) else {
         let measured = models.iter().any(|model| model.entry.is_measured());
-        return match &file.filter {
-            Some(_) if !measured => {
-                let why = if undelayed.d.amax() > 0.0 {
-                    "every command that enters one is delayed"
-                } else {
-                    "D is 0"
-                };
-                let message =
-                    format!("no fault enters a measurement, and {why}, so none is needed");
-                Err(file.error(&["filter"], message))
-            }
-            _ => Ok(()),
-        };
+        if file.filter.is_none() || measured {
+            return Ok(());
+        }
+        let delayed = undelayed.d.amax() > 0.0;
+        let why = if delayed { "every command that enters one is delayed" } else { "D is 0" };
+        let message = format!("no fault enters a measurement, and {why}, so none is needed");
+        return Err(file.error(&["filter"], message));
     };
     let fed = format!(
         "the measurement {} depends on {} directly (D is {})",

@@ -40,10 +40,8 @@ pub(crate) fn check_limits(
             return Err(file.error_at(place, message));
         }
         if value <= low || value >= high {
-            let message = format!(
-                "{about}, is at a limit, so that the controller acts in one direction only"
-            );
-            warnings.push(file.error_at(place, message));
+            let effect = "is at a limit, so that the controller acts in one direction only";
+            warnings.push(file.error_at(place, format!("{about}, {effect}")));
         }
     }
     for signal in &linear.measurements {

@@ -96,15 +96,13 @@ fn method(bandwidth: &Bandwidth, name: &str, loop_gain: f64, residual: f64) -> S
     } else {
         ", chosen by the verdict as the file states no requirement"
     };
-    let reached = match loop_gain {
-        gain if gain > 1.1 => {
-            format!("; the unstable modes need more: the loop gain there is {gain:.3}")
-        }
-        gain if gain < 0.9 => {
-            format!("; no weight reaches it: the loop gain there is {gain:.3}")
-        }
-        _ => String::new(),
+    let why = match loop_gain {
+        gain if gain > 1.1 => Some("the unstable modes need more"),
+        gain if gain < 0.9 => Some("no weight reaches it"),
+        _ => None,
     };
+    let reached = why.map(|why| format!("; {why}: the loop gain there is {loop_gain:.3}"));
+    let reached = reached.unwrap_or_default();
     format!(
         "{name} with a bandwidth of {rate} rad/s{chosen}{reached}; relative residual of the Riccati equation \
          {residual:.1e}."

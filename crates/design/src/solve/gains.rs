@@ -175,10 +175,8 @@ fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResul
         ..unique(placement.gain.clone(), method.to_owned())
     };
     let candidates = alternatives.candidates().map(|gains| gains.into_iter().map(result).collect());
-    let standard = alternatives
-        .standard
-        .each_ref()
-        .map(|choice| choice.as_ref().map(|alternative| alternative.gain.clone()));
+    let standard = alternatives.standard.each_ref();
+    let standard = standard.map(|choice| choice.as_ref().map(|placement| placement.gain.clone()));
     GainResult {
         choice: Some(Box::new(GainChoice { candidates, standard })),
         ..result(&alternatives.chosen)

@@ -82,30 +82,25 @@ impl LawProblem<'_> {
             parameters: Vec::new(),
             conditions: Vec::new(),
         };
+        let Self { plant, gains, domain, .. } = *self;
         match law {
             Law::Augmented => return Ok(design),
             Law::ProportionalIntegral { proportional } => {
                 self.require_current()?;
                 let part = proportional.unwrap_or(1.0);
-                design.gains = proportional_integral(self.plant, self.gains, self.domain, part)
-                    .map_err(text)?;
+                design.gains = proportional_integral(plant, gains, domain, part).map_err(text)?;
                 design.parameters.push(number("proportional", None, part));
                 return Ok(design);
             }
             Law::FastAdaptive { .. } | Law::SlidingMode { .. } | Law::Learning { .. } => {}
         }
         let form = self.direct_form(&mut design.conditions)?;
-        if matches!(law, Law::SlidingMode { .. } | Law::Learning { .. })
-            && self.domain == Domain::Continuous
-        {
-            return Err(
-                "it is a law of sampled controllers only: expected `sample_time`".to_owned()
-            );
+        if domain == Domain::Continuous && !matches!(law, Law::FastAdaptive { .. }) {
+            let reason = "it is a law of sampled controllers only: expected `sample_time`";
+            return Err(reason.to_owned());
         }
         self.require_current()?;
-        let dynamics = self.gains.error_dynamics(self.plant);
-        let rate = mean_rate(&dynamics, self.domain).map_err(text)?;
-        let (plant, gains) = (self.plant, self.gains);
+        let rate = mean_rate(&gains.error_dynamics(plant), domain).map_err(text)?;
         match law {
             Law::FastAdaptive { sigma, gamma } => {
                 // Different rates: equal ones would be a multiple eigenvalue.
@@ -119,16 +114,15 @@ impl LawProblem<'_> {
             Law::SlidingMode { rho, delta } => {
                 let rho = self.reach(rho.as_ref(), &mut design.conditions)?;
                 let law = SlidingMode { rho, delta: delta.clone() };
-                let (OwnModel { gains, a_f, .. }, delta) = sliding_mode(
-                    plant, &form, gains, &law, rate,
-                )
-                .map_err(|error| match error {
+                let refused = |error: Error| match error {
                     Error::NotSchur { .. } => format!(
                         "delta is too small for the sample time, the estimate would oscillate from \
                              sample to sample: {error}"
                     ),
                     other => text(other),
-                })?;
+                };
+                let designed = sliding_mode(plant, &form, gains, &law, rate).map_err(refused)?;
+                let (OwnModel { gains, a_f, .. }, delta) = designed;
                 (design.gains, design.a_f) = (gains, Some(a_f));
                 design.parameters.extend(self.each("rho", None, &law.rho));
                 design.parameters.extend(self.each("delta", None, &delta));
@@ -155,10 +149,9 @@ impl LawProblem<'_> {
 
     fn require_current(&self) -> Result<(), String> {
         if self.domain != Domain::Continuous && self.gains.estimator == Estimator::Prediction {
-            return Err(
-                "its estimate uses the newest measurement: expected estimator = \"current\""
-                    .to_owned(),
-            );
+            let reason =
+                "its estimate uses the newest measurement: expected estimator = \"current\"";
+            return Err(reason.to_owned());
         }
         Ok(())
     }

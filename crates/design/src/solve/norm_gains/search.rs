@@ -148,21 +148,19 @@ impl Search<'_> {
             bound.map(|bound| bound.gamma).filter(|gamma| *gamma <= LOOSE * norm)
         };
         let plain = self.weights.is_none() && self.performance == self.unweighted;
+        let unweighted = || {
+            let system = (self.system)(gain, &self.unweighted);
+            Ok::<_, Error>(h_infinity(&system, WIDTH)?.upper)
+        };
+        let positive = self.lower_bound.filter(|least| least.norm > 0.0);
         Ok(NormReport {
             channel: channel.to_owned(),
             norm,
             certified,
             lower_bound: self.lower_bound.map(|least| least.norm),
             lower_bound_for: self.lower_bound.map(|least| least.holds_for),
-            gap: self
-                .lower_bound
-                .filter(|least| least.norm > 0.0)
-                .map(|least| norm / least.norm - 1.0),
-            unweighted: if plain {
-                None
-            } else {
-                Some(h_infinity(&(self.system)(gain, &self.unweighted), WIDTH)?.upper)
-            },
+            gap: positive.map(|least| norm / least.norm - 1.0),
+            unweighted: if plain { None } else { Some(unweighted()?) },
             gain: gain.norm(),
             weights: weights_over_frequency(self.required.channel, self.domain),
         })
