@@ -115,14 +115,12 @@ fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWe
     }
     let table = entry.table()?;
     table.allow(&["low", "frequency", "high", "table", "order"])?;
-    let order = match table.get("order") {
-        None => 1,
-        Some(order) => match order.number()? {
-            1.0 => 1,
-            2.0 => 2,
-            other => return Err(order.error(format!("expected 1 or 2, found {other}"))),
-        },
+    let order = |entry: Entry<'_>| match entry.number()? {
+        1.0 => Ok(1),
+        2.0 => Ok(2),
+        other => Err(entry.error(format!("expected 1 or 2, found {other}"))),
     };
+    let order = table.get("order").map_or(Ok(1), order)?;
     if let Some(points) = table.get("table") {
         let alone = "a weight is stated by `table` or by `low`, `frequency` and `high`";
         refuse(&table, &["low", "frequency", "high"], alone)?;

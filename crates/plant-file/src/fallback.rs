@@ -3,7 +3,7 @@
 use crate::read::{alone, within};
 use crate::requirements::{Region, stated_region};
 use crate::signals::{Signal, positions};
-use files::{Place, PlaceError, Table};
+use files::{Entry, Place, PlaceError, Table};
 
 /// The failures that one feedback must serve without knowing which of them there is.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,13 +35,11 @@ impl FallbackRequest {
         table.allow(&KEYS)?;
         let meaning = "the names of the actuators that may fail, or \"all\"";
         let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
-        let loss = match table.get("loss") {
-            None => 1.0,
-            Some(entry) => {
-                entry.positive()?;
-                within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")?
-            }
+        let loss = |entry: Entry<'_>| {
+            entry.positive()?;
+            within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")
         };
+        let loss = table.get("loss").map_or(Ok(1.0), loss)?;
         if actuators.len() < 2 && loss >= 1.0 {
             let message =
                 "without its only actuator a plant is not controlled; expected a `loss` below 1";

@@ -28,13 +28,8 @@ const DETECTION: [&str; 7] = [
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let variables = OwnVariables::of(file);
     let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
-    for signal in file
-        .actuators
-        .iter()
-        .chain(&file.measurements)
-        .chain(references)
-        .chain(schedule_input(file))
-    {
+    let signals = file.actuators.iter().chain(&file.measurements).chain(references);
+    for signal in signals.chain(schedule_input(file)) {
         let name = &signal.name;
         if !is_structured_name(name) {
             let message = format!(
@@ -51,30 +46,28 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
             return Err(at_name(file, signal, message));
         }
     }
-    for signal in &file.measurements {
-        if file.actuators.iter().any(|actuator| actuator.name == signal.name) {
-            let message = format!(
-                "the actuator and the measurement `{}` would be one variable of the controller FMU; \
-                 expected different names",
-                signal.name
-            );
-            return Err(at_name(file, signal, message));
-        }
+    let is_actuator =
+        |signal: &&Signal| file.actuators.iter().any(|other| other.name == signal.name);
+    let is_measurement =
+        |signal: &&Signal| file.measurements.iter().any(|other| other.name == signal.name);
+    if let Some(signal) = file.measurements.iter().find(is_actuator) {
+        let message = format!(
+            "the actuator and the measurement `{}` would be one variable of the controller FMU; \
+             expected different names",
+            signal.name
+        );
+        return Err(at_name(file, signal, message));
     }
-    for signal in references {
-        let mut others = file.actuators.iter().chain(&file.measurements);
-        if others.any(|other| other.name == signal.name) {
-            let message = format!(
-                "the reference `{}` would have the name of an actuator or a measurement in the controller \
-                 FMU; expected another `name`",
-                signal.name
-            );
-            return Err(at_name(file, signal, message));
-        }
+    let is_either = |signal: &&Signal| is_actuator(signal) || is_measurement(signal);
+    if let Some(signal) = references.iter().find(is_either) {
+        let message = format!(
+            "the reference `{}` would have the name of an actuator or a measurement in the controller \
+             FMU; expected another `name`",
+            signal.name
+        );
+        return Err(at_name(file, signal, message));
     }
-    if let Some(input) = schedule_input(file)
-        && file.actuators.iter().any(|actuator| actuator.name == input.name)
-    {
+    if let Some(input) = schedule_input(file).filter(is_actuator) {
         let message = format!(
             "the scheduling variable `{}` is an actuator; expected a measurement, or another name",
             input.name

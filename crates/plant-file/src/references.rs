@@ -153,14 +153,11 @@ fn reference(
     if !text.is_empty() {
         signal.description = text;
     }
-    let step = match table.get("step") {
-        None => None,
-        Some(entry) => match entry.number()? {
-            0.0 => return Err(entry.error("expected a step other than 0")),
-            size => Some(size),
-        },
+    let size = |entry: Entry<'_>| match entry.number()? {
+        0.0 => Err(entry.error("expected a step other than 0")),
+        size => Ok(size),
     };
-    Ok((signal, weights, step))
+    Ok((signal, weights, table.get("step").map(size).transpose()?))
 }
 
 /// The reference of a measurement: `r_h1` for `h1`, `'r_level 1'` for `'level 1'`.
