@@ -1,6 +1,5 @@
 //! Chooses the bandwidths that a plant file leaves open.
 
-use control::Domain;
 use files::PlaceError;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -11,8 +10,8 @@ use crate::budget::Budget;
 use crate::plant::attainable;
 use crate::plant::linear::LinearPlant;
 use crate::solve::designed::design;
-use plant_file::PlantFile;
 use plant_file::requirements::{Bandwidth, Request, Requirement};
+use plant_file::{PlantFile, Sampling};
 
 /// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback:
 /// the first that makes the verdict green is taken.
@@ -142,10 +141,9 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
 
 /// The speed of the plant, or of the stated feedback, rad/s.
 fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
-    let domain = file.sampling.map(|sampling| Domain::Sampled { period: sampling.period });
-    let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, domain) {
+    let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, file.sampling) {
         (Requirement::Eigenvalues(all), _) => all.clone(),
-        (Requirement::SampledEigenvalues(all), Some(Domain::Sampled { period })) => {
+        (Requirement::SampledEigenvalues(all), Some(Sampling { period, .. })) => {
             all.iter().map(|value| value.ln() / period).collect()
         }
         (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok(*rate),

@@ -75,10 +75,8 @@ pub(crate) fn check_detectable(
     }
     let fault_names = fault_names(linear, extended);
     if let Some(&unseen) = detectability.invisible_faults().first() {
-        let message = format!(
-            "fault `{}` cannot be seen from the measurements {measurements}",
-            fault_names[unseen]
-        );
+        let name = &fault_names[unseen];
+        let message = format!("fault `{name}` cannot be seen from the measurements {measurements}");
         return Err(at_fault(file, linear, unseen, message).into());
     }
     // The eigenvalue of a constant signal.

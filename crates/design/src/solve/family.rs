@@ -133,14 +133,14 @@ pub(crate) fn name(members: &[Member], at: usize) -> &str {
 /// The sentence about a family without a common gain.
 fn refusal(names: &[&str], scaling: Option<f64>) -> String {
     let names = names.join(", ");
-    let Some(scaling) = scaling else {
-        return format!(
-            "no gain places the eigenvalues of the nominal plant in the region ({names})"
-        );
-    };
-    format!(
-        "no gain with one Lyapunov matrix places the eigenvalues of all members in the region: {names} \
-         have none together. The largest family for which one was found has {scaling:.2} of the \
-         distances from the nominal plant; expected members nearer to it, or a larger region"
-    )
+    match scaling {
+        None => {
+            format!("no gain places the eigenvalues of the nominal plant in the region ({names})")
+        }
+        Some(scaling) => format!(
+            "no gain with one Lyapunov matrix places the eigenvalues of all members in the region: {names} \
+             have none together. The largest family for which one was found has {scaling:.2} of the \
+             distances from the nominal plant; expected members nearer to it, or a larger region"
+        ),
+    }
 }
