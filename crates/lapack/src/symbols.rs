@@ -18,15 +18,19 @@ fn code(answer: Result<(), i32>) -> i32 {
     answer.err().unwrap_or(0)
 }
 
-macro_rules! gemm {
-    ($symbol:ident, $number:ty) => {
+/// Defines all functions for numbers of one type.
+macro_rules! symbols {
+    (
+        $number:ty: $gemm:ident $gemv:ident $symv:ident $syrk:ident $syr2k:ident
+        $potrf:ident $potrs:ident $gesv:ident $syevr:ident $gesdd:ident $gesvd:ident
+    ) => {
         /// C := alpha op(A) op(B) + beta C.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $gemm(
             transa: &u8,
             transb: &u8,
             m: &i32,
@@ -48,18 +52,14 @@ macro_rules! gemm {
             // SAFETY: the caller guarantees it.
             unsafe { general(&left, &right, &target) };
         }
-    };
-}
 
-macro_rules! gemv {
-    ($symbol:ident, $number:ty) => {
         /// y := alpha op(A) x + beta y.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $gemv(
             trans: &u8,
             m: &i32,
             n: &i32,
@@ -78,18 +78,14 @@ macro_rules! gemv {
             // SAFETY: the caller guarantees it.
             unsafe { matrix_vector(&matrix, &vector, &target) };
         }
-    };
-}
 
-macro_rules! symv {
-    ($symbol:ident, $number:ty) => {
         /// y := alpha A x + beta y with A symmetric.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $symv(
             uplo: &u8,
             n: &i32,
             alpha: &$number,
@@ -107,18 +103,14 @@ macro_rules! symv {
             // SAFETY: the caller guarantees it.
             unsafe { symmetric_vector(&matrix, &vector, &target) };
         }
-    };
-}
 
-macro_rules! syrk {
-    ($symbol:ident, $number:ty) => {
         /// A triangle of C := alpha op(A) op(A)' + beta C.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $syrk(
             uplo: &u8,
             trans: &u8,
             n: &i32,
@@ -136,18 +128,14 @@ macro_rules! syrk {
             // SAFETY: the caller guarantees it.
             unsafe { rank_k(&left, &target) };
         }
-    };
-}
 
-macro_rules! syr2k {
-    ($symbol:ident, $number:ty) => {
         /// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $syr2k(
             uplo: &u8,
             trans: &u8,
             n: &i32,
@@ -168,18 +156,14 @@ macro_rules! syr2k {
             // SAFETY: the caller guarantees it.
             unsafe { rank_2k(&left, &right, &target) };
         }
-    };
-}
 
-macro_rules! potrf {
-    ($symbol:ident, $number:ty) => {
         /// Replaces A by its Cholesky factor.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $potrf(
             uplo: &u8,
             n: &i32,
             a: *mut $number,
@@ -187,21 +171,16 @@ macro_rules! potrf {
             info: &mut i32,
         ) {
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { potrf(*uplo, *n, Array { at: a, leading: *lda }) };
-            *info = code(answer);
+            *info = code(unsafe { potrf(*uplo, *n, Array { at: a, leading: *lda }) });
         }
-    };
-}
 
-macro_rules! potrs {
-    ($symbol:ident, $number:ty) => {
         /// Solves A X = B with the Cholesky factor of A.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $potrs(
             uplo: &u8,
             n: &i32,
             nrhs: &i32,
@@ -214,21 +193,16 @@ macro_rules! potrs {
             let factor = Array { at: a.cast_mut(), leading: *lda };
             let right = Array { at: b, leading: *ldb };
             // SAFETY: the caller guarantees it; the factor is only read.
-            let answer = unsafe { potrs(*uplo, *n, *nrhs, factor, right) };
-            *info = code(answer);
+            *info = code(unsafe { potrs(*uplo, *n, *nrhs, factor, right) });
         }
-    };
-}
 
-macro_rules! gesv {
-    ($symbol:ident, $number:ty) => {
         /// Solves A X = B by elimination with partial pivoting.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $gesv(
             n: &i32,
             nrhs: &i32,
             a: *mut $number,
@@ -240,21 +214,16 @@ macro_rules! gesv {
         ) {
             let (matrix, right) = (Array { at: a, leading: *lda }, Array { at: b, leading: *ldb });
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { gesv(*n, *nrhs, matrix, ipiv, right) };
-            *info = code(answer);
+            *info = code(unsafe { gesv(*n, *nrhs, matrix, ipiv, right) });
         }
-    };
-}
 
-macro_rules! syevr {
-    ($symbol:ident, $number:ty) => {
         /// Computes eigenvalues and eigenvectors of a symmetric A.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $syevr(
             jobz: &u8,
             range: &u8,
             uplo: &u8,
@@ -288,21 +257,16 @@ macro_rules! syevr {
             let options = EigenOptions { job: *jobz, range: *range, triangle: *uplo };
             let to = Spectrum { count: m, values: w, vectors, support: isuppz };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { syevr(&options, *n, matrix, &to) };
-            *info = code(answer);
+            *info = code(unsafe { syevr(&options, *n, matrix, &to) });
         }
-    };
-}
 
-macro_rules! gesdd {
-    ($symbol:ident, $number:ty) => {
         /// Computes the singular value decomposition of A, with one option for both sides.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $gesdd(
             jobz: &u8,
             m: &i32,
             n: &i32,
@@ -329,21 +293,16 @@ macro_rules! gesdd {
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { singular_values(*m, *n, matrix, &to, 2) };
-            *info = code(answer);
+            *info = code(unsafe { singular_values(*m, *n, matrix, &to, 2) });
         }
-    };
-}
 
-macro_rules! gesvd {
-    ($symbol:ident, $number:ty) => {
         /// Computes the singular value decomposition of A, with one option for each side.
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symbol(
+        pub unsafe extern "C" fn $gesvd(
             jobu: &u8,
             jobvt: &u8,
             m: &i32,
@@ -370,31 +329,10 @@ macro_rules! gesvd {
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { singular_values(*m, *n, matrix, &to, 3) };
-            *info = code(answer);
+            *info = code(unsafe { singular_values(*m, *n, matrix, &to, 3) });
         }
     };
 }
 
-gemm!(dgemm_, f64);
-gemm!(sgemm_, f32);
-gemv!(dgemv_, f64);
-gemv!(sgemv_, f32);
-symv!(dsymv_, f64);
-symv!(ssymv_, f32);
-syrk!(dsyrk_, f64);
-syrk!(ssyrk_, f32);
-syr2k!(dsyr2k_, f64);
-syr2k!(ssyr2k_, f32);
-potrf!(dpotrf_, f64);
-potrf!(spotrf_, f32);
-potrs!(dpotrs_, f64);
-potrs!(spotrs_, f32);
-gesv!(dgesv_, f64);
-gesv!(sgesv_, f32);
-syevr!(dsyevr_, f64);
-syevr!(ssyevr_, f32);
-gesdd!(dgesdd_, f64);
-gesdd!(sgesdd_, f32);
-gesvd!(dgesvd_, f64);
-gesvd!(sgesvd_, f32);
+symbols!(f64: dgemm_ dgemv_ dsymv_ dsyrk_ dsyr2k_ dpotrf_ dpotrs_ dgesv_ dsyevr_ dgesdd_ dgesvd_);
+symbols!(f32: sgemm_ sgemv_ ssymv_ ssyrk_ ssyr2k_ spotrf_ spotrs_ sgesv_ ssyevr_ sgesdd_ sgesvd_);
