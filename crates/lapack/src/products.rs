@@ -26,18 +26,14 @@ impl<T: Number> Operand<T> {
     ///
     /// The array is valid for reads.
     unsafe fn read(&self) -> Option<DMatrix<f64>> {
-        let (rows, cols) = (self.rows, self.cols);
+        let array = |rows, cols| {
+            let layout = Layout::new(rows, cols, self.leading)?;
+            // SAFETY: the caller guarantees it.
+            Some(unsafe { layout.read(self.data, Part::All) })
+        };
         match self.transpose.to_ascii_uppercase() {
-            b'N' => {
-                let layout = Layout::new(rows, cols, self.leading)?;
-                // SAFETY: the caller guarantees it.
-                Some(unsafe { layout.read(self.data, Part::All) })
-            }
-            b'T' | b'C' => {
-                let layout = Layout::new(cols, rows, self.leading)?;
-                // SAFETY: the caller guarantees it.
-                Some(unsafe { layout.read(self.data, Part::All) }.transpose())
-            }
+            b'N' => array(self.rows, self.cols),
+            b'T' | b'C' => Some(array(self.cols, self.rows)?.transpose()),
             _ => None,
         }
     }

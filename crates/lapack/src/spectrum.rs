@@ -1,5 +1,6 @@
 //! Eigenvalues and eigenvectors of a symmetric matrix by Jacobi rotations.
 
+use crate::svd::rotate;
 use nalgebra::{DMatrix, DVector};
 
 /// Largest number of sweeps; 6 to 10 are usual.
@@ -42,12 +43,8 @@ fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) ->
     let tangent = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
     let c = 1.0 / tangent.hypot(1.0);
     let s = c * tangent;
-    for k in 0..m.nrows() {
-        let (x, y) = (m[(k, p)], m[(k, q)]);
-        (m[(k, p)], m[(k, q)]) = (c * x - s * y, s * x + c * y);
-        let (x, y) = (v[(k, p)], v[(k, q)]);
-        (v[(k, p)], v[(k, q)]) = (c * x - s * y, s * x + c * y);
-    }
+    rotate(m, p, q, c, s);
+    rotate(v, p, q, c, s);
     for k in 0..m.nrows() {
         let (x, y) = (m[(p, k)], m[(q, k)]);
         (m[(p, k)], m[(q, k)]) = (c * x - s * y, s * x + c * y);

@@ -29,12 +29,8 @@ impl Svd {
         let size = a.amax();
         if size == 0.0 || a.is_empty() {
             let (rows, cols) = a.shape();
-            let u = DMatrix::identity(rows, rows);
-            return Some(Self {
-                u,
-                values: DVector::zeros(cols),
-                v: DMatrix::identity(cols, cols),
-            });
+            let (u, v) = (DMatrix::identity(rows, rows), DMatrix::identity(cols, cols));
+            return Some(Self { u, values: DVector::zeros(cols), v });
         }
         if !size.is_finite() || a.iter().any(|entry| entry.is_nan()) {
             return None;
@@ -96,7 +92,7 @@ fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
 }
 
 /// Replaces columns a and b by c a - s b and s a + c b.
-fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
+pub(crate) fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
     for row in 0..m.nrows() {
         let (a, b) = (m[(row, p)], m[(row, q)]);
         (m[(row, p)], m[(row, q)]) = (c * a - s * b, s * a + c * b);
