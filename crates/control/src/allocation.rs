@@ -1,5 +1,6 @@
 //! Control allocation: the commands that take over when an actuator is gone.
 
+use crate::blocks::beside;
 use crate::svd::{Svd, norm_2};
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -139,8 +140,7 @@ pub fn equilibrium(
     check::shape("outputs", outputs, (outputs.nrows(), n))?;
     let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
     check::shape("disturbance", &w, (n, 1))?;
-    let mut all = a.clone().resize_horizontally(n + m, 0.0);
-    all.columns_mut(n, m).copy_from(&actuators.remaining()?);
+    let all = beside(a, &actuators.remaining()?);
     let svd = Svd::new(&all)?;
     let rank = svd.rank(TOLERANCE);
     if rank < n {

@@ -1,11 +1,18 @@
 //! Matrices made of blocks, and parts of matrices.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, ComplexField, DMatrix};
 
 /// [above; below].
-pub(crate) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+pub(crate) fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
+    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), T::zero());
     both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    both
+}
+
+/// [left, right].
+pub(crate) fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix<T> {
+    let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), T::zero());
+    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
     both
 }
 

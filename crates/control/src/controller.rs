@@ -1,6 +1,6 @@
 //! The controller of [`crate::aso`] as one linear system, and the loop that it closes.
 
-use crate::blocks::{block_2x2, stacked};
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::tracking::integration;
@@ -40,10 +40,8 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
         [&gains.controlled_dynamics(plant), &(&plant.f_a + &plant.b * &gains.k_f)],
         [&DMatrix::zeros(q, n), &plant.a_f],
     );
-    let mut m = gains.l_x.clone().resize_vertically(n + q, 0.0);
-    m.rows_mut(n, q).copy_from(&gains.l_f);
-    let mut k = gains.k_x.clone().resize_horizontally(n + q, 0.0);
-    k.columns_mut(n, q).copy_from(&gains.k_f);
+    let m = stacked(&gains.l_x, &gains.l_f);
+    let mut k = beside(&gains.k_x, &gains.k_f);
     let output = plant.augmented_output();
     let m_c = &m * &output;
     if let Some(p_f) = &gains.p_f {
@@ -100,9 +98,7 @@ pub fn fault_estimates(
         d.copy_from(p_f);
     }
     if gains.estimator == Estimator::Current {
-        let mut m = gains.l_x.clone().resize_vertically(n + q, 0.0);
-        m.rows_mut(n, q).copy_from(&gains.l_f);
-        let corrected = &c * m;
+        let corrected = &c * stacked(&gains.l_x, &gains.l_f);
         c -= &corrected * plant.augmented_output();
         d += corrected;
     }
@@ -154,7 +150,7 @@ pub fn complete_controller(
         let a = block_2x2([&commands.a, &into], [&below, &identity]);
         let integrand = (&integral.faults * &estimates.d - &integral.h) * step;
         let b = stacked(&commands.b, &integrand);
-        commands.c = stacked(&commands.c.transpose(), &integral.gain.transpose()).transpose();
+        commands.c = beside(&commands.c, &integral.gain);
         estimates.c = estimates.c.resize_horizontally(k + t, 0.0);
         (commands.a, commands.b) = (a.clone(), b.clone());
         (estimates.a, estimates.b) = (a, b);
@@ -174,14 +170,9 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
         Domain::Continuous => -&w,
         Domain::Sampled { .. } => DMatrix::identity(p, p) - &w,
     };
-    let mut a = DMatrix::zeros(p + k, p + k);
-    a.view_mut((0, 0), (p, p)).copy_from(&dynamics);
-    a.view_mut((p, 0), (k, p)).copy_from(&controller.b);
-    a.view_mut((p, p), (k, k)).copy_from(&controller.a);
-    let mut c = DMatrix::zeros(m, p + k);
-    c.columns_mut(0, p).copy_from(&controller.d);
-    c.columns_mut(p, k).copy_from(&controller.c);
+    let a = block_2x2([&dynamics, &DMatrix::zeros(p, k)], [&controller.b, &controller.a]);
     let (b, d) = (w.resize_vertically(p + k, 0.0), DMatrix::zeros(m, p));
+    let c = beside(&controller.d, &controller.c);
     Ok(StateSpace { a, b, c, d, domain: controller.domain })
 }
 

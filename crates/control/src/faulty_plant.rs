@@ -1,5 +1,6 @@
 //! The plant with faults.
 
+use crate::blocks::block_2x2;
 use crate::svd::Svd;
 use crate::{Error, check};
 use nalgebra::DMatrix;
@@ -56,11 +57,7 @@ impl FaultyPlant {
     #[must_use]
     pub fn augmented_dynamics(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
-        let mut a_0 = DMatrix::zeros(n + q, n + q);
-        a_0.view_mut((0, 0), (n, n)).copy_from(&self.a);
-        a_0.view_mut((0, n), (n, q)).copy_from(&-&self.f_a);
-        a_0.view_mut((n, n), (q, q)).copy_from(&self.a_f);
-        a_0
+        block_2x2([&self.a, &-&self.f_a], [&DMatrix::zeros(q, n), &self.a_f])
     }
 
     /// `C_0` = [C, 0], p x (n + q).

@@ -1,5 +1,6 @@
 //! The gains of the controller.
 
+use crate::blocks::stacked;
 use crate::faulty_plant::FaultyPlant;
 use crate::tracking::IntegralAction;
 use crate::{Error, check};
@@ -67,10 +68,7 @@ impl Gains {
     /// L = [`L_x`; -`L_f`], (n + q) x p, as in (10).
     #[must_use]
     pub fn observer_gain(&self) -> DMatrix<f64> {
-        let (n, q) = (self.l_x.nrows(), self.l_f.nrows());
-        let mut l = self.l_x.clone().resize_vertically(n + q, 0.0);
-        l.rows_mut(n, q).copy_from(&-&self.l_f);
-        l
+        stacked(&self.l_x, &-&self.l_f)
     }
 
     /// A + B `K_x`, n x n: the plant under exact state feedback.

@@ -1,6 +1,7 @@
 //! Exact discretisation of a linear system with an input that is constant or linear over the step.
 
 use crate::balance::{Balance, divide_rows, power_of_two};
+use crate::blocks::beside;
 use crate::exponential::scaling_and_squaring;
 use crate::logarithm::logarithm_of_one_plus;
 use crate::{Error, check};
@@ -147,9 +148,7 @@ pub fn continuous(
     let (n, m) = (check::square("A", phi)?, gamma.ncols());
     check::shape("B", gamma, (n, m))?;
     check::positive("h", h)?;
-    let mut less_one = DMatrix::zeros(n + m, n + m);
-    less_one.view_mut((0, 0), (n, n)).copy_from(&(phi - DMatrix::identity(n, n)));
-    less_one.view_mut((0, n), (n, m)).copy_from(gamma);
+    let less_one = beside(&(phi - DMatrix::identity(n, n)), gamma).resize_vertically(n + m, 0.0);
     let all = logarithm_of_one_plus(&less_one).ok_or(Error::NoContinuousPlant)? / h;
     Ok((all.view((0, 0), (n, n)).into(), all.view((0, n), (n, m)).into()))
 }

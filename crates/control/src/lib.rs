@@ -48,7 +48,6 @@ pub mod aso;
 mod balance;
 #[cfg(feature = "design")]
 pub mod bandwidth;
-#[cfg(feature = "design")]
 mod blocks;
 mod check;
 #[cfg(feature = "design")]

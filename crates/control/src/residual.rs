@@ -1,5 +1,6 @@
 //! Residual generators: linear systems from commands and measurements to residuals.
 
+use crate::blocks::beside;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
@@ -63,11 +64,6 @@ impl ResidualGenerator {
     /// Returns the generator as one system from [u; y] to r: B = [`B_u`, `B_y`], D = [`D_u`, `D_y`].
     #[must_use]
     pub fn system(&self) -> StateSpace {
-        let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-            let mut whole = left.clone().resize_horizontally(left.ncols() + right.ncols(), 0.0);
-            whole.columns_mut(left.ncols(), right.ncols()).copy_from(right);
-            whole
-        };
         StateSpace {
             a: self.a.clone(),
             b: beside(&self.b_u, &self.b_y),

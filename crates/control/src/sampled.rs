@@ -125,10 +125,10 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
     let filters = filter.as_ref().map_or(0, Vec::len);
     check::shape("A", &plant.a, (states + filters, states + filters))?;
     let n = *states;
-    let mut both = DMatrix::zeros(n + q, n + q);
-    both.view_mut((0, 0), (n, n)).copy_from(&plant.a.view((0, 0), (n, n)));
-    both.view_mut((0, n), (n, q)).copy_from(&plant.f_a.rows(0, n));
-    both.view_mut((n, n), (q, q)).copy_from(&plant.a_f);
+    let both = block_2x2(
+        [&plant.a.view((0, 0), (n, n)).into(), &plant.f_a.rows(0, n).into()],
+        [&DMatrix::zeros(q, n), &plant.a_f],
+    );
     let input = plant.b.rows(0, n).into_owned().resize_vertically(n + q, 0.0);
     let hold = FirstOrderHold::new(&both, &input, period)?;
     let a: DMatrix<f64> = hold.phi.view((0, 0), (n, n)).into();

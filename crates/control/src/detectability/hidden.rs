@@ -21,7 +21,7 @@
 //! systems, Indagationes Mathematicae 72 (1969).
 
 use crate::Error;
-use crate::blocks::to_complex;
+use crate::blocks::{beside, stacked, to_complex};
 use crate::eigen::eigenvalues;
 use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
@@ -89,15 +89,9 @@ pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Err
         let (rank, null) = scaled_null_space(&rosenbrock_matrix(plant, s, &eigenvectors))?;
         let states = null.rows(0, n).into_owned();
         let faults = &eigenvectors * null.rows(n, channels);
+        let expected = n + channels;
         for (fault, state) in reduced_basis(faults, states) {
-            hidden.push(HiddenFault {
-                at: s,
-                channels,
-                rank,
-                expected: n + channels,
-                fault,
-                state,
-            });
+            hidden.push(HiddenFault { at: s, channels, rank, expected, fault, state });
         }
     }
     Ok(hidden)
@@ -137,13 +131,10 @@ fn rosenbrock_matrix(
     eigenvectors: &ComplexMatrix,
 ) -> ComplexMatrix {
     let (n, p) = (plant.a.nrows(), plant.c.nrows());
-    let mut r = ComplexMatrix::zeros(n + p, n + eigenvectors.ncols());
     let shifted = to_complex(&plant.a) - ComplexMatrix::identity(n, n) * s;
-    r.view_mut((0, 0), (n, n)).copy_from(&shifted);
-    r.view_mut((0, n), (n, eigenvectors.ncols()))
-        .copy_from(&(to_complex(&plant.f_a) * eigenvectors));
-    r.view_mut((n, 0), (p, n)).copy_from(&to_complex(&plant.c));
-    r
+    let of_faults = to_complex(&plant.f_a) * eigenvectors;
+    let of_states = stacked(&shifted, &to_complex(&plant.c));
+    beside(&of_states, &of_faults.resize_vertically(n + p, Complex::ZERO))
 }
 
 /// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to

@@ -1,5 +1,6 @@
 //! The mean of residuals after a step of a fault.
 
+use crate::blocks::stacked;
 use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
@@ -59,11 +60,8 @@ pub fn mean_of_constant(effect: &StateSpace, period: f64) -> Result<DVector<f64>
 /// intervals, times the root of the period.
 pub(crate) fn averaged(system: &StateSpace, period: f64) -> Result<StateSpace, Error> {
     let (n, p) = (system.a.nrows(), system.c.nrows());
-    let mut a = system.a.clone().resize(n + p, n + p, 0.0);
-    a.view_mut((n, 0), (p, n)).copy_from(&system.c);
-    let mut b = system.b.clone().resize_vertically(n + p, 0.0);
-    b.rows_mut(n, p).copy_from(&system.d);
-    let (phi, gamma) = zero_order_hold(&a, &b, period)?;
+    let a = stacked(&system.a, &system.c).resize_horizontally(n + p, 0.0);
+    let (phi, gamma) = zero_order_hold(&a, &stacked(&system.b, &system.d), period)?;
     let root = 1.0 / period.sqrt();
     Ok(StateSpace {
         a: phi.view((0, 0), (n, n)).into_owned(),

@@ -1,5 +1,6 @@
 //! The mean that errors of the model give to residuals without a fault.
 
+use crate::blocks::beside;
 use crate::eigen::eigenvalues;
 use crate::hold::zero_order_hold;
 use crate::residual::ResidualGenerator;
@@ -111,9 +112,7 @@ impl UncertainPlant {
         let [of_a, of_b, of_c] = &self.sizes;
         let (n, m) = b.shape();
         let unit = DMatrix::identity(n, n);
-        let mut inputs = b.clone().resize_horizontally(m + n, 0.0);
-        inputs.columns_mut(m, n).copy_from(&unit);
-        let d = DMatrix::zeros(n, m + n);
+        let (inputs, d) = (beside(b, &unit), DMatrix::zeros(n, m + n));
         let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: *domain };
         let gains = peak_gain(&states, WIDTH)?.upper;
         let (from_u, from_w) = (gains.columns(0, m), gains.columns(m, n));

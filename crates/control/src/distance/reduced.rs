@@ -1,6 +1,6 @@
 //! The smallest singular value of [A - s I, B] for many s.
 
-use crate::blocks::to_complex;
+use crate::blocks::{beside, to_complex};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Steps of the inverse iteration.
@@ -24,8 +24,7 @@ impl ReducedPencil {
     /// `a`: n x n; `b`: n x m.
     pub(super) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Self {
         let (n, inputs) = b.shape();
-        let mut both = b.clone().resize_horizontally(inputs + n, 0.0);
-        both.columns_mut(inputs, n).copy_from(a);
+        let mut both = beside(b, a);
         for at in 0..n.saturating_sub(1) {
             let mut v = both.view((at, at), (n - at, 1)).into_owned();
             let norm = v.norm();

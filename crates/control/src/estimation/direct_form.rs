@@ -1,6 +1,7 @@
 //! The coordinates in which each fault acts on one output only.
 
 use super::{constant, eigenvalue};
+use crate::blocks::{beside, stacked};
 use crate::eigen::eigenvalues;
 use crate::faulty_plant::FaultyPlant;
 use crate::placement::place_balanced;
@@ -69,13 +70,9 @@ impl DirectForm {
         let m_1 = Svd::new(&c_f_a)?.least_squares(&DMatrix::identity(c.nrows(), c.nrows()), q);
         let m_2 = left_null_space(&c_f_a, q)?;
         let rest = left_null_space(f_a, q)?;
-        let mut to = DMatrix::zeros(n, n);
-        to.rows_mut(0, q).copy_from(&(&m_1 * c));
-        to.rows_mut(q, n - q).copy_from(&rest);
-        let mut from = DMatrix::zeros(n, n);
-        from.columns_mut(0, q).copy_from(f_a);
+        let to = stacked(&(&m_1 * c), &rest);
         let rest = rest.transpose();
-        from.columns_mut(q, n - q).copy_from(&(&rest - f_a * (&m_1 * c * &rest)));
+        let from = beside(f_a, &(&rest - f_a * (&m_1 * c * &rest)));
         let c_2 = &m_2 * c * from.columns(q, n - q);
         let mut form = Self { a: &to * a * &from, m_1, m_2, to, from, c_2, zeros: vec![], domain };
         form.zeros = form.invariant_zeros()?;
@@ -122,11 +119,10 @@ impl DirectForm {
     ///
     /// Same as [`place_balanced`], in sampled time as [`place_estimator`].
     pub fn observer_gain(&self, pole: f64, rate: f64) -> Result<DMatrix<f64>, Error> {
-        let (n, q, p) = (self.a.nrows(), self.faults(), self.m_1.ncols());
+        let (n, q) = (self.a.nrows(), self.faults());
         let of_faults = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
-        let mut gain = DMatrix::zeros(n, p);
-        gain.rows_mut(0, q).copy_from(&(of_faults * &self.m_1));
-        gain.rows_mut(q, n - q).copy_from(&(self.a.view((q, 0), (n - q, q)) * &self.m_1));
+        let of_rest = self.a.view((q, 0), (n - q, q)) * &self.m_1;
+        let mut gain = stacked(&(of_faults * &self.m_1), &of_rest);
         if !self.c_2.is_empty() {
             let shown = Svd::new(&self.c_2.transpose())?;
             let coupling = self.a.view((0, q), (q, n - q)).transpose();

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use crate::blocks::stacked;
 use crate::check::as_number;
 use crate::svd::Svd;
 use crate::{Error, check};
@@ -175,12 +176,6 @@ impl Windows {
 
 /// The triangular factor of matrices below each other.
 fn stacked_factor(parts: &[&DMatrix<f64>]) -> DMatrix<f64> {
-    let rows = parts.iter().map(|part| part.nrows()).sum();
-    let mut all = DMatrix::zeros(rows, parts[0].ncols());
-    let mut first = 0;
-    for part in parts {
-        all.rows_mut(first, part.nrows()).copy_from(*part);
-        first += part.nrows();
-    }
+    let all = parts[1..].iter().fold(parts[0].clone(), |all, part| stacked(&all, part));
     all.qr().r()
 }

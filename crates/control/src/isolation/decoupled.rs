@@ -3,7 +3,7 @@
 use super::DisturbedPlant;
 use crate::Error;
 use crate::balance::{multiply_columns, multiply_rows, unit_columns};
-use crate::blocks::stacked;
+use crate::blocks::{beside, stacked};
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
@@ -227,11 +227,4 @@ fn injection(
 fn relative_lengths(part: &DMatrix<f64>, whole: &DMatrix<f64>) -> Vec<f64> {
     let columns = part.column_iter().zip(whole.column_iter());
     columns.map(|(part, whole)| part.norm() / whole.norm().max(f64::MIN_POSITIVE)).collect()
-}
-
-/// [left, right].
-pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), 0.0);
-    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
-    both
 }

@@ -1,7 +1,8 @@
 //! The plant with commands, disturbances and faults.
 
-use super::decoupled::{Gap, beside, observable_states};
+use super::decoupled::{Gap, observable_states};
 use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
+use crate::blocks::beside;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
@@ -61,12 +62,9 @@ impl DisturbedPlant {
     /// The columns of the disturbances and of the faults with `decoupled[fault]`.
     pub(super) fn unknown_inputs(&self, decoupled: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
         let chosen: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
-        let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-            let mut both = left.clone().resize_horizontally(left.ncols() + chosen.len(), 0.0);
-            both.columns_mut(left.ncols(), chosen.len()).copy_from(&right.select_columns(&chosen));
-            both
-        };
-        (beside(&self.b_d, &self.b_f), beside(&self.d_d, &self.d_f))
+        let with_chosen =
+            |m: &DMatrix<f64>, of: &DMatrix<f64>| beside(m, &of.select_columns(&chosen));
+        (with_chosen(&self.b_d, &self.b_f), with_chosen(&self.d_d, &self.d_f))
     }
 
     /// The plant without the modes that no input moves, in balanced coordinates, and the number of these

@@ -1,8 +1,7 @@
 //! Verification of a residual generator on the plant for which it was made.
 
 use super::DisturbedPlant;
-use super::decoupled::beside;
-use crate::blocks::to_complex;
+use crate::blocks::{beside, to_complex};
 use crate::residual::ResidualGenerator;
 use crate::response::Transfer;
 use crate::{Domain, StateSpace};

@@ -3,7 +3,7 @@
 use super::eigenvectors::{Directions, LARGEST_DESCENT};
 use super::subspace::AssignableSubspaces;
 use super::update_order::update_order;
-use crate::blocks::to_complex;
+use crate::blocks::{stacked, to_complex};
 use crate::svd::Svd;
 use crate::{Error, reflections::Reflections};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
@@ -147,12 +147,10 @@ impl Iteration {
             &(of_u * second.tr_mul(&v).transpose() - of_v * second.tr_mul(&u).transpose()),
         )?;
         let count = if is_close(svd.values[0], svd.values[1]) { 2 } else { 1 };
-        let mut plane = DMatrix::zeros(2 * n, count);
-        plane.rows_mut(0, n).copy_from(&(first * svd.left.columns(0, count)));
-        plane.rows_mut(n, n).copy_from(&(second * svd.right.columns(0, count)));
-        let mut before = DVector::zeros(2 * n);
-        before.rows_mut(0, n).copy_from(&self.vectors.column(i));
-        before.rows_mut(n, n).copy_from(&self.vectors.column(j));
+        let (left, right) = (svd.left.columns(0, count), svd.right.columns(0, count));
+        let plane = stacked(&(first * left), &(second * right));
+        let both = self.vectors.select_columns([&i, &j]);
+        let before = DVector::from_column_slice(both.as_slice());
         let mut pair = &plane * plane.tr_mul(&before);
         if pair.amax() > ZERO {
             pair *= std::f64::consts::SQRT_2 / pair.norm();

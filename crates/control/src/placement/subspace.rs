@@ -2,8 +2,10 @@
 
 use super::pole_block::PoleBlock;
 use crate::Error;
-use crate::balance::power_of_two;
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
+use crate::balance::{
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+};
+use crate::blocks::beside;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
@@ -170,12 +172,10 @@ pub(crate) fn solutions(
 
 /// A V - V M + B G as a matrix that multiplies the stacked columns of V and G.
 fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) -> DMatrix<f64> {
-    let ((n, r), count) = (b.shape(), poles.count());
+    let (n, count) = (b.nrows(), poles.count());
     let one = DMatrix::identity(count, count);
     let shifted = one.kronecker(a) - poles.block().transpose().kronecker(&DMatrix::identity(n, n));
-    let mut equations = shifted.resize_horizontally(count * (n + r), 0.0);
-    equations.columns_mut(count * n, count * r).copy_from(&one.kronecker(b));
-    equations
+    beside(&shifted, &one.kronecker(b))
 }
 
 /// Orthonormal basis of the null space of independent rows, small entries included.
