@@ -23,11 +23,8 @@ impl Actuators<'_> {
     /// `B_r` D.
     fn remaining(&self) -> Result<DMatrix<f64>, Error> {
         let Self { b, gone, authority } = *self;
-        let column = DMatrix::from_column_slice(authority.len(), 1, authority);
-        check::shape("authority", &column, (b.ncols(), 1))?;
-        for limit in authority {
-            check::positive("authority", *limit)?;
-        }
+        check::column("authority", authority, b.ncols())?;
+        authority.iter().try_for_each(|&limit| check::positive("authority", limit))?;
         let factor = |j: usize| if gone.contains(&j) { 0.0 } else { authority[j] };
         Ok(DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * factor(j)))
     }
@@ -135,8 +132,7 @@ pub fn equilibrium(
     disturbance: &DVector<f64>,
 ) -> Result<Equilibrium, Error> {
     let Actuators { b, gone, authority } = *actuators;
-    let (n, m) = (check::square("A", a)?, b.ncols());
-    check::shape("B", b, (n, m))?;
+    let (n, m) = (check::with_inputs(a, b)?, b.ncols());
     check::shape("outputs", outputs, (outputs.nrows(), n))?;
     let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
     check::shape("disturbance", &w, (n, 1))?;

@@ -35,12 +35,46 @@ pub(crate) fn square(matrix: &'static str, m: &DMatrix<f64>) -> Result<usize, Er
     Ok(m.nrows())
 }
 
-/// Checks that a number is finite and above zero.
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
-    if value.is_finite() && value > 0.0 {
+/// Checks A, n x n, and B, n x m; returns n.
+pub(crate) fn with_inputs(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<usize, Error> {
+    let n = square("A", a)?;
+    shape("B", b, (n, b.ncols()))?;
+    Ok(n)
+}
+
+/// Checks A, n x n, and C, p x n; returns n.
+pub(crate) fn with_outputs(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<usize, Error> {
+    let n = square("A", a)?;
+    shape("C", c, (c.nrows(), n))?;
+    Ok(n)
+}
+
+/// Checks that a column is finite and has this many rows.
+pub(crate) fn column(name: &'static str, entries: &[f64], rows: usize) -> Result<(), Error> {
+    shape(name, &DMatrix::from_column_slice(entries.len(), 1, entries), (rows, 1))
+}
+
+/// Checks the number of entries alone.
+pub(crate) fn length<T>(matrix: &'static str, list: &[T], expected: usize) -> Result<(), Error> {
+    if list.len() == expected {
         return Ok(());
     }
-    Err(Error::OutOfRange { name, value, rule: "a finite number above zero" })
+    Err(Error::Shape { matrix, expected: (expected, 1), actual: (list.len(), 1) })
+}
+
+/// Checks that a number is finite and above zero.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
+    that(value.is_finite() && value > 0.0, name, value, "a finite number above zero")
+}
+
+/// Checks that a rule `holds` for a number.
+pub(crate) fn that(
+    holds: bool,
+    name: &'static str,
+    value: f64,
+    rule: &'static str,
+) -> Result<(), Error> {
+    if holds { Ok(()) } else { Err(Error::OutOfRange { name, value, rule }) }
 }
 
 /// Checks that a computed matrix is within the range of double precision.

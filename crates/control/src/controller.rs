@@ -164,7 +164,7 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
         return Ok(controller.clone());
     };
     let (p, k, m) = (filter.len(), controller.a.nrows(), controller.c.nrows());
-    check::shape("W", &DMatrix::from_column_slice(p, 1, filter), (controller.b.ncols(), 1))?;
+    check::column("W", filter, controller.b.ncols())?;
     let w = DMatrix::from_diagonal(&filter.to_vec().into());
     let dynamics = match controller.domain {
         Domain::Continuous => -&w,
@@ -244,8 +244,7 @@ pub fn closed_loop(
     check::shape("the controller's B", b, (k, p))?;
     check::shape("the controller's C", c, (m, k))?;
     check::shape("the controller's D", d, (m, p))?;
-    let column = DMatrix::from_column_slice(effectiveness.len(), 1, effectiveness);
-    check::shape("effectiveness", &column, (m, 1))?;
+    check::column("effectiveness", effectiveness, m)?;
     let b_e = DMatrix::from_fn(n, m, |i, j| plant.b[(i, j)] * effectiveness[j]);
     Ok(block_2x2([&(&plant.a + &b_e * d * &plant.c), &(&b_e * c)], [&(b * &plant.c), a]))
 }

@@ -4,6 +4,7 @@
 //! loop is therefore designed with an approximation and compared with the delay itself, see [`Delays::exact`].
 
 use crate::blocks::to_complex;
+use crate::check::as_number;
 use crate::eigen::complex_eigenvalues;
 use crate::hold::zero_order_hold;
 use crate::response::frequency_response;
@@ -44,8 +45,7 @@ const WHOLE: f64 = 1e-9;
 #[must_use]
 pub fn pade(order: usize) -> (DMatrix<f64>, DVector<f64>) {
     let sign = |even: usize| if even.is_multiple_of(2) { 1.0 } else { -1.0 };
-    #[expect(clippy::cast_precision_loss, reason = "the order of an approximant")]
-    let scale = |i: usize| (2 * i + 1) as f64;
+    let scale = |i: usize| as_number(2 * i + 1);
     let g = |i: usize, j: usize| if i < j { 1.0 } else { sign(i - j) };
     let legendre = DMatrix::from_fn(order, order, |i, j| -scale(i) * g(i, j));
     let input = DVector::from_fn(order, |i, _| scale(i) * sign(i));
@@ -133,10 +133,8 @@ impl Delays {
     pub fn approximated(&self, plant: &StateSpace, order: usize) -> Result<StateSpace, Error> {
         plant.check()?;
         for &delay in self.inputs.iter().chain(&self.outputs) {
-            if !(delay.is_finite() && delay >= 0.0) {
-                let rule = "finite and not below zero";
-                return Err(Error::OutOfRange { name: "a delay", value: delay, rule });
-            }
+            let holds = delay.is_finite() && delay >= 0.0;
+            check::that(holds, "a delay", delay, "finite and not below zero")?;
         }
         let (n, (p, m)) = (plant.a.nrows(), plant.d.shape());
         let all = n + self.states(order);

@@ -83,8 +83,7 @@ pub struct Distance {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix;
 /// [`Error::NotConverged`] when an inner iteration does not end.
 pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distance, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    check::with_inputs(a, b)?;
     Pencil::new(a, b)?.search()
 }
 
@@ -98,8 +97,7 @@ pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distanc
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix;
 /// [`Error::NotConverged`] when an inner iteration does not end.
 pub fn from_unobservable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Distance, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
+    check::with_outputs(a, c)?;
     Pencil::new(&a.transpose(), &c.transpose())?.search()
 }
 

@@ -6,6 +6,7 @@ mod hamiltonian;
 mod rank_one;
 
 use crate::balance::Balance;
+use crate::check::as_number;
 use crate::{Error, check};
 pub(crate) use complex::complex_eigenvalues;
 pub(crate) use hamiltonian::Hamiltonian;
@@ -77,11 +78,7 @@ where
 /// The shifts of the QR algorithm do not converge on some matrices with many symmetries,
 /// permutations for example. The reflection breaks the symmetry and preserves the eigenvalues.
 fn reflected(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut divisor = 0.0;
-    let v = DVector::from_fn(m.nrows(), |_, _| {
-        divisor += 1.0;
-        1.0 / divisor
-    });
+    let v = DVector::from_fn(m.nrows(), |i, _| 1.0 / as_number(i + 1));
     let h = DMatrix::identity(v.len(), v.len()) - &v * v.transpose() * (2.0 / v.norm_squared());
     &h * m * &h
 }

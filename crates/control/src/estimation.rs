@@ -62,9 +62,7 @@ pub fn mean_rate(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> 
             .min(FASTEST / period),
     };
     let sum: f64 = all.iter().map(|value| rate(value).ln()).sum();
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let count = all.len() as f64;
-    Ok((sum / count).exp())
+    Ok((sum / check::as_number(all.len())).exp())
 }
 
 /// The eigenvalue of an error that decays with `rate`: -rate, in sampled time e^(-rate T).
@@ -100,18 +98,12 @@ fn require_constant_faults(plant: &FaultyPlant, domain: Domain) -> Result<(), Er
     plant.check()?;
     let q = plant.a_f.nrows();
     let difference = (&plant.a_f - DMatrix::identity(q, q) * constant(domain)).amax();
-    if difference > 0.0 {
-        let rule = "zero: the law is about faults that are modelled as constant";
-        return Err(Error::OutOfRange { name: "A_f of f' = A_f f", value: difference, rule });
-    }
-    Ok(())
+    let rule = "zero: the law is about faults that are modelled as constant";
+    check::that(difference <= 0.0, "A_f of f' = A_f f", difference, rule)
 }
 
 /// Checks a current estimator of a sampled plant.
 fn require_current(domain: Domain, estimator: Estimator) -> Result<(), Error> {
-    if domain == Domain::Continuous || estimator == Estimator::Prediction {
-        let rule = "a sampled controller with a current estimator";
-        return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
-    }
-    Ok(())
+    let holds = domain != Domain::Continuous && estimator == Estimator::Current;
+    check::that(holds, "the domain", f64::NAN, "a sampled controller with a current estimator")
 }

@@ -20,6 +20,7 @@
 //! [`crate::controller::with_feedthrough`]. A fault f of its input i enters both: columns i of B and D.
 
 use crate::blocks::{block_2x2, stacked};
+use crate::check::as_number;
 use crate::faulty_plant::FaultyPlant;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -163,8 +164,7 @@ impl ExtendedPlant {
         domain: Domain,
     ) -> Result<Self, Error> {
         domain.check()?;
-        let n = check::square("A", a)?;
-        check::shape("B", b, (n, b.ncols()))?;
+        let n = check::with_inputs(a, b)?;
         check::shape("C", c, (c.nrows(), n))?;
         let (f_a, f_s) = columns(b, c.nrows(), faults)?;
         let (mut a_f, channels) = models(faults);
@@ -177,7 +177,8 @@ impl ExtendedPlant {
             let plant = FaultyPlant { a: a.clone(), b: b.clone(), c: c.clone(), f_a, a_f };
             return Ok(Self { plant, domain, filter: None, states: n, channels });
         }
-        checked_filter(filter, c.nrows())?;
+        check::column("W", filter, c.nrows())?;
+        filter.iter().try_for_each(|&rate| check::positive("a rate of the filter W", rate))?;
         let coefficients = coefficients(filter, domain);
         let rates = DMatrix::from_diagonal(&DVector::from_column_slice(&coefficients));
         let decay = match domain {
@@ -205,8 +206,7 @@ fn columns(
     let (n, m) = b.shape();
     let (mut f_a, mut f_s) = (DMatrix::zeros(n, faults.len()), DMatrix::zeros(p, faults.len()));
     let set = |into: &mut DMatrix<f64>, at: usize, name, column: &DVector<f64>| {
-        let entries = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
-        check::shape(name, &entries, (into.nrows(), 1))?;
+        check::column(name, column.as_slice(), into.nrows())?;
         into.set_column(at, column);
         Ok(())
     };
@@ -215,14 +215,10 @@ fn columns(
             FaultEntry::Actuator(column) => (Some(column.clone()), None),
             FaultEntry::Sensor(column) => (None, Some(column)),
             FaultEntry::Both { states, measurements } => (Some(states.clone()), Some(measurements)),
-            FaultEntry::LossOfEffectiveness(input) if *input < m => {
-                (Some(b.column(*input).into()), None)
-            }
             FaultEntry::LossOfEffectiveness(input) => {
-                #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-                let value = *input as f64;
-                let rule = "the index of an input, from zero";
-                return Err(Error::OutOfRange { name: "the input of a loss", value, rule });
+                let (value, rule) = (as_number(*input), "the index of an input, from zero");
+                check::that(*input < m, "the input of a loss", value, rule)?;
+                (Some(b.column(*input).into()), None)
             }
         };
         if let Some(column) = on_states {
@@ -259,12 +255,4 @@ pub(crate) fn coefficients(rates: &[f64], domain: Domain) -> Vec<f64> {
         Domain::Continuous => rates.to_vec(),
         Domain::Sampled { period } => rates.iter().map(|rate| -(-rate * period).exp_m1()).collect(),
     }
-}
-
-fn checked_filter(filter: &[f64], p: usize) -> Result<(), Error> {
-    check::shape("W", &DMatrix::from_column_slice(filter.len(), 1, filter), (p, 1))?;
-    for &rate in filter {
-        check::positive("a rate of the filter W", rate)?;
-    }
-    Ok(())
 }

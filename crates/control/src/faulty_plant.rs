@@ -45,8 +45,7 @@ impl FaultyPlant {
     ///
     /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], with the name of the matrix.
     pub fn check(&self) -> Result<(), Error> {
-        let n = check::square("A", &self.a)?;
-        check::shape("B", &self.b, (n, self.b.ncols()))?;
+        let n = check::with_inputs(&self.a, &self.b)?;
         check::shape("C", &self.c, (self.c.nrows(), n))?;
         check::shape("F_a", &self.f_a, (n, self.f_a.ncols()))?;
         check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))

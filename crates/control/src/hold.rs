@@ -73,10 +73,10 @@ impl FirstOrderHold {
         out: &mut [f64],
     ) -> Result<(), Error> {
         let (n, m) = self.gamma_0.shape();
-        length("x", x, n)?;
-        length("w0", w0, m)?;
-        length("w1", w1, m)?;
-        length("out", out, n)?;
+        check::length("x", x, n)?;
+        check::length("w0", w0, m)?;
+        check::length("w1", w1, m)?;
+        check::length("out", out, n)?;
         out.fill(0.0);
         add_product(&self.phi, x, out);
         add_product(&self.gamma_0, w0, out);
@@ -145,8 +145,7 @@ pub fn continuous(
     gamma: &DMatrix<f64>,
     h: f64,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let (n, m) = (check::square("A", phi)?, gamma.ncols());
-    check::shape("B", gamma, (n, m))?;
+    let (n, m) = (check::with_inputs(phi, gamma)?, gamma.ncols());
     check::positive("h", h)?;
     let less_one = beside(&(phi - DMatrix::identity(n, n)), gamma).resize_vertically(n + m, 0.0);
     let all = logarithm_of_one_plus(&less_one).ok_or(Error::NoContinuousPlant)? / h;
@@ -167,10 +166,8 @@ fn integrals(
     h: f64,
     degree: Degree,
 ) -> Result<[DMatrix<f64>; 3], Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    let (n, m) = (check::with_inputs(a, b)?, b.ncols());
     check::positive("h", h)?;
-    let m = b.ncols();
     let slopes = if degree == Degree::Linear { m } else { 0 };
     let balance = Balance::new(a);
     let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
@@ -200,13 +197,6 @@ fn integrals(
 fn unit(norm: f64) -> f64 {
     let power = power_of_two(norm);
     if power.is_normal() { power } else { 1.0 }
-}
-
-fn length(name: &'static str, vector: &[f64], expected: usize) -> Result<(), Error> {
-    if vector.len() == expected {
-        return Ok(());
-    }
-    Err(Error::Shape { matrix: name, expected: (expected, 1), actual: (vector.len(), 1) })
 }
 
 /// Selects a specialised loop for up to eight states, whose columns fit into registers.

@@ -19,6 +19,7 @@
 //!
 //! For a linear plant both are the Kalman filter of [`crate::riccati::kalman`], before it is stationary.
 
+use crate::check::as_number;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Part of its variance below which a pivot of a covariance is rounding, times the order.
@@ -266,8 +267,7 @@ impl NonlinearFilter {
     fn place_points(&mut self) {
         let n = self.mean.len();
         square_root(&self.covariance, &mut self.root);
-        #[expect(clippy::cast_precision_loss, reason = "a number of states")]
-        let scale = (n as f64).sqrt();
+        let scale = as_number(n).sqrt();
         for j in 0..n {
             for (at, sign) in [(j, scale), (n + j, -scale)] {
                 let mut point = self.points.column_mut(at);
@@ -284,7 +284,7 @@ fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
     for point in points.column_iter() {
         *mean += point;
     }
-    *mean /= count(points);
+    *mean /= as_number(points.ncols());
     for mut point in points.column_iter_mut() {
         point -= &*mean;
     }
@@ -294,13 +294,8 @@ fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
 fn covariance_of(rows: &DMatrix<f64>, columns: &DMatrix<f64>, covariance: &mut DMatrix<f64>) {
     covariance.fill(0.0);
     for (row, column) in rows.column_iter().zip(columns.column_iter()) {
-        covariance.ger(1.0 / count(rows), &row, &column, 1.0);
+        covariance.ger(1.0 / as_number(rows.ncols()), &row, &column, 1.0);
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "twice a number of states")]
-fn count(points: &DMatrix<f64>) -> f64 {
-    points.ncols() as f64
 }
 
 fn symmetrise(matrix: &mut DMatrix<f64>) {
@@ -320,8 +315,7 @@ fn square_root(covariance: &DMatrix<f64>, root: &mut DMatrix<f64>) {
     for j in 0..n {
         let explained: f64 = (0..j).map(|k| root[(j, k)] * root[(j, k)]).sum();
         let (variance, pivot) = (covariance[(j, j)], covariance[(j, j)] - explained);
-        #[expect(clippy::cast_precision_loss, reason = "a number of states")]
-        let rounding = ROUNDING * n as f64 * variance;
+        let rounding = ROUNDING * as_number(n) * variance;
         if pivot.is_nan() || pivot <= rounding {
             continue;
         }

@@ -232,8 +232,7 @@ impl PlacementProblem<'_> {
         extent: Extent,
     ) -> Result<Alternatives, Error> {
         let Self { a, b, poles, tolerance } = *self;
-        let n = check::square("A", a)?;
-        check::shape("B", b, (n, b.ncols()))?;
+        let n = check::with_inputs(a, b)?;
         check_poles(poles, n)?;
         require_controllable(a, b)?;
         let ones = DVector::from_element(n, 1.0);

@@ -83,8 +83,7 @@ impl Rank {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
 /// [`Error::NotConverged`] when a singular value iteration does not end.
 pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    check::with_inputs(a, b)?;
     Ok(Staircase::new(a, b)?.answer)
 }
 
@@ -98,8 +97,7 @@ pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
 /// [`Error::NotConverged`] when a singular value iteration does not end.
 pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
+    check::with_outputs(a, c)?;
     Ok(Staircase::new(&a.transpose(), &c.transpose())?.answer)
 }
 
@@ -132,9 +130,8 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<R
 ///
 /// Same as [`controllability`].
 pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
-    uncontrollable_part(a, b)
+    check::with_inputs(a, b)?;
+    modes_of(&Staircase::new(a, b)?)
 }
 
 /// The unobservable modes of x' = A x, y = C x: as many as the rank is below n.
@@ -161,13 +158,8 @@ pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mo
 ///
 /// Same as [`observability`].
 pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
-    uncontrollable_part(&a.transpose(), &c.transpose())
-}
-
-fn uncontrollable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
-    modes_of(&Staircase::new(a, b)?)
+    check::with_outputs(a, c)?;
+    modes_of(&Staircase::new(&a.transpose(), &c.transpose())?)
 }
 
 fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {

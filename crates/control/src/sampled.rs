@@ -80,13 +80,9 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
     check::positive("the sample time", period)?;
     for pole in continuous {
         let (decay, angle) = (pole.re * period, pole.im * period);
-        if !decay.is_finite() {
-            return Err(Error::OutOfRange { name: "Re(p) T", value: decay, rule: "finite" });
-        }
-        if angle.is_nan() || angle.abs() > std::f64::consts::PI {
-            let rule = "at most pi in modulus: half a turn per sample";
-            return Err(Error::OutOfRange { name: "Im(p) T", value: angle, rule });
-        }
+        check::that(decay.is_finite(), "Re(p) T", decay, "finite")?;
+        let rule = "at most pi in modulus: half a turn per sample";
+        check::that(angle.abs() <= std::f64::consts::PI, "Im(p) T", angle, rule)?;
     }
     let fastest = continuous.iter().map(|pole| -pole.re * period).fold(0.0, f64::max);
     let exponent = if fastest > FASTEST { FASTEST.ln() / fastest.ln() } else { 1.0 };

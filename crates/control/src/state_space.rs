@@ -49,8 +49,7 @@ impl StateSpace {
     /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix;
     /// [`Error::OutOfRange`] for the period.
     pub fn check(&self) -> Result<(), Error> {
-        let n = check::square("A", &self.a)?;
-        check::shape("B", &self.b, (n, self.b.ncols()))?;
+        let n = check::with_inputs(&self.a, &self.b)?;
         check::shape("C", &self.c, (self.c.nrows(), n))?;
         check::shape("D", &self.d, (self.c.nrows(), self.b.ncols()))?;
         self.domain.check()

@@ -70,23 +70,14 @@ impl Cusum {
     /// that the threshold would be above 1e6.
     pub fn with_false_alarms(drift: f64, samples: f64) -> Result<Self, Error> {
         check::positive("the drift", drift)?;
-        if samples.is_nan() || samples < 2.0 {
-            let rule = "at least 2";
-            return Err(Error::OutOfRange {
-                name: "the number of samples between false alarms",
-                value: samples,
-                rule,
-            });
-        }
+        let name = "the number of samples between false alarms";
+        check::that(samples >= 2.0, name, samples, "at least 2")?;
         let of = |threshold: f64| Self { drift, threshold };
         let (mut low, mut high) = (0.0, 1.0);
         while of(high).between_false_alarms() < samples {
             (low, high) = (high, 1.5 * high);
-            if high > LARGEST {
-                let rule = "less, as the threshold would be above 1e6";
-                let name = "the number of samples between false alarms";
-                return Err(Error::OutOfRange { name, value: samples, rule });
-            }
+            let rule = "less, as the threshold would be above 1e6";
+            check::that(high <= LARGEST, name, samples, rule)?;
         }
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);

@@ -55,8 +55,7 @@ pub struct DetectionFilter {
 
 impl NoisyPlant {
     fn check(&self) -> Result<(), Error> {
-        let (n, p) = (check::square("A", &self.a)?, self.c.nrows());
-        check::shape("B", &self.b, (n, self.b.ncols()))?;
+        let (n, p) = (check::with_inputs(&self.a, &self.b)?, self.c.nrows());
         check::shape("C", &self.c, (p, n))?;
         check::shape("W", &self.w, (n, n))?;
         check::shape("V", &self.v, (p, p))?;
@@ -64,9 +63,8 @@ impl NoisyPlant {
     }
 
     fn check_input(&self, input: &UnknownInput) -> Result<(), Error> {
-        let column = |v: &DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
-        check::shape("a column e", &column(&input.on_states), (self.a.nrows(), 1))?;
-        check::shape("a column e_s", &column(&input.on_measurements), (self.c.nrows(), 1))
+        check::column("a column e", input.on_states.as_slice(), self.a.nrows())?;
+        check::column("a column e_s", input.on_measurements.as_slice(), self.c.nrows())
     }
 
     /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
@@ -257,14 +255,8 @@ impl DetectionFilter {
     ///
     /// [`Error::Shape`] for columns of the wrong length.
     pub fn effect(&self, input: &UnknownInput) -> Result<StateSpace, Error> {
-        let (n, p) = (self.projection.ncols(), self.selection.ncols());
-        for (name, column, rows) in [("e", &input.on_states, n), ("e_s", &input.on_measurements, p)]
-        {
-            if column.len() != rows {
-                let (expected, actual) = ((rows, 1), (column.len(), 1));
-                return Err(Error::Shape { matrix: name, expected, actual });
-            }
-        }
+        check::length("e", input.on_states.as_slice(), self.projection.ncols())?;
+        check::length("e_s", input.on_measurements.as_slice(), self.selection.ncols())?;
         let generator = &self.generator;
         let b = &self.projection * &input.on_states - &self.injection * &input.on_measurements;
         let d = &self.selection * &input.on_measurements;

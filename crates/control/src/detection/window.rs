@@ -2,8 +2,8 @@
 
 use super::Delay;
 use super::chi_square::{noncentral_quantile, noncentral_survival};
-use crate::Error;
 use crate::check::as_number;
+use crate::{Error, check};
 
 /// At most as many phases of a window are averaged for a delay.
 const PHASES: usize = 32;
@@ -46,19 +46,13 @@ impl WindowTest {
         bias: f64,
     ) -> Result<Self, Error> {
         let length = as_number(window);
-        if residuals == 0 || window == 0 {
-            let (name, rule) = ("the number of residuals or of samples", "at least 1");
-            return Err(Error::OutOfRange { name, value: 0.0, rule });
-        }
-        if !(bias >= 0.0 && bias.is_finite()) {
-            let (name, rule) = ("the mean of the residuals", "a finite number from 0");
-            return Err(Error::OutOfRange { name, value: bias, rule });
-        }
+        let (holds, name) = (residuals > 0 && window > 0, "the number of residuals or of samples");
+        check::that(holds, name, 0.0, "at least 1")?;
+        let (holds, name) = (bias >= 0.0 && bias.is_finite(), "the mean of the residuals");
+        check::that(holds, name, bias, "a finite number from 0")?;
         let threshold = noncentral_quantile(residuals, length * bias * bias, length / samples);
-        if threshold.is_nan() {
-            let (name, rule) = ("the number of samples between false alarms", "more than a window");
-            return Err(Error::OutOfRange { name, value: samples, rule });
-        }
+        let name = "the number of samples between false alarms";
+        check::that(!threshold.is_nan(), name, samples, "more than a window")?;
         Ok(Self { residuals, window, threshold })
     }
 

@@ -3,6 +3,7 @@
 use super::francis;
 use crate::balance::Balance;
 use crate::blocks::block_2x2;
+use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// A Hamiltonian matrix [A, G; Q, -A'] with symmetric G and Q.
@@ -19,9 +20,8 @@ impl Hamiltonian {
         let n = a.nrows();
         let scale = Balance::new(&block_2x2([a, g], [q, &-a.transpose()])).scale;
         let unit = DVector::from_fn(n, |i, _| (scale[i] / scale[n + i]).sqrt());
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let count = (2 * n) as f64;
-        let ratio = (scale.iter().map(|one| one.ln()).sum::<f64>() * 2.0 / count).exp();
+        let logarithms = scale.iter().map(|one| one.ln()).sum::<f64>();
+        let ratio = (logarithms * 2.0 / as_number(2 * n)).exp();
         Self {
             a: DMatrix::from_fn(n, n, |i, j| a[(i, j)] * (unit[j] / unit[i])),
             g: DMatrix::from_fn(n, n, |i, j| g[(i, j)] * ratio / unit[i] / unit[j]),

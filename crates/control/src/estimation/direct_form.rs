@@ -2,6 +2,7 @@
 
 use super::{constant, eigenvalue};
 use crate::blocks::{beside, stacked};
+use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::faulty_plant::FaultyPlant;
 use crate::placement::place_balanced;
@@ -144,8 +145,8 @@ impl DirectForm {
             return Ok(DMatrix::zeros(a.nrows(), c.ncols()));
         }
         let (a, c) = if part.fixed.is_empty() { (&a, &c) } else { (&part.a, &part.b) };
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let pole = |i: usize| eigenvalue(rate * 2_f64.powf(i as f64 / order as f64), self.domain);
+        let faster = |i: usize| 2_f64.powf(as_number(i) / as_number(order));
+        let pole = |i: usize| eigenvalue(rate * faster(i), self.domain);
         let poles: Vec<_> = (0..order).map(|i| Complex::new(pole(i), 0.0)).collect();
         let gain = match self.domain {
             Domain::Continuous => -place_balanced(a, c, &poles)?.gain,

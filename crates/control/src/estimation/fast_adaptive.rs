@@ -52,7 +52,7 @@ pub fn fast_adaptive(
     require_constant_faults(plant, domain)?;
     gains.check(plant)?;
     let q = plant.f_a.ncols();
-    check::shape("gamma", &DMatrix::from_column_slice(law.gamma.len(), 1, &law.gamma), (q, 1))?;
+    check::column("gamma", &law.gamma, q)?;
     check::positive("sigma", law.sigma)?;
     law.gamma.iter().try_for_each(|&gamma| check::positive("gamma", gamma))?;
     let pole = eigenvalue(law.sigma, domain);
@@ -64,10 +64,9 @@ pub fn fast_adaptive(
     if domain == Domain::Continuous {
         return Ok(Gains { l_x, l_f, p_f: Some(direct), ..gains.clone() });
     }
-    if gains.estimator == Estimator::Prediction {
-        let rule = "a current estimator: f_hat uses the newest measurement";
-        return Err(Error::OutOfRange { name: "the estimator", value: f64::NAN, rule });
-    }
+    let is_current = gains.estimator == Estimator::Current;
+    let rule = "a current estimator: f_hat uses the newest measurement";
+    check::that(is_current, "the estimator", f64::NAN, rule)?;
     // L = A_aug M with A_aug = [A, F_a; 0, I]: M_f = L_f, A M_x = L_x - F_a L_f.
     let of_states = &l_x - &plant.f_a * &l_f;
     let m_x = plant.a.clone().lu().solve(&of_states).ok_or(Error::Overflow { what: "A^-1 L_x" })?;

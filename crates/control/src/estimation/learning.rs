@@ -49,10 +49,7 @@ pub fn learning(
     require_current(domain, gains.estimator)?;
     gains.check(plant)?;
     let k_1 = law.kept;
-    if !(k_1 > 0.0 && k_1 <= 1.0) {
-        let rule = "above 0 and at most 1";
-        return Err(Error::OutOfRange { name: "K_1", value: k_1, rule });
-    }
+    check::that(k_1 > 0.0 && k_1 <= 1.0, "K_1", k_1, "above 0 and at most 1")?;
     let fast = eigenvalue(rate, domain);
     let pole = fast * fast / k_1;
     if pole >= 1.0 {

@@ -40,10 +40,8 @@ pub fn proportional_integral(
     part: f64,
 ) -> Result<Gains, Error> {
     gains.check(plant)?;
-    if !(part.is_finite() && part >= 0.0) {
-        let rule = "a finite number of at least 0";
-        return Err(Error::OutOfRange { name: "proportional", value: part, rule });
-    }
+    let holds = part.is_finite() && part >= 0.0;
+    check::that(holds, "proportional", part, "a finite number of at least 0")?;
     let (n, q) = plant.f_a.shape();
     // The last states of the fault models: f' = 0 there.
     let develops = &plant.a_f - DMatrix::identity(q, q) * constant(domain);

@@ -61,7 +61,7 @@ pub fn sliding_mode(
     let q = plant.f_a.ncols();
     for list in [Some(&law.rho), law.delta.as_ref()].into_iter().flatten() {
         let name = "rho, or delta,";
-        check::shape(name, &DMatrix::from_column_slice(list.len(), 1, list), (q, 1))?;
+        check::column(name, list, q)?;
         list.iter().try_for_each(|&value| check::positive(name, value))?;
     }
     let fast = eigenvalue(rate, domain);

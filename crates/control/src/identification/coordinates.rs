@@ -32,8 +32,7 @@ impl MeasuredStates {
     ///
     /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`].
     pub fn new(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Option<Self>, Error> {
-        let (n, p) = (check::square("A", a)?, c.nrows());
-        check::shape("C", c, (p, n))?;
+        let (n, p) = (check::with_outputs(a, c)?, c.nrows());
         if n < p || n > 2 * p {
             return Ok(None);
         }

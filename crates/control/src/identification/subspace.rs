@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::Error;
 use crate::check::as_number;
 use crate::identification::{IdentifiedModel, Windows};
 use crate::svd::Svd;
+use crate::{Error, check};
 
 /// Singular values below this part of the largest one are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -90,10 +90,9 @@ impl Subspace {
     ///
     /// [`Error::OutOfRange`] unless the order is between 1 and the number of singular values; [`Error::NotConverged`].
     pub fn model(&self, order: usize) -> Result<IdentifiedModel, Error> {
-        if order == 0 || order > self.states.nrows() {
-            let rule = "at least 1 and at most the number of states that the samples determine";
-            return Err(Error::OutOfRange { name: "order", value: as_number(order), rule });
-        }
+        let rule = "at least 1 and at most the number of states that the samples determine";
+        let holds = (1..=self.states.nrows()).contains(&order);
+        check::that(holds, "order", as_number(order), rule)?;
         let past = self.windows.past_columns();
         let (m, p) = (self.windows.inputs, self.windows.outputs);
         let states = self.states.rows(0, order).into_owned();

@@ -79,14 +79,7 @@ impl Requirements {
         check::positive("quality", self.quality)?;
         let noise = self.noise.iter().flatten();
         noise.clone().try_for_each(|&size| check::positive("noise", size))?;
-        match &self.noise {
-            Some(noise) if noise.len() != measurements => Err(Error::Shape {
-                matrix: "noise",
-                expected: (measurements, 1),
-                actual: (noise.len(), 1),
-            }),
-            _ => Ok(()),
-        }
+        self.noise.iter().try_for_each(|noise| check::length("noise", noise, measurements))
     }
 }
 
@@ -218,11 +211,7 @@ fn check_arguments(
 ) -> Result<(), Error> {
     plant.check()?;
     requirements.check(plant.c.nrows(), plant.domain)?;
-    let faults = plant.b_f.ncols();
-    if pattern.len() != faults {
-        let (expected, actual) = ((faults, 1), (pattern.len(), 1));
-        return Err(Error::Shape { matrix: "pattern", expected, actual });
-    }
+    check::length("pattern", pattern, plant.b_f.ncols())?;
     if !pattern.contains(&true) {
         return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
     }

@@ -4,7 +4,8 @@ use super::DisturbedPlant;
 use super::decoupled::{DecoupledPart, complement};
 use super::generator::{Requirements, Residual, gains};
 use crate::blocks::{block_2x2, stacked};
-use crate::{Domain, Error};
+use crate::check::as_number;
+use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -68,12 +69,8 @@ pub fn achievable_patterns(
         }
         let strong = is_strong(&part, &pattern, requirements, plant.domain)?;
         strength.insert(pattern, strong);
-        if strength.len() > PATTERNS {
-            let rule = "at most 4096: decouple fewer faults";
-            #[expect(clippy::cast_precision_loss, reason = "about 4096")]
-            let value = strength.len() as f64;
-            return Err(Error::OutOfRange { name: "the number of patterns", value, rule });
-        }
+        let (count, rule) = (strength.len(), "at most 4096: decouple fewer faults");
+        check::that(count <= PATTERNS, "the number of patterns", as_number(count), rule)?;
     }
     let mut patterns: Vec<AchievablePattern> = strength
         .into_iter()
@@ -127,7 +124,7 @@ pub fn structure(
     frequency: f64,
     threshold: f64,
 ) -> Result<Vec<Vec<bool>>, Error> {
-    crate::check::positive("threshold", threshold)?;
+    check::positive("threshold", threshold)?;
     let row = |residual: &Residual| {
         let sizes: Vec<f64> =
             gains(&residual.from_faults, frequency).iter().map(|gain| gain.norm()).collect();

@@ -67,10 +67,9 @@ impl LossyLoop {
         controller: &StateSpace,
         inputs: &[usize],
     ) -> Result<Self, Error> {
-        if inputs.is_empty() || inputs.len() > MOST_INPUTS {
-            let (name, rule) = ("the number of inputs with a loss", "from one to six");
-            return Err(Error::OutOfRange { name, value: as_number(inputs.len()), rule });
-        }
+        let (count, name) = (inputs.len(), "the number of inputs with a loss");
+        let holds = (1..=MOST_INPUTS).contains(&count);
+        check::that(holds, name, as_number(count), "from one to six")?;
         Self::of_any_number(plant, controller, inputs)
     }
 
@@ -81,10 +80,8 @@ impl LossyLoop {
         inputs: &[usize],
     ) -> Result<Self, Error> {
         let m = plant.b.ncols();
-        if let Some(&input) = inputs.iter().find(|&&input| input >= m) {
-            let (name, rule) = ("the input of a loss", "the index of an input, from zero");
-            return Err(Error::OutOfRange { name, value: as_number(input), rule });
-        }
+        let (name, rule) = ("the input of a loss", "the index of an input, from zero");
+        inputs.iter().try_for_each(|&at| check::that(at < m, name, as_number(at), rule))?;
         let intact = closed_loop(plant, controller, &vec![1.0; m])?;
         let effect = |&input: &usize| {
             let mut effectiveness = vec![1.0; m];
@@ -172,8 +169,7 @@ impl LossyLoop {
     }
 
     fn check(&self, largest: &[f64]) -> Result<(), Error> {
-        let losses = DMatrix::from_column_slice(largest.len(), 1, largest);
-        check::shape("the largest losses", &losses, (self.effects.len(), 1))?;
+        check::column("the largest losses", largest, self.effects.len())?;
         let rule = "from zero to one, above zero for at least one input";
         let bad = largest.iter().copied().find(|loss| !(0.0..=1.0).contains(loss));
         match bad.or_else(|| largest.iter().all(|loss| *loss <= 0.0).then_some(0.0)) {

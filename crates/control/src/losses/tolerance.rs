@@ -3,7 +3,7 @@
 use super::lossy_loop::{LossyLoop, grid};
 use crate::check::as_number;
 use crate::faulty_plant::FaultyPlant;
-use crate::{Error, StateSpace};
+use crate::{Error, StateSpace, check};
 
 /// Largest number of points of the grid over several inputs.
 const GRID: usize = 1000;
@@ -24,7 +24,7 @@ const GRID_PER_INPUT: usize = 11;
 ///
 /// [`Error::OutOfRange`] when `excitation` is not above zero.
 pub fn estimated_loss(u: f64, f_hat: f64, excitation: f64) -> Result<f64, Error> {
-    crate::check::positive("u_e", excitation)?;
+    check::positive("u_e", excitation)?;
     let size = u.hypot(excitation);
     Ok(-(u / size) * (f_hat / size))
 }
@@ -65,7 +65,7 @@ pub fn loss_tolerance(
     inputs: &[usize],
     largest: f64,
 ) -> Result<LossTolerance, Error> {
-    check(inputs.len(), largest)?;
+    check_box(inputs.len(), largest)?;
     let lossy = LossyLoop::of_any_number(plant, controller, inputs)?;
     let alone = |at: usize| {
         let mut direction = vec![0.0; inputs.len()];
@@ -87,16 +87,12 @@ pub fn loss_tolerance(
     })
 }
 
-fn check(inputs: usize, largest: f64) -> Result<(), Error> {
-    if !(largest > 0.0 && largest <= 1.0) {
-        let rule = "above zero and at most one";
-        return Err(Error::OutOfRange { name: "the largest loss", value: largest, rule });
-    }
-    if inputs == 0 || 1 << inputs.min(20) > GRID {
-        let (name, rule) = ("the number of inputs with a loss", "from one to nine");
-        return Err(Error::OutOfRange { name, value: as_number(inputs), rule });
-    }
-    Ok(())
+fn check_box(inputs: usize, largest: f64) -> Result<(), Error> {
+    let rule = "above zero and at most one";
+    check::that(largest > 0.0 && largest <= 1.0, "the largest loss", largest, rule)?;
+    let (holds, name) =
+        (inputs > 0 && 1 << inputs.min(20) <= GRID, "the number of inputs with a loss");
+    check::that(holds, name, as_number(inputs), "from one to nine")
 }
 
 /// The largest number of points for each input, at most eleven, whose grid is small enough.

@@ -4,6 +4,7 @@ use super::descent::minimise;
 use super::subspace::{AssignableSubspace, AssignableSubspaces};
 use crate::Error;
 use crate::balance::multiply_rows;
+use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -65,11 +66,7 @@ pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
 /// Quasi-random directions: the fractional parts of multiples of square roots.
 fn spread(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
     let count = problem.scale.len() * problem.inputs();
-    let mut seed = (2 + start * count..).map(|k| {
-        #[expect(clippy::cast_precision_loss, reason = "the count is far below 2^52")]
-        let root = (k as f64).sqrt();
-        (1000.0 * root).fract() - 0.5
-    });
+    let mut seed = (2 + start * count..).map(|k| (1000.0 * as_number(k).sqrt()).fract() - 0.5);
     let mut direction = |space: &AssignableSubspace| {
         let w = DVector::from_fn(space.states.ncols(), |_, _| seed.next().unwrap_or(1.0));
         let length = w.norm();

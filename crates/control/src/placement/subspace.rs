@@ -6,6 +6,7 @@ use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
 use crate::blocks::beside;
+use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
@@ -204,7 +205,6 @@ fn row_sizes(solutions: &[DMatrix<f64>], blocks: &[PoleBlock], n: usize) -> DVec
         }
     }
     let total = sizes.sum();
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let factors = sizes.map(|size| power_of_two((size * rows as f64 / total).sqrt()));
+    let factors = sizes.map(|size| power_of_two((size * as_number(rows) / total).sqrt()));
     factors.map(|factor| if factor.is_normal() { factor } else { 1.0 })
 }

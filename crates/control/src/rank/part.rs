@@ -59,8 +59,7 @@ impl ControllablePart {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
 /// [`Error::NotConverged`] when an inner iteration does not end.
 pub fn controllable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<ControllablePart, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    check::with_inputs(a, b)?;
     let staircase = Staircase::new(a, b)?;
     Ok(ControllablePart {
         a: staircase.reached_dynamics(),

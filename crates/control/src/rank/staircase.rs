@@ -3,6 +3,7 @@
 use super::Rank;
 use crate::Error;
 use crate::balance::{Balance, divide_rows, multiply_rows, unit_columns};
+use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
@@ -42,8 +43,7 @@ impl Staircase {
         let (mut rest, mut rest_basis) = (balanced.clone(), DMatrix::identity(n, n));
         let mut reached = Vec::with_capacity(n);
         let mut link = unit_columns(&divide_rows(b, &scale));
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let tolerance = TOLERANCE_PER_STATE * n as f64;
+        let tolerance = TOLERANCE_PER_STATE * as_number(n);
         let mut margin = f64::INFINITY;
         let size = rest.norm();
         let mut reference = link.norm();
