@@ -35,6 +35,22 @@ impl Domain {
         }
     }
 
+    /// s = j w, or z = e^(j w T), at the frequency w in rad per unit of time.
+    pub(crate) fn point(self, frequency: f64) -> Complex<f64> {
+        match self {
+            Self::Continuous => Complex::new(0.0, frequency),
+            Self::Sampled { period } => Complex::from_polar(1.0, frequency * period),
+        }
+    }
+
+    /// The eigenvalue of a constant: 0, in sampled time 1.
+    pub(crate) fn constant(self) -> f64 {
+        match self {
+            Self::Continuous => 0.0,
+            Self::Sampled { .. } => 1.0,
+        }
+    }
+
     /// Checks that the period of sampled time is a finite number above zero.
     pub(crate) fn check(self) -> Result<(), Error> {
         match self {

@@ -73,14 +73,6 @@ pub(crate) fn eigenvalue(rate: f64, domain: Domain) -> f64 {
     }
 }
 
-/// The eigenvalue of a constant error: 0, in sampled time 1.
-pub(crate) fn constant(domain: Domain) -> f64 {
-    match domain {
-        Domain::Continuous => 0.0,
-        Domain::Sampled { .. } => 1.0,
-    }
-}
-
 /// (I - C `L_x`)^-1 of a current estimator, I of a prediction estimator: e before the correction from e
 /// after it.
 fn before_correction(plant: &FaultyPlant, gains: &Gains) -> Result<DMatrix<f64>, Error> {
@@ -97,7 +89,7 @@ fn before_correction(plant: &FaultyPlant, gains: &Gains) -> Result<DMatrix<f64>,
 fn require_constant_faults(plant: &FaultyPlant, domain: Domain) -> Result<(), Error> {
     plant.check()?;
     let q = plant.a_f.nrows();
-    let difference = (&plant.a_f - DMatrix::identity(q, q) * constant(domain)).amax();
+    let difference = (&plant.a_f - DMatrix::identity(q, q) * domain.constant()).amax();
     let rule = "zero: the law is about faults that are modelled as constant";
     check::that(difference <= 0.0, "A_f of f' = A_f f", difference, rule)
 }

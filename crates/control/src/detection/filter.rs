@@ -86,10 +86,7 @@ impl NoisyPlant {
         let grown = |m: &DMatrix<f64>| m.clone().resize(n + 1, n + 1, 0.0);
         let (mut a, mut w) = (grown(&self.a), grown(&self.w));
         a.view_mut((0, n), (n, 1)).copy_from(&input.on_states);
-        a[(n, n)] = match self.domain {
-            Domain::Continuous => 0.0,
-            Domain::Sampled { .. } => 1.0,
-        };
+        a[(n, n)] = self.domain.constant();
         w[(n, n)] = intensity;
         let mut c = self.c.clone().resize_horizontally(n + 1, 0.0);
         c.set_column(n, &input.on_measurements);

@@ -1,6 +1,6 @@
 //! The coordinates in which each fault acts on one output only.
 
-use super::{constant, eigenvalue};
+use super::eigenvalue;
 use crate::blocks::{beside, stacked};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
@@ -45,7 +45,7 @@ pub struct DirectForm {
     /// A in these coordinates.
     a: DMatrix<f64>,
     c_2: DMatrix<f64>,
-    domain: Domain,
+    pub(super) domain: Domain,
 }
 
 impl DirectForm {
@@ -162,15 +162,6 @@ impl DirectForm {
     #[must_use]
     pub fn coordinates(&self) -> &DMatrix<f64> {
         &self.to
-    }
-
-    /// 1 - `pole` in sampled time, -`pole` in continuous time.
-    pub(crate) fn distance(&self, pole: f64) -> f64 {
-        constant(self.domain) - pole
-    }
-
-    pub(crate) fn domain(&self) -> Domain {
-        self.domain
     }
 }
 

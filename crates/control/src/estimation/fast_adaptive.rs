@@ -48,7 +48,7 @@ pub fn fast_adaptive(
     law: &FastAdaptive,
     rate: f64,
 ) -> Result<Gains, Error> {
-    let domain = form.domain();
+    let domain = form.domain;
     require_constant_faults(plant, domain)?;
     gains.check(plant)?;
     let q = plant.f_a.ncols();
@@ -56,11 +56,11 @@ pub fn fast_adaptive(
     check::positive("sigma", law.sigma)?;
     law.gamma.iter().try_for_each(|&gamma| check::positive("gamma", gamma))?;
     let pole = eigenvalue(law.sigma, domain);
-    let gamma = law.gamma.iter().map(|&gamma| form.distance(eigenvalue(gamma, domain)));
+    let gamma = law.gamma.iter().map(|&gamma| domain.constant() - eigenvalue(gamma, domain));
     let gamma = DMatrix::from_diagonal(&DVector::from_iterator(q, gamma));
     let direct = gamma * &form.m_1;
     let l_x = form.observer_gain(pole, rate)? + &plant.f_a * &direct;
-    let l_f = &direct * form.distance(pole);
+    let l_f = &direct * (domain.constant() - pole);
     if domain == Domain::Continuous {
         return Ok(Gains { l_x, l_f, p_f: Some(direct), ..gains.clone() });
     }

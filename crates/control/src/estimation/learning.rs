@@ -44,7 +44,7 @@ pub fn learning(
     law: &Learning,
     rate: f64,
 ) -> Result<OwnModel, Error> {
-    let domain = form.domain();
+    let domain = form.domain;
     require_constant_faults(plant, domain)?;
     require_current(domain, gains.estimator)?;
     gains.check(plant)?;

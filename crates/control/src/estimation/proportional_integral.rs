@@ -1,6 +1,6 @@
 //! The proportional-integral observer.
 
-use super::{before_correction, constant};
+use super::before_correction;
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::Gains;
 use crate::{Domain, Error, check};
@@ -44,14 +44,14 @@ pub fn proportional_integral(
     check::that(holds, "proportional", part, "a finite number of at least 0")?;
     let (n, q) = plant.f_a.shape();
     // The last states of the fault models: f' = 0 there.
-    let develops = &plant.a_f - DMatrix::identity(q, q) * constant(domain);
+    let develops = &plant.a_f - DMatrix::identity(q, q) * domain.constant();
     let last: Vec<usize> = (0..q).filter(|&j| develops.row(j).amax() <= 0.0).collect();
     let mut rates = DMatrix::zeros(n + q, last.len());
     for (column, &row) in last.iter().enumerate() {
         rates[(n + row, column)] = 1.0;
     }
     let dynamics = gains.error_dynamics(plant);
-    let still = dynamics - DMatrix::identity(n + q, n + q) * constant(domain);
+    let still = dynamics - DMatrix::identity(n + q, n + q) * domain.constant();
     let lasting = still.lu().solve(&rates).ok_or(Error::Overflow { what: "the lag of f_hat" })?;
     let lag = -lasting.rows(n, q);
     let p_f = lag * gains.l_f.select_rows(&last) * before_correction(plant, gains)? * part;

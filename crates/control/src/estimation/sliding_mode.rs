@@ -1,6 +1,6 @@
 //! The sliding-mode observer of a sampled controller.
 
-use super::{DirectForm, OwnModel, constant, eigenvalue, require_constant_faults, require_current};
+use super::{DirectForm, OwnModel, eigenvalue, require_constant_faults, require_current};
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::Gains;
 use crate::{Error, check};
@@ -54,7 +54,7 @@ pub fn sliding_mode(
     law: &SlidingMode,
     rate: f64,
 ) -> Result<(OwnModel, Vec<f64>), Error> {
-    let domain = form.domain();
+    let domain = form.domain;
     require_constant_faults(plant, domain)?;
     require_current(domain, gains.estimator)?;
     gains.check(plant)?;
@@ -65,7 +65,7 @@ pub fn sliding_mode(
         list.iter().try_for_each(|&value| check::positive(name, value))?;
     }
     let fast = eigenvalue(rate, domain);
-    let pole = constant(domain) - LEFT * form.distance(fast);
+    let pole = domain.constant() - LEFT * (domain.constant() - fast);
     let slope = pole - fast;
     let delta = law.delta.clone();
     let delta = delta.unwrap_or_else(|| law.rho.iter().map(|rho| rho / slope).collect());

@@ -104,7 +104,7 @@ impl Family {
 
     /// For each fault the size that its gains would have without cancellation.
     pub(super) fn fault_scale(&self, part: &DecoupledPart, frequency: f64) -> Vec<f64> {
-        let s = self.point(frequency);
+        let s = self.domain.point(frequency);
         let size = |fault: usize| {
             let (b, d) = (part.b_f.column(fault).norm(), part.d_f.column(fault).norm());
             let lags = self.poles.iter().zip(self.t.iter().zip(&self.l));
@@ -113,14 +113,6 @@ impl Family {
             through.sum::<f64>() + self.w.norm() * d
         };
         (0..part.b_f.ncols()).map(size).collect()
-    }
-
-    /// s or z at a frequency.
-    fn point(&self, frequency: f64) -> Complex<f64> {
-        match self.domain {
-            Domain::Continuous => Complex::new(0.0, frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-        }
     }
 
     /// W: the combination v of the members has the variance v W v', averaged over frequencies up to ten
@@ -151,7 +143,7 @@ impl Family {
         input: impl Fn(usize) -> DMatrix<f64>,
         direct: &DMatrix<f64>,
     ) -> ComplexMatrix {
-        let s = self.point(frequency);
+        let s = self.domain.point(frequency);
         let mut sum = to_complex(direct);
         let mut through = Complex::new(1.0, 0.0);
         for (at, &pole) in self.poles.iter().enumerate().rev() {
@@ -164,8 +156,5 @@ impl Family {
 
 /// The gain of a lag with the pole p whose static gain is one: -p, or 1 - p in sampled time.
 pub(super) fn unit_gain(pole: f64, domain: Domain) -> f64 {
-    match domain {
-        Domain::Continuous => -pole,
-        Domain::Sampled { .. } => 1.0 - pole,
-    }
+    domain.constant() - pole
 }

@@ -330,10 +330,7 @@ fn realised(part: &DecoupledPart, family: Family, frequency: f64) -> Residual {
 /// The response of one residual to the faults at one frequency, through a chain of lags.
 pub(super) fn gains(from_faults: &StateSpace, frequency: f64) -> Vec<Complex<f64>> {
     let StateSpace { a, b, c, d, domain } = from_faults;
-    let s = match domain {
-        Domain::Continuous => Complex::new(0.0, frequency),
-        Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-    };
+    let s = domain.point(frequency);
     let gain = |fault: usize| {
         let mut below = Complex::new(0.0, 0.0);
         let mut sum = Complex::new(d[(0, fault)], 0.0);

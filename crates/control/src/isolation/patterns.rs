@@ -6,7 +6,7 @@ use super::generator::{Requirements, Residual, gains};
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
 use crate::{Domain, Error, check};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 use std::collections::{BTreeMap, VecDeque};
 
 /// More patterns than this are not enumerated.
@@ -89,10 +89,7 @@ fn is_strong(
     requirements: &Requirements,
     domain: Domain,
 ) -> Result<bool, Error> {
-    let s = match domain {
-        Domain::Continuous => Complex::new(0.0, requirements.frequency),
-        Domain::Sampled { period } => Complex::from_polar(1.0, requirements.frequency * period),
-    };
+    let s = domain.point(requirements.frequency);
     let n = part.a.nrows();
     let size = part.a.norm().max(f64::MIN_POSITIVE);
     // Rows in units of A and of C.
