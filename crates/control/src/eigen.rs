@@ -90,12 +90,7 @@ fn diagonal_blocks(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
     let mut row = 0;
     while row < n {
         if row + 1 < n && t[(row + 1, row)] != 0.0 {
-            eigenvalues.extend(pair(
-                t[(row, row)],
-                t[(row, row + 1)],
-                t[(row + 1, row)],
-                t[(row + 1, row + 1)],
-            ));
+            eigenvalues.extend(pair(t, row));
             row += 2;
         } else {
             eigenvalues.push(Complex::new(t[(row, row)], 0.0));
@@ -105,8 +100,10 @@ fn diagonal_blocks(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
     eigenvalues
 }
 
-/// Eigenvalues of [a, b; c, d], without cancellation.
-fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex<f64>; 2] {
+/// Eigenvalues of the block [a, b; c, d] on the diagonal of M from row `at` on, without cancellation.
+fn pair(m: &DMatrix<f64>, at: usize) -> [Complex<f64>; 2] {
+    let (a, b) = (m[(at, at)], m[(at, at + 1)]);
+    let (c, d) = (m[(at + 1, at)], m[(at + 1, at + 1)]);
     let half = 0.5 * (a - d);
     let discriminant = half * half + b * c;
     if discriminant < 0.0 {

@@ -37,9 +37,7 @@ pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
                 if first == last {
                     eigenvalues.push(Complex::new(h[(last, last)], 0.0));
                 } else {
-                    let [a, c, b, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
-                        .map(|(row, column)| h[(first + row, first + column)]);
-                    eigenvalues.extend(pair(a, b, c, d));
+                    eigenvalues.extend(pair(&h, first));
                 }
                 end = first;
                 break;
@@ -102,8 +100,8 @@ impl Shift {
             };
             return Self { real: 0.75 * size + corner, imaginary: 0.4375_f64.sqrt() * size };
         }
-        let (at, corner) = (last - 1, h[(last, last)]);
-        let [one, other] = pair(h[(at, at)], h[(at, last)], h[(last, at)], corner);
+        let corner = h[(last, last)];
+        let [one, other] = pair(h, last - 1);
         let nearer = if (one.re - corner).abs() < (other.re - corner).abs() { one } else { other };
         Self { real: nearer.re, imaginary: nearer.im.abs() }
     }

@@ -58,10 +58,7 @@ impl RankOne {
         first += added;
         // A is balanced; the feedback disturbs that only if it is larger.
         let balanced = if dominates { Balance::new(&matrix).matrix } else { matrix.clone() };
-        match francis::eigenvalues(balanced) {
-            Some(eigenvalues) => Ok(eigenvalues),
-            None => eigenvalues(&matrix),
-        }
+        francis::eigenvalues(balanced).map_or_else(|| eigenvalues(&matrix), Ok)
     }
 }
 
