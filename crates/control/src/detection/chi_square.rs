@@ -28,9 +28,7 @@ pub fn survival(degrees: u32, x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;
     }
-    let mut terms = Terms::new(degrees, 0.5 * x);
-    (0..degrees / 2).for_each(|_| terms.raise());
-    terms.survival
+    Terms::new(degrees, 0.5 * x).survival
 }
 
 /// The probability that a noncentral chi-square variable is above `x`: of the squared length of a normal
@@ -55,7 +53,6 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     }
     let rate = 0.5 * noncentrality;
     let mut terms = Terms::new(degrees, 0.5 * x);
-    (0..degrees / 2).for_each(|_| terms.raise());
     let (mut sum, mut weights) = (0.0, 0.0);
     for j in 0..MOST_TERMS {
         let count = f64::from(j);
@@ -119,12 +116,14 @@ struct Terms {
 }
 
 impl Terms {
-    /// Starts with no degrees of freedom, or with one where `degrees` is odd.
+    /// Raises no degrees of freedom, or one where `degrees` is odd.
     fn new(degrees: u32, half: f64) -> Self {
-        match degrees % 2 {
+        let mut terms = match degrees % 2 {
             0 => Self { half, survival: 0.0, shape: 0.0 },
             _ => Self { half, survival: libm::erfc(half.sqrt()), shape: 0.5 },
-        }
+        };
+        (0..degrees / 2).for_each(|_| terms.raise());
+        terms
     }
 
     /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), a half of the degrees before.

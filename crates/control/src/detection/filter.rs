@@ -1,5 +1,6 @@
 //! The filter of the residuals: a Kalman filter behind an unknown-input observer.
 
+use crate::balance::unit_columns;
 use crate::blocks::symmetric_part;
 use crate::residual::ResidualGenerator;
 use crate::riccati::kalman;
@@ -44,10 +45,9 @@ pub struct UnknownInput {
 pub struct DetectionFilter {
     /// The filter, from commands u and measurements y to r.
     pub generator: ResidualGenerator,
-    /// K: the initial state of the filter is K x, x the initial state of the plant.
+    /// K: the initial state of the filter is K x, x the initial state of the plant; T of the unknown-input
+    /// observer, in the coordinates of the filter, whose state estimates T x.
     pub start: DMatrix<f64>,
-    /// T of the unknown-input observer, in the coordinates of the filter: its state estimates T x.
-    projection: DMatrix<f64>,
     /// `B_y` - the part of it that does not multiply the innovation, and N of the innovation.
     injection: DMatrix<f64>,
     selection: DMatrix<f64>,
@@ -178,7 +178,7 @@ impl UnknownInputObserver {
         let Some(unaffected) = of_sensors else { return Ok(None) };
         let e = columns(|input| &input.on_states, n);
         let visible = &unaffected * &plant.c * &e;
-        if e.ncols() > 0 && rank(&scaled(&visible))? < rank(&e)? {
+        if e.ncols() > 0 && rank(&unit_columns(&visible))? < rank(&e)? {
             return Ok(None);
         }
         let Some(left) = left_null_space(&visible)? else { return Ok(None) };
@@ -204,14 +204,13 @@ impl UnknownInputObserver {
         let dynamics = projection * a * basis;
         let through = projection * a * h;
         let output = selection * c * basis;
-        let noise = CorrelatedNoise {
-            process: symmetric_part(
-                &(projection * w * projection.transpose() + &through * v * through.transpose()),
-            ),
-            measurement: symmetric_part(&(selection * v * selection.transpose())),
-            cross: -(&through * v * selection.transpose()),
-        };
-        let (gain, covariance) = correlated_filter(&dynamics, &output, &noise, *domain)?;
+        let process = symmetric_part(
+            &(projection * w * projection.transpose() + &through * v * through.transpose()),
+        );
+        let measurement = symmetric_part(&(selection * v * selection.transpose()));
+        let cross = -(&through * v * selection.transpose());
+        let noise = [&process, &measurement, &cross];
+        let (gain, covariance) = correlated_filter(&dynamics, &output, noise, *domain)?;
         let factor = symmetric_part(&covariance)
             .cholesky()
             .ok_or(Error::NotPositiveDefinite { matrix: "V" })?
@@ -232,7 +231,6 @@ impl UnknownInputObserver {
                 domain: *domain,
             },
             start: projection.clone(),
-            projection: projection.clone(),
             injection,
             selection: whitening * selection,
         })
@@ -252,10 +250,10 @@ impl DetectionFilter {
     ///
     /// [`Error::Shape`] for columns of the wrong length.
     pub fn effect(&self, input: &UnknownInput) -> Result<StateSpace, Error> {
-        check::length("e", input.on_states.as_slice(), self.projection.ncols())?;
+        check::length("e", input.on_states.as_slice(), self.start.ncols())?;
         check::length("e_s", input.on_measurements.as_slice(), self.selection.ncols())?;
         let generator = &self.generator;
-        let b = &self.projection * &input.on_states - &self.injection * &input.on_measurements;
+        let b = &self.start * &input.on_states - &self.injection * &input.on_measurements;
         let d = &self.selection * &input.on_measurements;
         Ok(StateSpace {
             a: generator.a.clone(),
@@ -267,25 +265,17 @@ impl DetectionFilter {
     }
 }
 
-/// Covariances of a process noise w and a measurement noise v, in continuous time intensities.
-struct CorrelatedNoise {
-    /// W = E w w', n x n.
-    process: DMatrix<f64>,
-    /// V = E v v', p x p.
-    measurement: DMatrix<f64>,
-    /// S = E w v', n x p.
-    cross: DMatrix<f64>,
-}
-
 /// Gain and innovation covariance (in continuous time: intensity V) of the Kalman filter for correlated
 /// noise: A - S V^-1 C and W - S V^-1 S' have uncorrelated noise and a gain less by S V^-1.
+///
+/// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v, in continuous
+/// time intensities.
 fn correlated_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
-    noise: &CorrelatedNoise,
+    [w, v, s]: [&DMatrix<f64>; 3],
     domain: Domain,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let CorrelatedNoise { process: w, measurement: v, cross: s } = noise;
     let factor = v.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "V" })?;
     let part = factor.solve(&s.transpose()).transpose();
     let process = symmetric_part(&(w - &part * s.transpose()));
@@ -303,7 +293,7 @@ fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
     if columns == 0 || m.amax() <= 0.0 {
         return Ok(Some(DMatrix::identity(rows, rows)));
     }
-    let dual = Svd::new(&scaled(m).transpose())?;
+    let dual = Svd::new(&unit_columns(m).transpose())?;
     let rank = dual.rank(TOLERANCE);
     if rank == rows {
         return Ok(None);
@@ -311,18 +301,6 @@ fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
     Ok(Some(dual.right.columns(rank, rows - rank).transpose()))
 }
 
-/// The matrix with columns of length one; columns of zeros stay.
-fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut unit = m.clone();
-    for mut column in unit.column_iter_mut() {
-        let length = column.norm();
-        if length > 0.0 {
-            column /= length;
-        }
-    }
-    unit
-}
-
 fn rank(m: &DMatrix<f64>) -> Result<usize, Error> {
-    if m.amax() > 0.0 { Ok(Svd::new(m)?.rank(TOLERANCE)) } else { Ok(0) }
+    Ok(Svd::new(m)?.rank(TOLERANCE))
 }
