@@ -13,7 +13,6 @@ use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
 use reduced::ReducedPencil;
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 /// Largest number of evaluations of the smallest singular value in the search of the plane.
 const EVALUATIONS: usize = 1000;
@@ -158,14 +157,14 @@ impl Pencil {
             best = best.lower_of(self.descend(start)?);
         }
         let half = 0.5 * (1.0 + best.value);
-        let mut squares = BinaryHeap::new();
-        for centre in [Complex::new(-half, half), Complex::new(half, half)] {
-            squares.push(Square { bound: 0.0, centre, half });
-        }
+        let centres = [Complex::new(-half, half), Complex::new(half, half)];
+        let mut squares = centres.map(|centre| Square { bound: 0.0, centre, half }).to_vec();
         let mut lower = 0.0;
         let searched = self.reduced.is_none();
         for _ in 0..if searched { EVALUATIONS / 4 } else { 0 } {
-            let Some(square) = squares.pop() else { break };
+            let first = (0..squares.len()).min_by(|&i, &j| squares[i].order(&squares[j]));
+            let Some(first) = first else { break };
+            let square = squares.swap_remove(first);
             lower = square.bound;
             if lower >= CLOSE * best.value || best.value <= ROUNDING {
                 break;
@@ -198,8 +197,8 @@ impl Minimum {
     }
 }
 
-/// A square of the plane in which no value is below `bound`; ordered so that a heap returns the
-/// lowest bound first.
+/// A square of the plane in which no value is below `bound`.
+#[derive(Clone)]
 struct Square {
     bound: f64,
     centre: Complex<f64>,
@@ -211,30 +210,11 @@ impl Square {
         let h = 0.5 * self.half;
         [(-h, -h), (-h, h), (h, -h), (h, h)].map(|(x, y)| self.centre + Complex::new(x, y))
     }
-}
 
-impl Ord for Square {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let position = |square: &Self| (square.centre.re, square.centre.im);
-        let (mine, theirs) = (position(self), position(other));
-        other
-            .bound
-            .total_cmp(&self.bound)
-            .then(mine.0.total_cmp(&theirs.0))
-            .then(mine.1.total_cmp(&theirs.1))
+    /// The lowest bound first, then the centre farthest to the right, then the highest.
+    fn order(&self, other: &Self) -> Ordering {
+        let (here, there) = (self.centre, other.centre);
+        let by_centre = there.re.total_cmp(&here.re).then(there.im.total_cmp(&here.im));
+        self.bound.total_cmp(&other.bound).then(by_centre)
     }
 }
-
-impl PartialOrd for Square {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Square {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Square {}
