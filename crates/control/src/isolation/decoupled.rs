@@ -68,12 +68,12 @@ impl DecoupledPart {
         decoupled: &[bool],
         tolerance: f64,
     ) -> Result<Option<Self>, Error> {
-        let Scaled { a, e, c, d, outputs, size } = Scaled::new(plant, decoupled);
+        let ([a, e, c, d], outputs, size) = scaled(plant, decoupled);
         let mut gap = Gap::none();
         let w = reached_unseen([&a, &e, &c, &d], tolerance, &mut gap)?;
-        let v = noted_complement(&w, tolerance, &mut gap)?;
+        let v = complement(&w, tolerance, &mut gap)?;
         let image = beside(&(&c * &w), &d);
-        let h = noted_complement(&image, tolerance, &mut gap)?.transpose();
+        let h = complement(&image, tolerance, &mut gap)?.transpose();
         if h.nrows() == 0 {
             return Ok(None);
         }
@@ -105,38 +105,20 @@ impl DecoupledPart {
     }
 }
 
-/// A plant with the outputs R y and time in units of 1 / (norm of A).
-struct Scaled {
-    a: DMatrix<f64>,
-    e: DMatrix<f64>,
-    c: DMatrix<f64>,
-    d: DMatrix<f64>,
-    /// Diagonal of R.
-    outputs: DVector<f64>,
-    /// The norm of A.
-    size: f64,
-}
-
-impl Scaled {
-    fn new(plant: &DisturbedPlant, decoupled: &[bool]) -> Self {
-        let (e, d) = plant.unknown_inputs(decoupled);
-        let (n, norm) = (plant.a.nrows(), plant.a.norm());
-        let size = if norm > 0.0 { norm } else { 1.0 };
-        let outputs = plant.c.row_iter().zip(d.row_iter()).map(|(state, direct)| {
-            let length = if state.norm() > 0.0 { state.norm() } else { direct.norm() };
-            if length > 0.0 { 1.0 / length } else { 1.0 }
-        });
-        let outputs = DVector::from_iterator(plant.c.nrows(), outputs);
-        let inputs = unit_columns(&stacked(&(e / size), &multiply_rows(&d, &outputs)));
-        Self {
-            a: &plant.a / size,
-            e: inputs.rows(0, n).into_owned(),
-            d: inputs.rows(n, d.nrows()).into_owned(),
-            c: multiply_rows(&plant.c, &outputs),
-            outputs,
-            size,
-        }
-    }
+/// A, E, C, D of a plant with the outputs R y and time in units of 1 / (norm of A); the diagonal of R; the
+/// norm of A.
+fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVector<f64>, f64) {
+    let (e, d) = plant.unknown_inputs(decoupled);
+    let (n, norm) = (plant.a.nrows(), plant.a.norm());
+    let size = if norm > 0.0 { norm } else { 1.0 };
+    let outputs = plant.c.row_iter().zip(d.row_iter()).map(|(state, direct)| {
+        let length = if state.norm() > 0.0 { state.norm() } else { direct.norm() };
+        if length > 0.0 { 1.0 / length } else { 1.0 }
+    });
+    let outputs = DVector::from_iterator(plant.c.nrows(), outputs);
+    let inputs = unit_columns(&stacked(&(e / size), &multiply_rows(&d, &outputs)));
+    let (e, d) = (inputs.rows(0, n).into_owned(), inputs.rows(n, d.nrows()).into_owned());
+    ([&plant.a / size, e, multiply_rows(&plant.c, &outputs), d], outputs, size)
 }
 
 /// W: an orthonormal basis of the smallest subspace with [A W, E] ker [C W, D] in it.
@@ -163,13 +145,9 @@ fn reached_unseen(
     }
 }
 
-/// An orthonormal basis of the vectors that are orthogonal to the columns of M.
-pub(super) fn complement(m: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, Error> {
-    noted_complement(m, tolerance, &mut Gap::none())
-}
-
-/// The same; the rank decision is noted in `gap`.
-fn noted_complement(
+/// An orthonormal basis of the vectors that are orthogonal to the columns of M; the rank decision is noted
+/// in `gap`.
+pub(super) fn complement(
     m: &DMatrix<f64>,
     tolerance: f64,
     gap: &mut Gap,

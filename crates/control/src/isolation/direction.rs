@@ -1,5 +1,6 @@
 //! The member of a family of residuals whose weakest fault is strongest.
 
+use crate::balance::unit_columns;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Patterns of signs are tried one by one up to this number of faults.
@@ -30,11 +31,7 @@ pub(super) fn strongest_weakest(
     gains: &DMatrix<f64>,
     noise: &Cholesky<f64, Dyn>,
 ) -> Option<Direction> {
-    let mut unit = noise.l().solve_lower_triangular(gains)?;
-    for mut column in unit.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
-    }
+    let unit = unit_columns(&noise.l().solve_lower_triangular(gains)?);
     let products = unit.tr_mul(&unit);
     let solutions = signs(&products)
         .into_iter()

@@ -194,7 +194,8 @@ fn with_tolerance(
     let (reachable, unreachable) = plant.reachable_part(tolerance)?;
     let decoupled: Vec<bool> = pattern.iter().map(|responds| !responds).collect();
     let part = DecoupledPart::new(&reachable, &decoupled, tolerance)?;
-    let part = part.ok_or_else(|| not_isolable(pattern, first_of(pattern)))?;
+    let first = pattern.iter().position(|&responds| responds).unwrap_or(0);
+    let part = part.ok_or_else(|| not_isolable(pattern, first))?;
     let (family, direction) = least_order(&part, pattern, requirements, plant.domain)?;
     let factors = DMatrix::from_row_slice(1, direction.factors.len(), direction.factors.as_slice());
     let mut residual = realised(&part, family.member(&factors), requirements.frequency);
@@ -216,10 +217,6 @@ fn check_arguments(
         return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
     }
     Ok(())
-}
-
-fn first_of(pattern: &[bool]) -> usize {
-    pattern.iter().position(|&responds| responds).unwrap_or(0)
 }
 
 fn not_isolable(pattern: &[bool], fault: usize) -> Error {
@@ -347,11 +344,9 @@ pub(super) fn gains(from_faults: &StateSpace, frequency: f64) -> Vec<Complex<f64
 /// Scales the residual such that the largest gain of a fault of the pattern is 1, with the sign of
 /// the first one positive.
 fn normalise(residual: &mut Residual, pattern: &[bool]) {
-    let of_pattern = |residual: &Residual| -> Vec<Complex<f64>> {
-        let both = residual.gains.iter().zip(pattern);
-        both.filter(|(_, responds)| **responds).map(|(gain, _)| *gain).collect()
-    };
-    let responses = of_pattern(residual);
+    let both = residual.gains.iter().zip(pattern);
+    let responses: Vec<_> =
+        both.filter(|(_, responds)| **responds).map(|(gain, _)| *gain).collect();
     let largest = responses.iter().map(|gain| gain.norm()).fold(0.0, f64::max);
     let first = responses[0];
     let sign = if first.re.abs() >= first.im.abs() { first.re } else { first.im };

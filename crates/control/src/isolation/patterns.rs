@@ -1,7 +1,7 @@
 //! Patterns that a plant admits, and the patterns of given residuals.
 
 use super::DisturbedPlant;
-use super::decoupled::{DecoupledPart, complement};
+use super::decoupled::{DecoupledPart, Gap, complement};
 use super::generator::{Requirements, Residual, gains};
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
@@ -72,10 +72,8 @@ pub fn achievable_patterns(
         let (count, rule) = (strength.len(), "at most 4096: decouple fewer faults");
         check::that(count <= PATTERNS, "the number of patterns", as_number(count), rule)?;
     }
-    let mut patterns: Vec<AchievablePattern> = strength
-        .into_iter()
-        .map(|(pattern, strong)| AchievablePattern { pattern, strong })
-        .collect();
+    let achievable = |(pattern, strong)| AchievablePattern { pattern, strong };
+    let mut patterns: Vec<_> = strength.into_iter().map(achievable).collect();
     let count = |one: &AchievablePattern| one.pattern.iter().filter(|x| **x).count();
     patterns.sort_by(|x, y| count(y).cmp(&count(x)).then_with(|| y.pattern.cmp(&x.pattern)));
     Ok(patterns)
@@ -99,7 +97,7 @@ fn is_strong(
     let imaginary =
         DMatrix::from_fn(real.nrows(), n, |i, j| if i == j { -s.im / size } else { 0.0 });
     let pencil = block_2x2([&real, &-&imaginary], [&imaginary, &real]);
-    let null = complement(&pencil, requirements.tolerance)?;
+    let null = complement(&pencil, requirements.tolerance, &mut Gap::none())?;
     let columns = stacked(&(&part.b_f / size), &(&part.d_f / outputs));
     let twice = stacked(&columns, &DMatrix::zeros(columns.nrows(), columns.ncols()));
     let responses = null.tr_mul(&twice);

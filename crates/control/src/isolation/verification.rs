@@ -37,7 +37,6 @@ pub(super) fn decoupling_error(
         d: beside(&beside(&plant.d_u, &plant.d_d), &plant.d_f),
         domain: plant.domain,
     };
-    let filter = generator.system();
     let lengths: Vec<f64> =
         plant.c.row_iter().map(|row| if row.norm() > 0.0 { row.norm() } else { 1.0 }).collect();
     let size = plant.a.norm().max(f64::MIN_POSITIVE);
@@ -47,14 +46,15 @@ pub(super) fn decoupling_error(
         whole.b.column(input).norm() / size + direct.fold(0.0, f64::max)
     };
     let possible: Vec<f64> = (0..whole.b.ncols()).map(possible).collect();
-    let (whole, filter) = (Response::new(&whole), Response::new(&filter));
+    let filter = generator.system();
+    let (whole, filter) = (response(&whole), response(&filter));
     let frequencies = match plant.domain {
         Domain::Continuous => CONTINUOUS.map(|factor| factor * fastest),
         Domain::Sampled { period } => SAMPLED.map(|factor| factor * std::f64::consts::PI / period),
     };
     let mut largest: f64 = 0.0;
     for frequency in frequencies {
-        let (Some(g), Some(q)) = (whole.at(frequency), filter.at(frequency)) else {
+        let (Some(g), Some(q)) = (whole(frequency), filter(frequency)) else {
             continue;
         };
         let (q_u, q_y) = (q.columns(0, commands), q.columns(commands, plant.c.nrows()));
@@ -78,25 +78,11 @@ pub(super) fn decoupling_error(
     largest
 }
 
-/// The frequency response of a system that may have no states.
-enum Response<'a> {
-    Static(&'a DMatrix<f64>),
-    Dynamic(Transfer),
-}
-
-impl<'a> Response<'a> {
-    fn new(system: &'a StateSpace) -> Self {
-        if system.a.is_empty() {
-            return Self::Static(&system.d);
-        }
-        Self::Dynamic(Transfer::new(system))
-    }
-
-    /// None at a pole.
-    fn at(&self, frequency: f64) -> Option<DMatrix<Complex<f64>>> {
-        match self {
-            Self::Static(d) => Some(to_complex(d)),
-            Self::Dynamic(transfer) => transfer.gain(frequency).ok(),
-        }
+/// The frequency response of a system that may have no states; None at a pole.
+fn response(system: &StateSpace) -> impl Fn(f64) -> Option<DMatrix<Complex<f64>>> {
+    let transfer = (!system.a.is_empty()).then(|| Transfer::new(system));
+    move |frequency| match &transfer {
+        Some(transfer) => transfer.gain(frequency).ok(),
+        None => Some(to_complex(&system.d)),
     }
 }
