@@ -236,20 +236,18 @@ impl PlacementProblem<'_> {
         check_poles(poles, n)?;
         require_controllable(a, b)?;
         let ones = DVector::from_element(n, 1.0);
-        let assignable = Assignable::new(a, b, poles, &ones)?;
-        let starts = widest_directions(&assignable.problem)?;
-        let best = Assignment::new(assignable, &starts)?;
-        let scaled = |units: &DVector<f64>| {
+        let in_units = |units: &DVector<f64>| {
             let assignable = Assignable::new(a, b, poles, units)?;
             let starts = widest_directions(&assignable.problem)?;
-            Assignment::new(assignable, &starts)
+            Ok::<_, Error>((Assignment::new(assignable, &starts)?, starts))
         };
+        let (best, starts) = in_units(&ones)?;
         let balance = |gain: &DMatrix<f64>| Balance::new(&(a + b * gain)).scale;
         let mut scale = balance(&best.gain);
         let other = match coordinates {
             Coordinates::Given => None,
-            Coordinates::Balanced => Some(scaled(&scale)?),
-            Coordinates::Scaled(units) => Some(scaled(units)?),
+            Coordinates::Balanced => Some(in_units(&scale)?.0),
+            Coordinates::Scaled(units) => Some(in_units(units)?.0),
         };
         if let (Coordinates::Scaled(_), Some(other)) = (coordinates, &other) {
             scale = balance(&other.gain);

@@ -154,10 +154,8 @@ impl<'a> Search<'a> {
     /// The directions whose largest relative figure is least.
     fn best(&self, reference: Figures) -> Option<&Directions> {
         let worst = |(figures, _): &(Figures, Directions)| ratio(*figures, reference);
-        self.results
-            .iter()
-            .min_by(|x, y| worst(x).total_cmp(&worst(y)))
-            .map(|(_, directions)| directions)
+        let best = self.results.iter().min_by(|x, y| worst(x).total_cmp(&worst(y)));
+        best.map(|(_, directions)| directions)
     }
 
     fn descend(
@@ -166,9 +164,8 @@ impl<'a> Search<'a> {
         weigh: &dyn Fn(&Figures) -> (f64, Figures),
     ) -> Result<(), Error> {
         let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weigh);
-        let problem = self.feedback.problem();
-        self.offer(&[descend(problem, start.clone(), &slope, TOLERANCE)?])?;
-        Ok(())
+        let end = descend(self.feedback.problem, start.clone(), &slope, TOLERANCE)?;
+        self.offer(&[end]).map(drop)
     }
 }
 

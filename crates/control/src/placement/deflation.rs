@@ -1,7 +1,7 @@
 //! The gain for chosen eigenvectors.
 
 use super::pole_block::PoleBlock;
-use super::subspace::{AssignableSubspaces, solutions};
+use super::subspace::{AssignableSubspaces, basis, equations};
 use crate::Error;
 use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows};
 use crate::svd::Svd;
@@ -61,7 +61,8 @@ fn nearest_solution(
     poles: PoleBlock,
     chosen: Option<(&DMatrix<f64>, &DMatrix<f64>)>,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let basis = solutions(&(rest.tr_mul(a) * rest), &rest.tr_mul(b), poles)?;
+    // The solutions of A V - V M + B G = 0, columns stacked.
+    let basis = basis(&equations(&(rest.tr_mul(a) * rest), &rest.tr_mul(b), poles))?;
     let (count, states) = (poles.count(), poles.count() * rest.ncols());
     let weights = if let Some((v, g)) = chosen {
         let size = v.norm();

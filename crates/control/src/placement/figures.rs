@@ -29,7 +29,8 @@ pub(crate) type Weigh<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + 'a;
 /// K = G V^-1,   S(s) = (I - K (s I - A)^-1 B)^-1 = I + G (s I - M)^-1 V^-1 B
 /// ```
 pub(crate) struct FeedbackLoop<'a> {
-    problem: &'a AssignableSubspaces,
+    /// The problem whose eigenvectors are chosen.
+    pub(crate) problem: &'a AssignableSubspaces,
     /// Columns X for which B X is orthonormal: the responses of the problem are in this basis.
     basis: &'a DMatrix<f64>,
     b: &'a DMatrix<f64>,
@@ -59,13 +60,8 @@ impl<'a> FeedbackLoop<'a> {
         b: &'a DMatrix<f64>,
         sampled: bool,
     ) -> Self {
-        let poles: Vec<_> = problem.spaces.iter().map(|space| space.poles.pole()).collect();
+        let poles: Vec<_> = problem.spaces.iter().map(|space| space.poles.pole).collect();
         Self { problem, basis, b, points: points(&poles, sampled) }
-    }
-
-    /// The problem whose eigenvectors are chosen.
-    pub(crate) fn problem(&self) -> &AssignableSubspaces {
-        self.problem
     }
 
     fn blocks(&self) -> impl Iterator<Item = PoleBlock> {
@@ -134,7 +130,7 @@ impl<'a> FeedbackLoop<'a> {
         let mut solved = n.clone();
         let mut row = 0;
         for poles in self.blocks() {
-            let pole = poles.pole();
+            let pole = poles.pole;
             let diagonal = s - pole.re;
             if poles.count() == 1 {
                 solved.row_mut(row).iter_mut().for_each(|entry| *entry /= diagonal);

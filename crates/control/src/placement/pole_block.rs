@@ -12,15 +12,10 @@ use nalgebra::{Complex, DMatrix};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoleBlock {
     /// p, its imaginary part not below zero.
-    pole: Complex<f64>,
+    pub(crate) pole: Complex<f64>,
 }
 
 impl PoleBlock {
-    /// p.
-    pub(crate) fn pole(self) -> Complex<f64> {
-        self.pole
-    }
-
     /// Number of eigenvalues: 1 or 2.
     pub(crate) fn count(self) -> usize {
         if self.pole.im > 0.0 { 2 } else { 1 }

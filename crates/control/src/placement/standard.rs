@@ -82,7 +82,7 @@ impl Iteration {
             return start;
         }
         for number in start.order.clone() {
-            let pole = problem.spaces[number].poles.pole().conj();
+            let pole = problem.spaces[number].poles.pole.conj();
             let shifted = to_complex(&a.transpose()) - DMatrix::from_diagonal_element(n, n, pole);
             let kernel = Reflections::new(shifted * &normal).last_columns(r);
             let sum = kernel.column_sum().normalize();

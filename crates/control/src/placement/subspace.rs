@@ -162,17 +162,8 @@ fn in_units(
     blocks.iter().map(|&poles| equations(&a, &b, poles)).collect()
 }
 
-/// Orthonormal basis of the solutions (V; G) of A V - V M + B G = 0, columns stacked.
-pub(crate) fn solutions(
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
-    poles: PoleBlock,
-) -> Result<DMatrix<f64>, Error> {
-    basis(&equations(a, b, poles))
-}
-
 /// A V - V M + B G as a matrix that multiplies the stacked columns of V and G.
-fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) -> DMatrix<f64> {
+pub(crate) fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) -> DMatrix<f64> {
     let (n, count) = (b.nrows(), poles.count());
     let one = DMatrix::identity(count, count);
     let shifted = one.kronecker(a) - poles.block().transpose().kronecker(&DMatrix::identity(n, n));
@@ -180,7 +171,7 @@ fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) -> DMatrix<f6
 }
 
 /// Orthonormal basis of the null space of independent rows, small entries included.
-fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+pub(crate) fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let (rank, all) = equations.shape();
     Ok(Svd::new(equations)?.right.columns(rank, all - rank).into())
 }
