@@ -36,7 +36,7 @@ use nalgebra::DMatrix;
 pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
-    let g = block_2x2(
+    let mut g = block_2x2(
         [&gains.controlled_dynamics(plant), &(&plant.f_a + &plant.b * &gains.k_f)],
         [&DMatrix::zeros(q, n), &plant.a_f],
     );
@@ -44,30 +44,23 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     let mut k = beside(&gains.k_x, &gains.k_f);
     let output = plant.augmented_output();
     let m_c = &m * &output;
-    if let Some(p_f) = &gains.p_f {
-        let direct = &gains.k_f * p_f;
-        k -= &direct * &output;
-        let enters = (&plant.b * &direct).resize_vertically(n + q, 0.0);
-        let g = g - &enters * &output;
-        return Ok(match gains.estimator {
-            Estimator::Prediction => {
-                StateSpace { a: g - m_c, b: m + enters, c: k, d: direct, domain }
-            }
-            Estimator::Current => {
-                let w = DMatrix::identity(n + q, n + q) - m_c;
-                let (b, d) = (&g * &m + enters, &k * m + direct);
-                StateSpace { a: g * &w, b, c: k * w, d, domain }
-            }
-        });
+    // What the direct term adds to D, and with it to B.
+    let direct = gains.p_f.as_ref().map(|p_f| &gains.k_f * p_f);
+    let enters = direct.as_ref().map(|d| (&plant.b * d).resize_vertically(n + q, 0.0));
+    if let (Some(direct), Some(enters)) = (&direct, &enters) {
+        k -= direct * &output;
+        g -= enters * &output;
     }
+    let plus = |m: DMatrix<f64>, part: Option<_>| part.into_iter().fold(m, |m, part| m + part);
     Ok(match gains.estimator {
         Estimator::Prediction => {
-            let d = DMatrix::zeros(k.nrows(), m.ncols());
-            StateSpace { a: g - m_c, b: m, c: k, d, domain }
+            let d = direct.unwrap_or_else(|| DMatrix::zeros(k.nrows(), m.ncols()));
+            StateSpace { a: g - m_c, b: plus(m, enters), c: k, d, domain }
         }
         Estimator::Current => {
             let w = DMatrix::identity(n + q, n + q) - m_c;
-            StateSpace { a: &g * &w, b: g * &m, c: &k * w, d: k * m, domain }
+            let (b, d) = (plus(&g * &m, enters), plus(&k * m, direct));
+            StateSpace { a: g * &w, b, c: k * w, d, domain }
         }
     })
 }
