@@ -130,12 +130,8 @@ impl FaultyPlant {
     pub fn check_observer_exists(&self) -> Result<(), Error> {
         self.check()?;
         require_observable(&self.a, &self.c)?;
-        let hidden = hidden_faults(self)?;
-        if let Some(first) = hidden.first() {
-            return Err(refusal(first, self.c.nrows()));
-        }
-        require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
-        Ok(())
+        require_shown(self)?;
+        require_observable(&self.augmented_dynamics(), &self.augmented_output())
     }
 
     /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
@@ -150,10 +146,7 @@ impl FaultyPlant {
     /// that fails; same as [`FaultyPlant::check`] otherwise.
     pub fn check_detectable(&self, domain: Domain) -> Result<Vec<Mode>, Error> {
         self.check()?;
-        let hidden = hidden_faults(self)?;
-        if let Some(first) = hidden.first() {
-            return Err(refusal(first, self.c.nrows()));
-        }
+        require_shown(self)?;
         let (a_0, c_0) = (self.augmented_dynamics(), self.augmented_output());
         let modes = unobservable_modes(&a_0, &c_0)?;
         for Mode { eigenvalue, .. } in &modes {
@@ -165,14 +158,14 @@ impl FaultyPlant {
     }
 }
 
-fn refusal(hidden: &HiddenFault, measurements: usize) -> Error {
-    if hidden.channels > measurements {
-        return Error::TooManyFaults { faults: hidden.channels, measurements };
+/// Checks that the measurements tell all faults from motions of the states.
+fn require_shown(plant: &FaultyPlant) -> Result<(), Error> {
+    let (all, measurements) = (hidden_faults(plant)?, plant.c.nrows());
+    let Some(hidden) = all.first() else { return Ok(()) };
+    let HiddenFault { at, channels, rank, expected, .. } = *hidden;
+    if channels > measurements {
+        return Err(Error::TooManyFaults { faults: channels, measurements });
     }
-    Error::HiddenFault {
-        at: hidden.at,
-        rank: hidden.rank,
-        expected: hidden.expected,
-        faults: hidden.faults().iter().map(|fault| fault + 1).collect(),
-    }
+    let faults = hidden.faults().iter().map(|fault| fault + 1).collect();
+    Err(Error::HiddenFault { at, rank, expected, faults })
 }

@@ -111,10 +111,10 @@ pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result
 }
 
 /// Checks that a pair is observable.
-pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
+pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<(), Error> {
     let rank = observability(a, c)?;
     if rank.is_full() {
-        return Ok(rank);
+        return Ok(());
     }
     Err(Error::NotObservable { rank: rank.rank, n: rank.n })
 }

@@ -42,9 +42,8 @@ pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visib
         let visible = reached_output(&fault.by_model, &output).is_some();
         Ok(Visibility { visible, dc_gain })
     };
-    (0..p)
-        .map(|measurement| faults.iter().map(|fault| entry(measurement, fault)).collect())
-        .collect()
+    let row = |measurement| faults.iter().map(|fault| entry(measurement, fault)).collect();
+    (0..p).map(row).collect()
 }
 
 /// The states that a fault reaches.
