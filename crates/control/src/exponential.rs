@@ -1,6 +1,7 @@
 //! The matrix exponential.
 
 use crate::balance::Balance;
+use crate::logarithm::one_norm;
 use crate::{Error, check, product};
 use nalgebra::DMatrix;
 
@@ -69,11 +70,6 @@ pub(crate) fn scaling_and_squaring(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Err
         power = product(&power, &power);
     }
     check::in_range("e^A", power)
-}
-
-/// The largest column sum.
-fn one_norm(a: &DMatrix<f64>) -> f64 {
-    a.column_iter().map(|column| column.iter().map(|x| x.abs()).sum()).fold(0.0, f64::max)
 }
 
 /// (V - U)^-1 (V + U), with U the odd and V the even part of the numerator.
