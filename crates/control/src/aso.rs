@@ -193,10 +193,7 @@ fn design_feedback(
     k_f: Option<&DMatrix<f64>>,
 ) -> Result<AsoDesign, Error> {
     plant.check_observer_exists()?;
-    let k_f = match k_f {
-        Some(k_f) => k_f.clone(),
-        None => plant.compensation_gain()?,
-    };
+    let k_f = k_f.cloned().map_or_else(|| plant.compensation_gain(), Ok)?;
     check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
     let feedbacks = place_controller(plant, states, controller_poles, alternatives)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());

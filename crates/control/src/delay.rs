@@ -162,8 +162,9 @@ impl Delays {
         for (matrix, values) in [(1, &plant.b), (2, &plant.c), (3, &plant.d)] {
             for row in 0..values.nrows() {
                 for column in 0..values.ncols() {
-                    let from = PlantEntry { matrix, row, column };
-                    *self.entry_mut(&mut extended, n, order, from) = values[(row, column)];
+                    let at = self.entry(n, order, PlantEntry { matrix, row, column });
+                    let StateSpace { a, b, c, d, .. } = &mut extended;
+                    [a, b, c, d][at.matrix][(at.row, at.column)] = values[(row, column)];
                 }
             }
         }
@@ -191,18 +192,6 @@ impl Delays {
             row: chain_row.unwrap_or(row),
             column: chain_column.unwrap_or(column),
         }
-    }
-
-    fn entry_mut<'a>(
-        &self,
-        extended: &'a mut StateSpace,
-        n: usize,
-        order: usize,
-        entry: PlantEntry,
-    ) -> &'a mut f64 {
-        let PlantEntry { matrix, row, column } = self.entry(n, order, entry);
-        let StateSpace { a, b, c, d, .. } = extended;
-        &mut [a, b, c, d][matrix][(row, column)]
     }
 
     /// Of matrices A, B, C, D of the form of [`Delays::approximated`] the entries of the plant without delays: n states.

@@ -99,8 +99,8 @@ pub enum Error {
     },
     /// The measurements cannot distinguish a fault from a motion of the states.
     #[error(
-        "a fault that develops with {} cannot be told from a state: rank [A - s I, F_a; C, 0] is \
-         {rank}, expected {expected}; it hides in the columns {faults:?} of F_a", development(*at)
+        "a fault that develops with s = {} cannot be told from a state: rank [A - s I, F_a; C, 0] is \
+         {rank}, expected {expected}; it hides in the columns {faults:?} of F_a", shown(*at)
     )]
     HiddenFault {
         /// s, an eigenvalue of the fault model: 0 for a constant fault, 1 in sampled time.
@@ -271,11 +271,6 @@ fn shown(value: Complex<f64>) -> String {
 
 fn also_decoupled(faults: &[usize]) -> String {
     if faults.is_empty() { String::new() } else { format!(" and the faults {faults:?}") }
-}
-
-/// Formats an eigenvalue s of a fault model.
-fn development(s: Complex<f64>) -> String {
-    format!("s = {}", shown(s))
 }
 
 impl Error {

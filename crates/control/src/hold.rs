@@ -53,7 +53,7 @@ impl FirstOrderHold {
     /// [`Error::OutOfRange`] for a bad `h`, [`Error::Overflow`] when the result leaves the range of
     /// double precision.
     pub fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, h: f64) -> Result<Self, Error> {
-        let [phi, gamma_0, gamma_1] = integrals(a, b, h, Degree::Linear)?;
+        let [phi, gamma_0, gamma_1] = integrals(a, b, h, b.ncols())?;
         Ok(Self { phi, gamma_0, gamma_1 })
     }
 
@@ -114,7 +114,7 @@ pub fn zero_order_hold(
     b: &DMatrix<f64>,
     h: f64,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let [phi, gamma, _] = integrals(a, b, h, Degree::Constant)?;
+    let [phi, gamma, _] = integrals(a, b, h, 0)?;
     Ok((phi, gamma))
 }
 
@@ -152,23 +152,15 @@ pub fn continuous(
     Ok((all.view((0, 0), (n, n)).into(), all.view((0, n), (n, m)).into()))
 }
 
-/// The polynomial degree of the input over a step.
-#[derive(Clone, Copy, PartialEq)]
-enum Degree {
-    Constant,
-    Linear,
-}
-
-/// Phi, `Gamma_0` and `Gamma_1`; `Gamma_1` has no columns for a constant input.
+/// Phi, `Gamma_0` and `Gamma_1` of the first `slopes` inputs.
 fn integrals(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     h: f64,
-    degree: Degree,
+    slopes: usize,
 ) -> Result<[DMatrix<f64>; 3], Error> {
     let (n, m) = (check::with_inputs(a, b)?, b.ncols());
     check::positive("h", h)?;
-    let slopes = if degree == Degree::Linear { m } else { 0 };
     let balance = Balance::new(a);
     let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
     let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));

@@ -201,17 +201,14 @@ pub fn design(
 ) -> Result<SampledDesign, Error> {
     let plant = sample(extended, period)?;
     plant.check_observer_exists()?;
-    let k_f = match k_f {
-        Some(k_f) => k_f.clone(),
-        None => compensation_gain(extended, Domain::Sampled { period })?,
-    };
+    let domain = Domain::Sampled { period };
+    let k_f = k_f.cloned().map_or_else(|| compensation_gain(extended, domain), Ok)?;
     check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
     let feedbacks =
         place_controller(&plant, extended.states, controller_poles, alternatives_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let output = estimator.output_matrix(&a_0, &c_0);
     let observers = estimator_alternatives(&a_0, &output, observer_poles)?;
-    let domain = Domain::Sampled { period };
     let candidates = GainCandidates {
         plant: &plant,
         feedbacks: &feedbacks,

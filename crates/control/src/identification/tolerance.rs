@@ -59,27 +59,17 @@ pub fn equivalent_tolerance(
     for at in 0..4 {
         for entry in varying(plant, at) {
             let mut changed = plant.clone();
-            matrix(&mut changed, at)[entry] *= 1.0 + STEP;
+            let StateSpace { a, b, c, d, .. } = &mut changed;
+            [a, b, c, d][at][entry] *= 1.0 + STEP;
             sensitivity += distance_squared(&nominal, &responses(&changed, units)?) / (STEP * STEP);
         }
     }
     Ok(2.0 * (variance / sensitivity).sqrt())
 }
 
-/// A, B, C or D.
-fn matrix(system: &mut StateSpace, at: usize) -> &mut DMatrix<f64> {
-    match at {
-        0 => &mut system.a,
-        1 => &mut system.b,
-        2 => &mut system.c,
-        _ => &mut system.d,
-    }
-}
-
-/// The positions of the entries of a matrix that vary.
+/// The positions of the entries of a matrix, A, B, C or D, that vary.
 fn varying(model: &StateSpace, at: usize) -> Vec<(usize, usize)> {
-    let mut system = model.clone();
-    let matrix = matrix(&mut system, at);
+    let matrix = [&model.a, &model.b, &model.c, &model.d][at];
     let is_zero = |value: f64| value.abs() <= 0.0;
     let is_state = |row: usize| {
         let others = matrix.row(row).iter().filter(|entry| !is_zero(**entry)).count();

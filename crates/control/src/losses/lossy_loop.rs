@@ -102,7 +102,7 @@ impl LossyLoop {
     /// A(E) at the corners of the box from 0 to `largest`; an input whose largest loss is 0 adds no corner.
     #[must_use]
     pub fn corners(&self, largest: &[f64]) -> Vec<DMatrix<f64>> {
-        corners(largest).iter().map(|loss| self.at(loss)).collect()
+        grid(largest, 2).iter().map(|loss| self.at(loss)).collect()
     }
 
     /// Computes the factor t up to which the loop is stable for every constant loss in the box from 0 to t
@@ -179,20 +179,13 @@ impl LossyLoop {
     }
 }
 
-/// The corners of the box from 0 to `largest`.
-fn corners(largest: &[f64]) -> Vec<Vec<f64>> {
-    grid(largest, 2)
-}
-
 /// All combinations of `points` values from 0 to the largest of each input.
 pub(super) fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
     largest.iter().fold(vec![Vec::new()], |all, largest| {
         let values = if *largest > 0.0 { points } else { 1 };
-        let extended = |begun: &Vec<f64>| {
-            (0..values).map(|at| largest * as_number(at) / as_number(points - 1)).map({
-                let begun = begun.clone();
-                move |value| begun.iter().copied().chain([value]).collect::<Vec<_>>()
-            })
+        let value = |at: usize| largest * as_number(at) / as_number(points - 1);
+        let extended = |begun: &Vec<f64>| -> Vec<_> {
+            (0..values).map(|at| [begun.as_slice(), &[value(at)]].concat()).collect()
         };
         all.iter().flat_map(extended).collect()
     })
