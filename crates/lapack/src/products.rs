@@ -1,4 +1,6 @@
 //! Products into an array: C := alpha (product) + beta C.
+//!
+//! The pointers of all functions are valid for the sizes that the arguments state.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::memory::{Layout, Number, Part, Vector};
@@ -69,10 +71,6 @@ impl<T: Number> Target<T> {
 
 /// C := alpha op(A) op(B) + beta C with C of m x n and op(A) of m x k; None, with C unchanged, if an
 /// argument is illegal.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn general<T: Number>(
     a: &Operand<T>,
     b: &Operand<T>,
@@ -86,10 +84,6 @@ pub(crate) unsafe fn general<T: Number>(
 }
 
 /// A triangle of C := alpha op(A) op(A)' + beta C with C of n x n and op(A) of n x k.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<()> {
     // SAFETY: the caller guarantees it.
     unsafe {
@@ -99,10 +93,6 @@ pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<
 }
 
 /// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn rank_2k<T: Number>(
     a: &Operand<T>,
     b: &Operand<T>,
@@ -139,10 +129,6 @@ pub(crate) struct VectorTarget<T> {
 }
 
 /// y := alpha op(A) x + beta y.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn matrix_vector<T: Number>(
     a: &Operand<T>,
     x: &VectorOperand<T>,
@@ -158,10 +144,6 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
 }
 
 /// y := alpha A x + beta y with A symmetric, n x n, of which one triangle is read.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn symmetric_vector<T: Number>(
     a: &Symmetric<T>,
     x: &VectorOperand<T>,

@@ -1,6 +1,7 @@
 //! The routines of LAPACK on arrays. Each returns its error code INFO.
 //!
-//! -i: argument i, from 1, is illegal; above 0: see the routine.
+//! -i: argument i, from 1, is illegal; above 0: see the routine. The pointers of all routines are valid for the
+//! sizes that the arguments state.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::factor::{Elimination, backward, cholesky, forward};
@@ -37,10 +38,6 @@ fn from_one(index: usize) -> i32 {
 
 /// Replaces A by its Cholesky factor L or U, A = L L' or U' U; INFO k: the leading minor of order k is
 /// not positive.
-///
-/// # Safety
-///
-/// The pointer is valid for the sizes that the arguments state.
 pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Result<(), i32> {
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 4)?;
@@ -55,10 +52,6 @@ pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Resu
 }
 
 /// Replaces B by the solution X of A X = B, with the factor of A from [`potrf`].
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn potrs<T: Number>(
     triangle: u8,
     n: i32,
@@ -79,10 +72,6 @@ pub(crate) unsafe fn potrs<T: Number>(
 }
 
 /// Replaces B by the solution X of A X = B and A by its factors L and U; INFO k: pivot k is zero.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn gesv<T: Number>(
     n: i32,
     right_sides: i32,
@@ -111,13 +100,6 @@ pub(crate) unsafe fn gesv<T: Number>(
     Ok(())
 }
 
-/// The options JOBZ, RANGE and UPLO of [`syevr`].
-pub(crate) struct EigenOptions {
-    pub(crate) job: u8,
-    pub(crate) range: u8,
-    pub(crate) triangle: u8,
-}
-
 /// The output arrays of [`syevr`].
 pub(crate) struct Spectrum<T> {
     pub(crate) count: *mut i32,
@@ -126,26 +108,23 @@ pub(crate) struct Spectrum<T> {
     pub(crate) support: *mut i32,
 }
 
-/// Computes all eigenvalues, ascending, and with JOBZ = V the eigenvectors; INFO 1: not converged.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
+/// Computes all eigenvalues, ascending, and with JOBZ = V the eigenvectors; INFO 1: not converged. The options are
+/// JOBZ, RANGE and UPLO.
 pub(crate) unsafe fn syevr<T: Number>(
-    options: &EigenOptions,
+    [job, range, triangle]: [u8; 3],
     n: i32,
     a: Array<T>,
     to: &Spectrum<T>,
 ) -> Result<(), i32> {
-    let compute_vectors = match options.job.to_ascii_uppercase() {
+    let compute_vectors = match job.to_ascii_uppercase() {
         b'N' => false,
         b'V' => true,
         _ => return Err(-1),
     };
-    if !options.range.eq_ignore_ascii_case(&b'A') {
+    if !range.eq_ignore_ascii_case(&b'A') {
         return Err(-2);
     }
-    let part = Part::triangle(options.triangle).ok_or(-3)?;
+    let part = Part::triangle(triangle).ok_or(-3)?;
     let layout = a.layout(size(n, 4)?, n, 6)?;
     // SAFETY: the caller guarantees it.
     let half = unsafe { layout.read(a.at, part) };
@@ -169,31 +148,13 @@ pub(crate) unsafe fn syevr<T: Number>(
     Ok(())
 }
 
-/// The singular vectors to compute.
-#[derive(Clone, Copy)]
-enum Vectors {
-    None,
-    Thin,
-    All,
-}
-
-impl Vectors {
-    fn new(letter: u8, argument: i32) -> Result<Self, i32> {
-        match letter.to_ascii_uppercase() {
-            b'N' => Ok(Self::None),
-            b'S' => Ok(Self::Thin),
-            b'A' => Ok(Self::All),
-            _ => Err(-argument),
-        }
-    }
-
-    /// The number of vectors: `all`, or the `thin` ones that have a singular value.
-    fn count(self, thin: i32, all: i32) -> i32 {
-        match self {
-            Self::None => 0,
-            Self::Thin => thin,
-            Self::All => all,
-        }
+/// The number of singular vectors to compute: none, the `thin` ones that have a singular value, or `all`.
+fn vectors(letter: u8, argument: i32, thin: i32, all: i32) -> Result<i32, i32> {
+    match letter.to_ascii_uppercase() {
+        b'N' => Ok(0),
+        b'S' => Ok(thin),
+        b'A' => Ok(all),
+        _ => Err(-argument),
     }
 }
 
@@ -206,10 +167,6 @@ pub(crate) struct Factors<T> {
 
 /// Computes the singular value decomposition; INFO 1: not converged. `first` is the number of the
 /// argument M, which follows the options.
-///
-/// # Safety
-///
-/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn singular_values<T: Number>(
     m: i32,
     n: i32,
@@ -217,14 +174,12 @@ pub(crate) unsafe fn singular_values<T: Number>(
     to: &Factors<T>,
     first: i32,
 ) -> Result<(), i32> {
-    let (left, right) = (Vectors::new(to.left.0, 1)?, Vectors::new(to.right.0, first - 1)?);
-    let layout = a.layout(size(m, first)?, size(n, first + 1)?, first + 3)?;
     let thin = m.min(n);
-    let count = (left.count(thin, m), right.count(thin, n));
-    let u_rows = if count.0 == 0 { 0 } else { m };
-    let vt_cols = if count.1 == 0 { 0 } else { n };
-    let u_layout = to.left.1.layout(u_rows, count.0, first + 6)?;
-    let vt_layout = to.right.1.layout(count.1, vt_cols, first + 8)?;
+    let left = vectors(to.left.0, 1, thin, m)?;
+    let right = vectors(to.right.0, first - 1, thin, n)?;
+    let layout = a.layout(size(m, first)?, size(n, first + 1)?, first + 3)?;
+    let u_layout = to.left.1.layout(if left == 0 { 0 } else { m }, left, first + 6)?;
+    let vt_layout = to.right.1.layout(right, if right == 0 { 0 } else { n }, first + 8)?;
     // SAFETY: the caller guarantees it.
     let matrix = unsafe { layout.read(a.at, Part::All) };
     if matrix.iter().any(|entry| entry.is_nan()) {

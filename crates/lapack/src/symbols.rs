@@ -9,9 +9,7 @@ use crate::products::{
     Operand, Symmetric, Target, VectorOperand, VectorTarget, general, matrix_vector, rank_2k,
     rank_k, symmetric_vector,
 };
-use crate::routines::{
-    Array, EigenOptions, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr,
-};
+use crate::routines::{Array, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr};
 
 /// The INFO of a result.
 fn code(answer: Result<(), i32>) -> i32 {
@@ -254,10 +252,9 @@ macro_rules! symbols {
             }
             let vectors = Array { at: z, leading: *ldz };
             let matrix = Array { at: a, leading: *lda };
-            let options = EigenOptions { job: *jobz, range: *range, triangle: *uplo };
             let to = Spectrum { count: m, values: w, vectors, support: isuppz };
             // SAFETY: the caller guarantees it.
-            *info = code(unsafe { syevr(&options, *n, matrix, &to) });
+            *info = code(unsafe { syevr([*jobz, *range, *uplo], *n, matrix, &to) });
         }
 
         /// Computes the singular value decomposition of A, with one option for both sides.
