@@ -180,36 +180,8 @@ pub fn design(
     observer_poles: &[Complex<f64>],
     k_f: Option<&DMatrix<f64>>,
 ) -> Result<AsoDesign, Error> {
-    design_feedback(plant, plant.a.nrows(), controller_poles, observer_poles, k_f)
-}
-
-/// [`design`] with feedback of the first `states` states only; the other states are a measurement
-/// filter.
-fn design_feedback(
-    plant: &FaultyPlant,
-    states: usize,
-    controller_poles: &[Complex<f64>],
-    observer_poles: &[Complex<f64>],
-    k_f: Option<&DMatrix<f64>>,
-) -> Result<AsoDesign, Error> {
-    plant.check_observer_exists()?;
-    let k_f = k_f.cloned().map_or_else(|| plant.compensation_gain(), Ok)?;
-    check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
-    let feedbacks = place_controller(plant, states, controller_poles, alternatives)?;
-    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let observers = alternatives_balanced(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
-    let observers = observers.map(|gain| -gain.transpose());
-    let residual = cancellation_residual(plant, states, &k_f);
-    let candidates = GainCandidates {
-        plant,
-        feedbacks: &feedbacks,
-        observers: &observers,
-        estimator: Estimator::Prediction,
-        k_f: &k_f,
-        domain: Domain::Continuous,
-    };
-    let (gains, [controller, observer]) = candidates.best()?;
-    Ok(AsoDesign { gains, cancellation_residual: residual, controller, observer })
+    let extended = ExtendedPlant::without_filter(plant.clone());
+    extended.design(controller_poles, observer_poles, k_f)
 }
 
 impl ExtendedPlant {
@@ -231,7 +203,25 @@ impl ExtendedPlant {
         observer_poles: &[Complex<f64>],
         k_f: Option<&DMatrix<f64>>,
     ) -> Result<AsoDesign, Error> {
-        design_feedback(&self.plant, self.states, controller_poles, observer_poles, k_f)
+        let Self { plant, states, .. } = self;
+        plant.check_observer_exists()?;
+        let k_f = k_f.cloned().map_or_else(|| plant.compensation_gain(), Ok)?;
+        check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
+        let feedbacks = place_controller(plant, *states, controller_poles, alternatives)?;
+        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let observers = alternatives_balanced(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
+        let observers = observers.map(|gain| -gain.transpose());
+        let candidates = GainCandidates {
+            plant,
+            feedbacks: &feedbacks,
+            observers: &observers,
+            estimator: Estimator::Prediction,
+            k_f: &k_f,
+            domain: Domain::Continuous,
+        };
+        let (gains, [controller, observer]) = candidates.best()?;
+        let cancellation_residual = cancellation_residual(plant, *states, &k_f);
+        Ok(AsoDesign { gains, cancellation_residual, controller, observer })
     }
 }
 
