@@ -1,6 +1,6 @@
 //! The mean that errors of the model give to residuals without a fault.
 
-use crate::blocks::beside;
+use crate::blocks::{beside, stacked};
 use crate::eigen::eigenvalues;
 use crate::hold::zero_order_hold;
 use crate::residual::ResidualGenerator;
@@ -78,31 +78,23 @@ impl UncertainPlant {
                 (phi, gamma, integral * w)
             }
         };
-        let [state, output] = [
-            [&filter.a, &filter.b_u, &filter.b_y],
-            [&(rows * &filter.c), &(rows * &filter.d_u), &(rows * &filter.d_y)],
-        ];
-        let (k, m, p, q) = (filter.a.nrows(), b.ncols(), c.nrows(), rows.nrows());
-        let mut whole = StateSpace {
-            a: DMatrix::zeros(n + k, n + k),
-            b: DMatrix::zeros(n + k, m + n + p),
-            c: DMatrix::zeros(q, n + k),
-            d: DMatrix::zeros(q, m + n + p),
+        // Of the filter or of the residuals the rows of A or C, and of B or D, of both systems together.
+        let rows_of = |[dynamics, from_u, from_y]: [&DMatrix<f64>; 3]| {
+            let from_inputs = (from_u + from_y * d).resize_horizontally(b.ncols() + n, 0.0);
+            (beside(&(from_y * c), dynamics), beside(&from_inputs, from_y))
+        };
+        let (of_filter, into_filter) = rows_of([&filter.a, &filter.b_u, &filter.b_y]);
+        let (output, direct) =
+            rows_of([&(rows * &filter.c), &(rows * &filter.d_u), &(rows * &filter.d_y)]);
+        let (order, width) = (n + filter.a.nrows(), direct.ncols());
+        let whole = StateSpace {
+            a: stacked(&phi.resize_horizontally(order, 0.0), &of_filter),
+            b: stacked(&beside(&gamma, &unit).resize_horizontally(width, 0.0), &into_filter),
+            c: output,
+            d: direct,
             domain: filter.domain,
         };
-        whole.a.view_mut((0, 0), (n, n)).copy_from(&phi);
-        whole.b.view_mut((0, 0), (n, m)).copy_from(&gamma);
-        whole.b.view_mut((0, m), (n, n)).copy_from(&unit);
-        for (at, to, through, [dynamics, from_u, from_y]) in
-            [(n, &mut whole.a, &mut whole.b, state), (0, &mut whole.c, &mut whole.d, output)]
-        {
-            let count = dynamics.nrows();
-            to.view_mut((at, 0), (count, n)).copy_from(&(from_y * c));
-            to.view_mut((at, n), (count, k)).copy_from(dynamics);
-            through.view_mut((at, 0), (count, m)).copy_from(&(from_u + from_y * d));
-            through.view_mut((at, m + n), (count, p)).copy_from(from_y);
-        }
-        let inputs = DVector::from_iterator(m + n + p, bounds.iter().chain(&w).chain(&z).copied());
+        let inputs = DVector::from_iterator(width, bounds.iter().chain(&w).chain(&z).copied());
         Ok(Some(peak_gain(&whole, WIDTH)?.upper * inputs))
     }
 
