@@ -154,7 +154,10 @@ impl Pencil {
     fn search(&self) -> Result<Distance, Error> {
         let mut best = Minimum { value: f64::INFINITY, s: Complex::new(0.0, 0.0) };
         for start in eigenvalues(&self.a)?.into_iter().filter(|start| start.im >= 0.0) {
-            best = best.lower_of(self.descend(start)?);
+            let minimum = self.descend(start)?;
+            if minimum.value < best.value {
+                best = minimum;
+            }
         }
         let half = 0.5 * (1.0 + best.value);
         let centres = [Complex::new(-half, half), Complex::new(half, half)];
@@ -173,7 +176,7 @@ impl Pencil {
                 let half = 0.5 * square.half;
                 let (value, _) = self.at(centre)?;
                 if value < best.value {
-                    best = best.lower_of(self.descend(centre)?);
+                    best = self.descend(centre)?;
                 }
                 let bound = (value - half * std::f64::consts::SQRT_2).max(square.bound);
                 squares.push(Square { bound, centre, half });
@@ -185,16 +188,9 @@ impl Pencil {
 }
 
 /// The smallest singular value of [A - s I, B] at s.
-#[derive(Clone, Copy)]
 struct Minimum {
     value: f64,
     s: Complex<f64>,
-}
-
-impl Minimum {
-    fn lower_of(self, other: Self) -> Self {
-        if other.value < self.value { other } else { self }
-    }
 }
 
 /// A square of the plane in which no value is below `bound`.

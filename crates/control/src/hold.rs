@@ -1,6 +1,6 @@
 //! Exact discretisation of a linear system with an input that is constant or linear over the step.
 
-use crate::balance::{Balance, divide_rows, power_of_two};
+use crate::balance::{Balance, divide_columns, divide_rows, power_of_two};
 use crate::blocks::beside;
 use crate::exponential::scaling_and_squaring;
 use crate::logarithm::logarithm_of_one_plus;
@@ -167,12 +167,8 @@ fn integrals(
     let mut block = DMatrix::zeros(n + m + slopes, n + m + slopes);
     let scaled_a = check::in_range("A h", &balance.matrix * h)?;
     block.view_mut((0, 0), (n, n)).copy_from(&scaled_a);
-    for (input, unit) in units.iter().enumerate() {
-        block.view_mut((0, n + input), (n, 1)).copy_from(&(inputs.column(input) / *unit));
-    }
-    for slope in 0..slopes {
-        block[(n + slope, n + m + slope)] = 1.0;
-    }
+    block.view_mut((0, n), (n, m)).copy_from(&divide_columns(&inputs, &units));
+    block.view_mut((n, n + m), (slopes, slopes)).fill_with_identity();
     let e = scaling_and_squaring(&block)?;
     let gamma = |from: usize, columns: usize, factor: f64| {
         let entry = |i: usize, j: usize| e[(i, from + j)] * balance.scale[i] * units[j] * factor;

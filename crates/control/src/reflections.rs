@@ -44,9 +44,7 @@ impl<T: ComplexField<RealField = f64>> Reflections<T> {
     pub(crate) fn last_columns(&self, count: usize) -> DMatrix<T> {
         let first = self.rows - count;
         let mut q = DMatrix::zeros(self.rows, count);
-        for column in 0..count {
-            q[(first + column, column)] = T::one();
-        }
+        q.rows_mut(first, count).fill_with_identity();
         for (k, (tau, v)) in self.all.iter().enumerate().rev() {
             for column in 0..count {
                 let mut part = q.view_mut((k, column), (self.rows - k, 1));

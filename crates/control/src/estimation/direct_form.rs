@@ -86,14 +86,9 @@ impl DirectForm {
         if unstable.is_empty() { Ok(form) } else { Err(Error::UnstableZeros { zeros: unstable }) }
     }
 
-    /// Number of faults.
-    fn faults(&self) -> usize {
-        self.m_1.nrows()
-    }
-
     /// `A_22`.
     fn rest(&self) -> DMatrix<f64> {
-        let (n, q) = (self.a.nrows(), self.faults());
+        let (n, q) = (self.a.nrows(), self.m_1.nrows());
         self.a.view((q, q), (n - q, n - q)).into()
     }
 
@@ -120,7 +115,7 @@ impl DirectForm {
     ///
     /// Same as [`place_balanced`], in sampled time as [`place_estimator`].
     pub fn observer_gain(&self, pole: f64, rate: f64) -> Result<DMatrix<f64>, Error> {
-        let (n, q) = (self.a.nrows(), self.faults());
+        let (n, q) = (self.a.nrows(), self.m_1.nrows());
         let of_faults = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
         let of_rest = self.a.view((q, 0), (n - q, q)) * &self.m_1;
         let mut gain = stacked(&(of_faults * &self.m_1), &of_rest);

@@ -63,14 +63,13 @@ impl Requirements {
     }
 
     pub(super) fn check(&self, measurements: usize, domain: Domain) -> Result<(), Error> {
-        let rule = match domain {
-            Domain::Continuous => "finite numbers below zero, at least one",
-            Domain::Sampled { .. } => "numbers above 1e-3 and below 1, at least one",
+        let (low, high, rule) = match domain {
+            Domain::Continuous => {
+                (f64::NEG_INFINITY, 0.0, "finite numbers below zero, at least one")
+            }
+            Domain::Sampled { .. } => (1e-3, 1.0, "numbers above 1e-3 and below 1, at least one"),
         };
-        let bad = |pole: &f64| match domain {
-            Domain::Continuous => !(pole.is_finite() && *pole < 0.0),
-            Domain::Sampled { .. } => !(*pole > 1e-3 && *pole < 1.0),
-        };
+        let bad = |pole: &f64| !(*pole > low && *pole < high);
         let first_bad = self.poles.iter().copied().find(bad);
         if let Some(value) = first_bad.or(self.poles.is_empty().then_some(f64::NAN)) {
             return Err(Error::OutOfRange { name: "poles", value, rule });

@@ -65,34 +65,30 @@ pub fn loss_tolerance(
     inputs: &[usize],
     largest: f64,
 ) -> Result<LossTolerance, Error> {
-    check_box(inputs.len(), largest)?;
+    let rule = "above zero and at most one";
+    check::that(largest > 0.0 && largest <= 1.0, "the largest loss", largest, rule)?;
+    let (count, name) = (inputs.len(), "the number of inputs with a loss");
+    let holds = count > 0 && 1 << count.min(20) <= GRID;
+    check::that(holds, name, as_number(count), "from one to nine")?;
     let lossy = LossyLoop::of_any_number(plant, controller, inputs)?;
     let alone = |at: usize| {
-        let mut direction = vec![0.0; inputs.len()];
+        let mut direction = vec![0.0; count];
         direction[at] = 1.0;
         lossy.along(&direction, largest)
     };
-    let mut worst = (vec![0.0; inputs.len()], f64::NEG_INFINITY);
-    for loss in grid(&vec![largest; inputs.len()], points(inputs.len())) {
+    let mut worst = (vec![0.0; count], f64::NEG_INFINITY);
+    for loss in grid(&vec![largest; count], points(count)) {
         let value = lossy.instability(&loss)?;
         if value > worst.1 {
             worst = (loss, value);
         }
     }
     Ok(LossTolerance {
-        common: lossy.along(&vec![1.0; inputs.len()], largest)?,
-        single: (0..inputs.len()).map(alone).collect::<Result<_, _>>()?,
+        common: lossy.along(&vec![1.0; count], largest)?,
+        single: (0..count).map(alone).collect::<Result<_, _>>()?,
         worst: worst.0,
         worst_instability: worst.1,
     })
-}
-
-fn check_box(inputs: usize, largest: f64) -> Result<(), Error> {
-    let rule = "above zero and at most one";
-    check::that(largest > 0.0 && largest <= 1.0, "the largest loss", largest, rule)?;
-    let (holds, name) =
-        (inputs > 0 && 1 << inputs.min(20) <= GRID, "the number of inputs with a loss");
-    check::that(holds, name, as_number(inputs), "from one to nine")
 }
 
 /// The largest number of points for each input, at most eleven, whose grid is small enough.
