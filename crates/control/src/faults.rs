@@ -210,22 +210,20 @@ fn columns(
         into.set_column(at, column);
         Ok(())
     };
+    let (on_states, on_measurements) = ("a column of F_a", "a column of F_s");
     for (at, fault) in faults.iter().enumerate() {
-        let (on_states, on_measurements) = match &fault.entry {
-            FaultEntry::Actuator(column) => (Some(column.clone()), None),
-            FaultEntry::Sensor(column) => (None, Some(column)),
-            FaultEntry::Both { states, measurements } => (Some(states.clone()), Some(measurements)),
+        match &fault.entry {
+            FaultEntry::Actuator(column) => set(&mut f_a, at, on_states, column)?,
+            FaultEntry::Sensor(column) => set(&mut f_s, at, on_measurements, column)?,
+            FaultEntry::Both { states, measurements } => {
+                set(&mut f_a, at, on_states, states)?;
+                set(&mut f_s, at, on_measurements, measurements)?;
+            }
             FaultEntry::LossOfEffectiveness(input) => {
                 let (value, rule) = (as_number(*input), "the index of an input, from zero");
                 check::that(*input < m, "the input of a loss", value, rule)?;
-                (Some(b.column(*input).into()), None)
+                f_a.set_column(at, &b.column(*input));
             }
-        };
-        if let Some(column) = on_states {
-            set(&mut f_a, at, "a column of F_a", &column)?;
-        }
-        if let Some(column) = on_measurements {
-            set(&mut f_s, at, "a column of F_s", column)?;
         }
     }
     Ok((f_a, f_s))
