@@ -2,6 +2,9 @@
 
 use nalgebra::{Complex, ComplexField, DMatrix};
 
+/// A matrix of complex numbers.
+pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
+
 /// [above; below].
 pub(crate) fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
     let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), T::zero());
@@ -33,6 +36,6 @@ pub(crate) fn symmetric_part(m: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// A real matrix as a complex one.
-pub(crate) fn to_complex(m: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+pub(crate) fn to_complex(m: &DMatrix<f64>) -> ComplexMatrix {
     m.map(|entry| Complex::new(entry, 0.0))
 }

@@ -3,7 +3,7 @@
 //! A gain needs a plant with finitely many states, so that a delay is approximated; a frequency response does not. The
 //! loop is therefore designed with an approximation and compared with the delay itself, see [`Delays::exact`].
 
-use crate::blocks::to_complex;
+use crate::blocks::{ComplexMatrix, to_complex};
 use crate::check::as_number;
 use crate::eigen::complex_eigenvalues;
 use crate::hold::zero_order_hold;
@@ -260,7 +260,7 @@ impl Delays {
         plant: &StateSpace,
         domain: Domain,
         frequencies: &[f64],
-    ) -> Result<Vec<DMatrix<Complex<f64>>>, Error> {
+    ) -> Result<Vec<ComplexMatrix>, Error> {
         let (p, m) = plant.d.shape();
         let mut all = vec![DMatrix::zeros(p, m); frequencies.len()];
         for (row, column) in (0..p).flat_map(|row| (0..m).map(move |column| (row, column))) {
@@ -301,10 +301,7 @@ fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpac
 }
 
 /// (I - X Y)^-1.
-fn sensitivity(
-    x: &DMatrix<Complex<f64>>,
-    y: &DMatrix<Complex<f64>>,
-) -> Result<DMatrix<Complex<f64>>, Error> {
+fn sensitivity(x: &ComplexMatrix, y: &ComplexMatrix) -> Result<ComplexMatrix, Error> {
     let size = x.nrows();
     let difference = to_complex(&DMatrix::identity(size, size)) - x * y;
     difference.try_inverse().ok_or(Error::Overflow { what: "S" })

@@ -21,7 +21,7 @@
 //! systems, Indagationes Mathematicae 72 (1969).
 
 use crate::Error;
-use crate::blocks::{beside, stacked, to_complex};
+use crate::blocks::{ComplexMatrix, beside, stacked, to_complex};
 use crate::eigen::eigenvalues;
 use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
@@ -34,7 +34,6 @@ const CLUSTER_TOLERANCE: f64 = 1e-6;
 /// An entry of a combination below this, relative to the largest, counts as zero.
 const ENTRY_TOLERANCE: f64 = 1e-6;
 
-type ComplexMatrix = DMatrix<Complex<f64>>;
 type ComplexVector = DVector<Complex<f64>>;
 
 /// A combination of faults that the measurements cannot tell from a motion of the states.

@@ -1,6 +1,6 @@
 //! The smallest singular value of [A - s I, B] for many s.
 
-use crate::blocks::{beside, to_complex};
+use crate::blocks::{ComplexMatrix, beside, to_complex};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Steps of the inverse iteration.
@@ -16,7 +16,7 @@ const ITERATIONS: usize = 6;
 /// computing controllability, IEEE Trans. Autom. Control 26 (1981).
 pub(super) struct ReducedPencil {
     /// [B, A], n x (m + n).
-    both: DMatrix<Complex<f64>>,
+    both: ComplexMatrix,
     inputs: usize,
 }
 
@@ -71,7 +71,7 @@ impl ReducedPencil {
 
 /// The triangular T, n x n, of a matrix M = [0, T] Z with a unitary Z; M: n x (m + n), zero below its
 /// diagonal.
-fn triangular(mut pencil: DMatrix<Complex<f64>>, inputs: usize) -> DMatrix<Complex<f64>> {
+fn triangular(mut pencil: ComplexMatrix, inputs: usize) -> ComplexMatrix {
     let n = pencil.nrows();
     for row in (0..n).rev() {
         let entries = pencil.view((row, row), (1, inputs + 1)).adjoint();

@@ -1,7 +1,8 @@
 //! The tolerance of matrices that is as large as the uncertainty of an identification.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
+use crate::blocks::ComplexMatrix;
 use crate::check::as_number;
 use crate::response::frequency_response;
 use crate::{Error, StateSpace};
@@ -80,12 +81,9 @@ fn varying(model: &StateSpace, at: usize) -> Vec<(usize, usize)> {
 }
 
 /// The frequency responses in units of the signals.
-fn responses(
-    system: &StateSpace,
-    units: &ResponseUnits,
-) -> Result<Vec<DMatrix<Complex<f64>>>, Error> {
+fn responses(system: &StateSpace, units: &ResponseUnits) -> Result<Vec<ComplexMatrix>, Error> {
     let points = frequency_response(system, &units.frequencies)?;
-    let scaled = |gain: DMatrix<Complex<f64>>| {
+    let scaled = |gain: ComplexMatrix| {
         DMatrix::from_fn(gain.nrows(), gain.ncols(), |i, j| {
             gain[(i, j)] * (units.inputs[j] / units.outputs[i])
         })
@@ -93,8 +91,8 @@ fn responses(
     Ok(points.into_iter().map(|point| scaled(point.gain)).collect())
 }
 
-fn distance_squared(one: &[DMatrix<Complex<f64>>], other: &[DMatrix<Complex<f64>>]) -> f64 {
-    let at_one = |(g, h): (&DMatrix<Complex<f64>>, &DMatrix<Complex<f64>>)| {
+fn distance_squared(one: &[ComplexMatrix], other: &[ComplexMatrix]) -> f64 {
+    let at_one = |(g, h): (&ComplexMatrix, &ComplexMatrix)| {
         (g - h).norm_squared() / ((1.0 + g.norm_squared()) * (1.0 + h.norm_squared()))
     };
     one.iter().zip(other).map(at_one).sum()

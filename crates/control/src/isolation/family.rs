@@ -1,12 +1,10 @@
 //! The linear family of all generators of one order with one residual.
 
 use super::decoupled::DecoupledPart;
-use crate::blocks::{stacked, to_complex};
+use crate::blocks::{ComplexMatrix, stacked, to_complex};
 use crate::svd::Svd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
-
-type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// Frequencies at which the effect of measurement noise is averaged, and the decades that they span.
 const NOISE_POINTS: u32 = 40;

@@ -1,11 +1,11 @@
 //! Verification of a residual generator on the plant for which it was made.
 
 use super::DisturbedPlant;
-use crate::blocks::{beside, to_complex};
+use crate::blocks::{ComplexMatrix, beside, to_complex};
 use crate::residual::ResidualGenerator;
 use crate::response::Transfer;
 use crate::{Domain, StateSpace};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 
 /// Frequencies at which the decoupling is verified, relative to the fastest pole, or to pi / period.
 const CONTINUOUS: [f64; 5] = [0.03, 0.3, 1.0, 3.0, 30.0];
@@ -79,7 +79,7 @@ pub(super) fn decoupling_error(
 }
 
 /// The frequency response of a system that may have no states; None at a pole.
-fn response(system: &StateSpace) -> impl Fn(f64) -> Option<DMatrix<Complex<f64>>> {
+fn response(system: &StateSpace) -> impl Fn(f64) -> Option<ComplexMatrix> {
     let transfer = (!system.a.is_empty()).then(|| Transfer::new(system));
     move |frequency| match &transfer {
         Some(transfer) => transfer.gain(frequency).ok(),

@@ -4,7 +4,7 @@ use super::eigenvectors::{Slope, condition};
 use super::pole_block::PoleBlock;
 use super::subspace::AssignableSubspaces;
 use crate::Error;
-use crate::blocks::to_complex;
+use crate::blocks::{ComplexMatrix, to_complex};
 use crate::svd::{ComplexSvd, norm_2};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector};
 use std::f64::consts::PI;
@@ -126,7 +126,7 @@ impl<'a> FeedbackLoop<'a> {
     }
 
     /// (s I - M)^-1 N.
-    fn resolvent(&self, s: Complex<f64>, n: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+    fn resolvent(&self, s: Complex<f64>, n: &ComplexMatrix) -> ComplexMatrix {
         let mut solved = n.clone();
         let mut row = 0;
         for poles in self.blocks() {
@@ -148,11 +148,7 @@ impl<'a> FeedbackLoop<'a> {
     }
 
     /// I + G Z, with Z = (s I - M)^-1 V^-1 B.
-    fn sensitivity(
-        &self,
-        structure: &Eigenstructure,
-        z: &DMatrix<Complex<f64>>,
-    ) -> DMatrix<Complex<f64>> {
+    fn sensitivity(&self, structure: &Eigenstructure, z: &ComplexMatrix) -> ComplexMatrix {
         let m = self.b.ncols();
         let (re, im) =
             (&structure.g * z.map(|entry| entry.re), &structure.g * z.map(|entry| entry.im));
@@ -200,12 +196,8 @@ impl<'a> FeedbackLoop<'a> {
     }
 
     /// (s I - M')^-1 N: the rows of a pair change their roles.
-    fn transposed_resolvent(
-        &self,
-        s: Complex<f64>,
-        n: &DMatrix<Complex<f64>>,
-    ) -> DMatrix<Complex<f64>> {
-        let swapped = |m: &DMatrix<Complex<f64>>| {
+    fn transposed_resolvent(&self, s: Complex<f64>, n: &ComplexMatrix) -> ComplexMatrix {
+        let swapped = |m: &ComplexMatrix| {
             let mut m = m.clone();
             let mut row = 0;
             for poles in self.blocks() {

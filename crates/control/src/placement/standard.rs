@@ -3,7 +3,7 @@
 use super::eigenvectors::{Directions, LARGEST_DESCENT};
 use super::subspace::AssignableSubspaces;
 use super::update_order::update_order;
-use crate::blocks::{stacked, to_complex};
+use crate::blocks::{ComplexMatrix, stacked, to_complex};
 use crate::svd::Svd;
 use crate::{Error, reflections::Reflections};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
@@ -62,7 +62,7 @@ struct Iteration {
     /// pair, of the eigenvalue with positive imaginary part.
     vectors: DMatrix<f64>,
     /// For each column the orthonormal basis of the subspace of its eigenvalue.
-    kernels: Vec<DMatrix<Complex<f64>>>,
+    kernels: Vec<ComplexMatrix>,
     /// Number of real eigenvalues.
     reals: usize,
     /// The number of the space of each column, real eigenvalues first.
