@@ -24,8 +24,6 @@ use eigenvectors::{Directions, best_conditioned, condition, more_directions, wid
 use figures::FeedbackLoop;
 use nalgebra::{Complex, DMatrix, DVector};
 use pole_block::pole_blocks;
-pub(crate) use pole_error::DISCRETE;
-use pole_error::{CONTINUOUS, PoleTolerance};
 use standard::standard_directions;
 use subspace::AssignableSubspaces;
 
@@ -133,7 +131,7 @@ pub fn place(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    PlacementProblem { a, b, poles, tolerance: &CONTINUOUS }.place(&Coordinates::Given)
+    PlacementProblem { a, b, poles, sampled: false }.place(&Coordinates::Given)
 }
 
 /// Like [`place`], but eigenvectors that are well conditioned in balanced coordinates come first.
@@ -151,7 +149,7 @@ pub fn place_balanced(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    PlacementProblem { a, b, poles, tolerance: &CONTINUOUS }.place(&Coordinates::Balanced)
+    PlacementProblem { a, b, poles, sampled: false }.place(&Coordinates::Balanced)
 }
 
 /// Like [`place_balanced`], for the sampled plant `x[k+1] = A x[k] + B u[k]`.
@@ -186,7 +184,7 @@ pub fn place_discrete(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    PlacementProblem { a, b, poles, tolerance: &DISCRETE }.place(&Coordinates::Balanced)
+    PlacementProblem { a, b, poles, sampled: true }.place(&Coordinates::Balanced)
 }
 
 /// The coordinates in which the eigenvectors of the candidate of least condition number are chosen.
@@ -216,7 +214,8 @@ pub(crate) struct PlacementProblem<'a> {
     pub(crate) b: &'a DMatrix<f64>,
     /// n eigenvalues.
     pub(crate) poles: &'a [Complex<f64>],
-    pub(crate) tolerance: &'a PoleTolerance,
+    /// Whether A and the eigenvalues are those of a sampled system.
+    pub(crate) sampled: bool,
 }
 
 impl PlacementProblem<'_> {
@@ -231,7 +230,7 @@ impl PlacementProblem<'_> {
         coordinates: &Coordinates<'_>,
         extent: Extent,
     ) -> Result<Alternatives, Error> {
-        let Self { a, b, poles, tolerance } = *self;
+        let Self { a, b, poles, sampled } = *self;
         let n = check::with_inputs(a, b)?;
         check_poles(poles, n)?;
         require_controllable(a, b)?;
@@ -257,7 +256,7 @@ impl PlacementProblem<'_> {
         let standard = standard_directions(a, independent, problem)?;
         let (mut choice, mut others) = (None, vec![]);
         if problem.inputs() > 1 {
-            let feedback = FeedbackLoop::new(problem, basis, b, tolerance.sampled);
+            let feedback = FeedbackLoop::new(problem, basis, b, sampled);
             let other = other.iter().map(|other| {
                 problem.directions_of(&other.assignable.eigenvectors(&other.directions, &ones))
             });
@@ -274,7 +273,7 @@ impl PlacementProblem<'_> {
             let quality = Quality {
                 condition: condition(&assignable.eigenvectors(directions, &ones))?,
                 balanced_condition: condition(&assignable.eigenvectors(directions, &scale))?,
-                pole_error: tolerance.pole_error(a, b, &gain, poles)?,
+                pole_error: self.pole_error(&gain)?,
             };
             Ok::<_, Error>(Placement { gain, quality })
         };

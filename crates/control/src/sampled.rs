@@ -13,7 +13,7 @@ use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::hold::FirstOrderHold;
 use crate::placement::{
-    Alternatives, Coordinates, DISCRETE, Extent, PlacementProblem, Quality, alternatives_discrete,
+    Alternatives, Coordinates, Extent, PlacementProblem, Quality, alternatives_discrete,
 };
 use crate::stability::instability;
 use crate::{Domain, Error, check};
@@ -291,7 +291,7 @@ fn place_dual(
     });
     let units = scale.map(|unit| 1.0 / unit);
     let (a, b) = (a_0.transpose(), output.transpose());
-    let problem = PlacementProblem { a: &a, b: &b, poles, tolerance: &DISCRETE };
+    let problem = PlacementProblem { a: &a, b: &b, poles, sampled: true };
     let placed = problem.alternatives(&Coordinates::Scaled(&units), extent)?;
     Ok(placed.map(|gain| -gain.transpose()))
 }

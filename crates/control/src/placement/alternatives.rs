@@ -1,7 +1,7 @@
 //! Feedbacks with the same eigenvalues and different eigenvectors.
 
 use super::eigenvectors::LARGEST_DESCENT;
-use super::{CONTINUOUS, Coordinates, DISCRETE, Extent, Placement, PlacementProblem};
+use super::{Coordinates, Extent, Placement, PlacementProblem};
 use crate::Error;
 use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
@@ -98,7 +98,7 @@ pub fn alternatives(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    let problem = PlacementProblem { a, b, poles, tolerance: &CONTINUOUS };
+    let problem = PlacementProblem { a, b, poles, sampled: false };
     problem.alternatives(&Coordinates::Given, Extent::Alternatives)
 }
 
@@ -112,7 +112,7 @@ pub fn alternatives_balanced(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    let problem = PlacementProblem { a, b, poles, tolerance: &CONTINUOUS };
+    let problem = PlacementProblem { a, b, poles, sampled: false };
     problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
 }
 
@@ -126,7 +126,7 @@ pub fn alternatives_discrete(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    let problem = PlacementProblem { a, b, poles, tolerance: &DISCRETE };
+    let problem = PlacementProblem { a, b, poles, sampled: true };
     problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
 }
 
