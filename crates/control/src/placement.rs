@@ -235,18 +235,13 @@ impl PlacementProblem<'_> {
         check_poles(poles, n)?;
         require_controllable(a, b)?;
         let ones = DVector::from_element(n, 1.0);
-        let in_units = |units: &DVector<f64>| {
-            let assignable = Assignable::new(a, b, poles, units)?;
-            let starts = widest_directions(&assignable.problem)?;
-            Ok::<_, Error>((Assignment::new(assignable, &starts)?, starts))
-        };
-        let (best, starts) = in_units(&ones)?;
+        let (best, starts) = Assignment::in_units(self, &ones)?;
         let balance = |gain: &DMatrix<f64>| Balance::new(&(a + b * gain)).scale;
         let mut scale = balance(&best.gain);
         let other = match coordinates {
             Coordinates::Given => None,
-            Coordinates::Balanced => Some(in_units(&scale)?.0),
-            Coordinates::Scaled(units) => Some(in_units(units)?.0),
+            Coordinates::Balanced => Some(Assignment::in_units(self, &scale)?.0),
+            Coordinates::Scaled(units) => Some(Assignment::in_units(self, units)?.0),
         };
         if let (Coordinates::Scaled(_), Some(other)) = (coordinates, &other) {
             scale = balance(&other.gain);
@@ -315,17 +310,13 @@ struct Assignable {
 }
 
 impl Assignable {
-    fn new(
-        a: &DMatrix<f64>,
-        b: &DMatrix<f64>,
-        poles: &[Complex<f64>],
-        units: &DVector<f64>,
-    ) -> Result<Self, Error> {
-        let a = divide_rows(&multiply_columns(a, units), units);
-        let b = divide_rows(b, units);
+    fn new(problem: &PlacementProblem<'_>, units: &DVector<f64>) -> Result<Self, Error> {
+        let a = divide_rows(&multiply_columns(problem.a, units), units);
+        let b = divide_rows(problem.b, units);
         let basis = input_basis(&b)?;
         let b = &b * &basis;
-        let problem = AssignableSubspaces::new(&a, &b, &pole_blocks(poles, basis.ncols())?)?;
+        let poles = pole_blocks(problem.poles, basis.ncols())?;
+        let problem = AssignableSubspaces::new(&a, &b, &poles)?;
         Ok(Self { a, b, basis, problem, units: units.clone() })
     }
 
@@ -349,11 +340,16 @@ struct Assignment {
 }
 
 impl Assignment {
-    /// Eigenvectors of least condition number.
-    fn new(assignable: Assignable, starts: &[Directions]) -> Result<Self, Error> {
-        let directions = best_conditioned(&assignable.problem, starts)?;
+    /// Eigenvectors of least condition number in these units of the states, and the starts of their search.
+    fn in_units(
+        problem: &PlacementProblem<'_>,
+        units: &DVector<f64>,
+    ) -> Result<(Self, Vec<Directions>), Error> {
+        let assignable = Assignable::new(problem, units)?;
+        let starts = widest_directions(&assignable.problem)?;
+        let directions = best_conditioned(&assignable.problem, &starts)?;
         let gain = assignable.gain(&directions)?;
-        Ok(Self { assignable, directions, gain })
+        Ok((Self { assignable, directions, gain }, starts))
     }
 }
 
