@@ -83,8 +83,7 @@ pub fn fault_estimates(
 ) -> Result<StateSpace, Error> {
     let system = controller(plant, gains, domain)?;
     let (n, q) = plant.f_a.shape();
-    let mut c = DMatrix::zeros(q, n + q);
-    c.columns_mut(n, q).fill_with_identity();
+    let mut c = DMatrix::identity(q, q).insert_columns(0, n, 0.0);
     let mut d = DMatrix::zeros(q, plant.c.nrows());
     if let Some(p_f) = &gains.p_f {
         c -= p_f * plant.augmented_output();

@@ -79,16 +79,10 @@ pub enum Transform {
 pub enum FilterError<E> {
     /// The plant cannot be evaluated.
     #[error(transparent)]
-    Plant(E),
+    Plant(#[from] E),
     /// H P H' + V is not positive definite.
     #[error("the covariance of the innovation is not positive definite: V must be")]
     NotDefinite,
-}
-
-impl<E> From<E> for FilterError<E> {
-    fn from(error: E) -> Self {
-        Self::Plant(error)
-    }
 }
 
 /// The estimate of a nonlinear plant, and space for its equations: a sample allocates nothing.

@@ -71,11 +71,6 @@ impl Svd {
         self.values.iter().filter(|&&value| value > threshold).count()
     }
 
-    /// The 2-norm of M: its largest singular value.
-    pub(crate) fn norm(&self) -> f64 {
-        self.values[0]
-    }
-
     /// The condition number of M: its largest singular value over its smallest.
     pub(crate) fn condition(&self) -> f64 {
         self.values[0] / self.values[self.values.len() - 1]
@@ -95,7 +90,7 @@ impl Svd {
 
 /// The 2-norm of a matrix: its largest singular value.
 pub(crate) fn norm_2(m: &DMatrix<f64>) -> Result<f64, Error> {
-    Ok(Svd::new(m)?.norm())
+    Ok(Svd::new(m)?.values[0])
 }
 
 /// Singular values and right singular vectors of a complex matrix.

@@ -89,6 +89,6 @@ impl Reach {
 fn dc_gain(system: &StateSpace) -> Result<Option<f64>, Error> {
     let n = system.a.nrows();
     let svd = Svd::new(&system.dc_matrix())?;
-    let regular = svd.rank(TOLERANCE) == n && svd.norm() > TOLERANCE * system.a.norm();
+    let regular = svd.rank(TOLERANCE) == n && svd.values[0] > TOLERANCE * system.a.norm();
     Ok(regular.then(|| system.c.transpose().dot(&svd.least_squares(&system.b, n))))
 }

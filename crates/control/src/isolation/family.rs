@@ -90,10 +90,6 @@ impl Family {
         self
     }
 
-    pub(super) fn members(&self) -> usize {
-        self.w.nrows()
-    }
-
     /// For each member the response of its residual to the faults.
     pub(super) fn fault_gains(&self, part: &DecoupledPart, frequency: f64) -> ComplexMatrix {
         let input = |at: usize| &self.l[at] * &part.d_f - &self.t[at] * &part.b_f;
@@ -118,7 +114,7 @@ impl Family {
     pub(super) fn noise(&self, part: &DecoupledPart, noise: &[f64], fastest: f64) -> DMatrix<f64> {
         let sizes = DMatrix::from_diagonal(&nalgebra::DVector::from_column_slice(noise));
         let (h, k) = (&part.h * &sizes, &part.k * &sizes);
-        let mut sum = DMatrix::zeros(self.members(), self.members());
+        let mut sum = DMatrix::zeros(self.w.nrows(), self.w.nrows());
         for point in 0..NOISE_POINTS {
             let fraction = f64::from(point) / f64::from(NOISE_POINTS - 1);
             let frequency = match self.domain {

@@ -151,7 +151,8 @@ pub(crate) fn descend(
             let slope = function(&directions)?;
             Some((slope.value, chart.gradient(problem, &directions, t, &slope)))
         };
-        let (at, lowest) = minimise(&local, chart.dimension(), tolerance);
+        let dimension = chart.normals.iter().map(DMatrix::ncols).sum();
+        let (at, lowest) = minimise(&local, dimension, tolerance);
         directions = chart.directions(&at);
         if value <= lowest + tolerance {
             break;
@@ -185,10 +186,6 @@ impl Chart {
         let pairs = problem.spaces.iter().zip(&centres);
         let normals = pairs.map(|(space, w)| normals(space, w)).collect::<Result<_, _>>()?;
         Ok(Self { centres, normals })
-    }
-
-    fn dimension(&self) -> usize {
-        self.normals.iter().map(DMatrix::ncols).sum()
     }
 
     fn directions(&self, t: &DVector<f64>) -> Vec<DVector<f64>> {

@@ -4,6 +4,7 @@ use super::eigenvectors::{Slope, condition};
 use super::pole_block::PoleBlock;
 use super::subspace::AssignableSubspaces;
 use crate::Error;
+use crate::balance::multiply_rows;
 use crate::blocks::{ComplexMatrix, to_complex};
 use crate::svd::{ComplexSvd, norm_2};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector};
@@ -71,7 +72,8 @@ impl<'a> FeedbackLoop<'a> {
     fn at(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
         let v = self.problem.eigenvectors(directions);
         let inverse = self.problem.inverse(directions)?;
-        let g = self.basis * self.problem.responses(directions);
+        let responses = self.problem.scaled_responses(directions);
+        let g = self.basis * multiply_rows(&responses, &self.problem.response_scale);
         let input = &inverse * self.b;
         Some(Eigenstructure { v, inverse, g, input })
     }

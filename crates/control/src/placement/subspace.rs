@@ -95,11 +95,6 @@ impl AssignableSubspaces {
         side_by_side(self.inputs(), columns)
     }
 
-    /// The columns of all G = K V side by side.
-    pub(crate) fn responses(&self, directions: &[DVector<f64>]) -> DMatrix<f64> {
-        multiply_rows(&self.scaled_responses(directions), &self.response_scale)
-    }
-
     /// The columns of all V side by side with the states divided by `units`, eigenvectors of length one.
     pub(crate) fn unit_eigenvectors(
         &self,
