@@ -4,26 +4,21 @@
 use nalgebra::DMatrix;
 
 /// A number in single or double precision; all arithmetic is in double precision.
-pub(crate) trait Number: Copy {
-    fn wide(self) -> f64;
+pub(crate) trait Number: Copy + Into<f64> {
     fn narrow(value: f64) -> Self;
+
+    fn wide(self) -> f64 {
+        self.into()
+    }
 }
 
 impl Number for f64 {
-    fn wide(self) -> f64 {
-        self
-    }
-
     fn narrow(value: f64) -> Self {
         value
     }
 }
 
 impl Number for f32 {
-    fn wide(self) -> f64 {
-        f64::from(self)
-    }
-
     #[expect(clippy::cast_possible_truncation, reason = "the answer in single precision")]
     fn narrow(value: f64) -> Self {
         value as Self
