@@ -8,13 +8,9 @@ pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error
     if m.is_empty() {
         return Err(Error::Empty { matrix, actual: m.shape() });
     }
-    match m.iter().position(|value| !value.is_finite()) {
-        None => Ok(()),
-        Some(at) => {
-            let (row, col) = (at % m.nrows() + 1, at / m.nrows() + 1);
-            Err(Error::NotFinite { matrix, row, col, value: m[at] })
-        }
-    }
+    let Some(at) = m.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+    let (row, col) = (at % m.nrows() + 1, at / m.nrows() + 1);
+    Err(Error::NotFinite { matrix, row, col, value: m[at] })
 }
 
 /// Checks that a matrix is finite and has the expected shape.

@@ -189,7 +189,6 @@ impl Cusum {
 
 /// The distribution of one cumulative sum that has not been above its threshold: the probability of 0,
 /// and the density at the nodes.
-#[derive(Clone)]
 struct Sums {
     drift: f64,
     nodes: Vec<f64>,

@@ -60,10 +60,7 @@ pub(super) fn decoupling_error(
         let (q_u, q_y) = (q.columns(0, commands), q.columns(commands, plant.c.nrows()));
         let strongest = q_y.iter().zip(&lengths).map(|(q, length)| q.norm() * length);
         let strongest = strongest.fold(0.0, f64::max);
-        for input in 0..g.ncols() {
-            if input >= before && pattern[input - before] {
-                continue;
-            }
+        for input in (0..g.ncols()).filter(|&input| input < before || !pattern[input - before]) {
             let direct = if input < commands { q_u[(0, input)] } else { Complex::new(0.0, 0.0) };
             let column = g.column(input);
             let terms = q_y.iter().zip(column.iter());
