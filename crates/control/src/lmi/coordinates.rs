@@ -4,6 +4,7 @@ use crate::Error;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
+use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::svd::Svd;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -153,7 +154,7 @@ impl Coordinates {
 }
 
 pub(super) fn mean_eigenvalue(a: &DMatrix<f64>) -> f64 {
-    a.trace() / f64::from(u32::try_from(a.nrows()).unwrap_or(u32::MAX))
+    a.trace() / as_number(a.nrows())
 }
 
 fn inverse_of_upper(u: &DMatrix<f64>) -> DMatrix<f64> {

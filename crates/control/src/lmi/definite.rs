@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::balance::power_of_two;
 use crate::blocks::symmetric_part;
+use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::DMatrix;
 
@@ -27,7 +28,7 @@ pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     });
     let size = scaled.amax();
     let Some(smallest) = smallest_eigenvalue(&scaled)? else { return Ok(0.0) };
-    let order = f64::from(u32::try_from(s.nrows()).unwrap_or(u32::MAX));
+    let order = as_number(s.nrows());
     Ok(if smallest > ROUNDING * order * order * size { smallest } else { 0.0 })
 }
 

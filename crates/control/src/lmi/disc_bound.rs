@@ -3,6 +3,7 @@
 use super::noiseless::{ROUNDING, checked};
 use super::{Disc, Performance};
 use crate::Error;
+use crate::check::as_number;
 use crate::svd::Svd;
 use crate::zeros::{Zeros, zeros};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -70,7 +71,7 @@ pub fn disc_norm_lower_bound(
     if !regular || feedthrough.amax() > 0.0 {
         return Ok(None);
     }
-    let (order, inputs) = (number(n), number(k));
+    let (order, inputs) = (as_number(n), as_number(k));
     let power = |base: f64| if base > 0.0 { base * base.ln() } else { 0.0 };
     let shape = power(order - inputs) + power(inputs) - power(order);
     let determinant = sizes.iter().map(|value| value.ln()).sum::<f64>();
@@ -91,11 +92,6 @@ pub fn disc_norm_lower_bound(
     Ok((bound > 0.0).then_some(bound))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-fn number(count: usize) -> f64 {
-    count as f64
-}
-
 /// The range of Re(-1 / s) of the eigenvalues s; the upper end may be infinite.
 struct Inverses {
     count: usize,
@@ -106,23 +102,23 @@ struct Inverses {
 impl Inverses {
     /// The logarithm of the largest product of 1 / (1 + a v) over all v with this sum.
     fn largest_log(&self, sum: f64, a: f64) -> f64 {
-        let free = (sum - number(self.count) * self.least).max(0.0);
+        let free = (sum - as_number(self.count) * self.least).max(0.0);
         let width = self.largest - self.least;
         let of = |v: f64| -(a * v).ln_1p();
         let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
-        if at_end >= number(self.count) {
-            return number(self.count) * of(self.largest);
+        if at_end >= as_number(self.count) {
+            return as_number(self.count) * of(self.largest);
         }
         let ends = if at_end > 0.0 { at_end * of(self.largest) } else { 0.0 };
         let left = if at_end > 0.0 { free - at_end * width } else { free };
-        ends + of(self.least + left) + (number(self.count) - at_end - 1.0) * of(self.least)
+        ends + of(self.least + left) + (as_number(self.count) - at_end - 1.0) * of(self.least)
     }
 }
 
 /// The bound by the trace at 0 and det H at points s > 0; `sizes`: the q singular values of E B.
 fn by_zeros(eigenvalues: &Inverses, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
     let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
-    let inputs = number(sizes.len());
+    let inputs = as_number(sizes.len());
     let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();
     let by_trace = |sum: f64| (zeta - sum) / inverses;
     let by_points = |sum: f64| {
@@ -137,7 +133,7 @@ fn by_zeros(eigenvalues: &Inverses, zeros: &[Complex<f64>], sizes: &DVector<f64>
             .map(|point| at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
             .fold(0.0, f64::max)
     };
-    let count = number(eigenvalues.count);
+    let count = as_number(eigenvalues.count);
     let [mut low, mut high] = [eigenvalues.least, eigenvalues.largest].map(|end| count * end);
     if low <= 0.0 {
         return 0.0;

@@ -5,6 +5,7 @@ use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Affine, Outcome, Problem};
 use crate::balance::power_of_two;
+use crate::check::as_number;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
 use crate::stability::instability;
 use crate::{Domain, Error, check};
@@ -193,5 +194,5 @@ fn mean(matrices: &[DMatrix<f64>]) -> Result<DMatrix<f64>, Error> {
         check::shape("A", a, (n, n))?;
         sum += a;
     }
-    Ok(sum / f64::from(u32::try_from(matrices.len()).unwrap_or(u32::MAX)))
+    Ok(sum / as_number(matrices.len()))
 }

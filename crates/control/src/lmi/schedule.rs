@@ -4,6 +4,7 @@ use super::coordinates::Coordinates;
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Affine, Problem};
+use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -64,10 +65,9 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
     if degree == 0 {
         return Ok(values.to_vec());
     }
-    let number = |k: usize| f64::from(u32::try_from(k).unwrap_or(u32::MAX));
     let basis = DMatrix::from_fn(degree + 1, degree + 1, |at, j| {
-        let t = number(at) / number(degree);
-        let choose = (0..j).fold(1.0, |all, k| all * number(degree - k) / number(k + 1));
+        let t = as_number(at) / as_number(degree);
+        let choose = (0..j).fold(1.0, |all, k| all * as_number(degree - k) / as_number(k + 1));
         let power = |base: f64, exponent: usize| (0..exponent).fold(1.0, |all, _| all * base);
         choose * power(t, j) * power(1.0 - t, degree - j)
     });
@@ -269,7 +269,7 @@ fn inequalities(
             let by = &slope(interval) * step;
             let ends = [&p[i] + &by, &p[i + 1] + &by];
             for j in 0..=degree {
-                let t = number(j) / number(degree);
+                let t = as_number(j) / as_number(degree);
                 let between = |[from, to]: [&Affine; 2]| &(from * (1.0 - t)) + &(to * t);
                 let now = between([&p[i], &p[i + 1]]);
                 let then = between([&ends[0], &ends[1]]);
@@ -288,10 +288,6 @@ fn inequalities(
     all
 }
 
-fn number(k: usize) -> f64 {
-    f64::from(u32::try_from(k).unwrap_or(u32::MAX))
-}
-
 /// The Bernstein coefficients of -(A' P + P A + D) in continuous time.
 fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
     let mut all = Vec::new();
@@ -299,7 +295,7 @@ fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
         let slope = &(&p[i + 1] - &p[i]) * (rate / length);
         let degree = a.len();
         for j in 0..=degree {
-            let t = number(j) / number(degree);
+            let t = as_number(j) / as_number(degree);
             let (n, _) = slope.shape();
             let mut product = Affine::zeros(n, n);
             if j < degree {
@@ -321,7 +317,7 @@ fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec
     for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {
         let n = p[i].nrows();
         let degree = a.len();
-        let slope = (&p[i + 1] - &p[i]) * (rate / length * number(degree));
+        let slope = (&p[i + 1] - &p[i]) * (rate / length * as_number(degree));
         for j in 0..=degree {
             // (d + 1 - j) `P_i` `A_j` + j `P_{i+1}` `A_{j-1}` as one product: a sum of whole terms rounds nothing.
             let pair = |k: usize| if k < degree - j { (i, j) } else { (i + 1, j - 1) };

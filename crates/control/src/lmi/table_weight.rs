@@ -2,6 +2,7 @@
 
 use super::affine::Affine;
 use super::{Outcome, Problem};
+use crate::check::as_number;
 use crate::weight::Weight;
 use crate::{Error, check};
 
@@ -60,12 +61,12 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
         return Err(Error::Empty { matrix: "table", actual: (table.len(), 2) });
     };
     if !(1..=2).contains(&order) {
-        let value = f64::from(u32::try_from(order).unwrap_or(u32::MAX));
+        let value = as_number(order);
         return Err(Error::OutOfRange { name: "order", value, rule: "1 or 2" });
     }
     let unit = (first * last).sqrt();
     let points = interpolated(table);
-    let size = points.iter().map(|(_, m)| m.ln()).sum::<f64>() / count(points.len());
+    let size = points.iter().map(|(_, m)| m.ln()).sum::<f64>() / as_number(points.len());
     let size = size.exp();
     let fit = |deviation: f64| {
         let scaled = points.iter().map(|(w, m)| ((w / unit).powi(2), (m / size).powi(2)));
@@ -92,17 +93,13 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
     Ok(TableWeight { weight, deviation })
 }
 
-fn count(number: usize) -> f64 {
-    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
-}
-
 /// The table with further points between its own.
 fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     for pair in table.windows(2) {
         let ((w, m), (w_next, m_next)) = (pair[0], pair[1]);
         for at in 0..BETWEEN {
-            let part = count(at) / count(BETWEEN);
+            let part = as_number(at) / as_number(BETWEEN);
             points.push((w * (w_next / w).powf(part), m * (m_next / m).powf(part)));
         }
     }

@@ -5,6 +5,7 @@ use super::observer::{Candidate, RELAXED_GAIN, norm_below, speed};
 use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
 use super::{Affine, Outcome, Problem};
 use crate::balance::{divide_columns, divide_rows, power_of_two};
+use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -121,7 +122,7 @@ pub(crate) fn find_common(
             return Ok(None);
         }
     }
-    let count = f64::from(u32::try_from(vertices.len()).unwrap_or(u32::MAX));
+    let count = as_number(vertices.len());
     let mean = vertices[1..].iter().fold(vertices[0].clone(), |sum, a| sum + a) / count;
     for a in [&mean, &vertices[0]] {
         let Some(coordinates) = Coordinates::of_dynamics(a)? else { continue };
