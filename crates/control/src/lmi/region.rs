@@ -50,12 +50,7 @@ pub struct RegionCertificate {
     pub margin: f64,
 }
 
-/// A part of a region and the name by which a conflict reports it.
-struct Part {
-    name: &'static str,
-    shape: Shape,
-}
-
+/// A part of a region.
 enum Shape {
     HalfPlane(f64),
     Disc(Disc),
@@ -87,32 +82,22 @@ impl Region {
         Err(Error::OutOfRange { name: "sector", value, rule })
     }
 
-    /// The parts, with frequencies divided by `unit`.
-    fn parts(&self, domain: Domain, unit: f64) -> Vec<Part> {
-        let mut parts = Vec::new();
-        let around_zero = |radius| Shape::Disc(Disc { center: 0.0, radius });
-        if let Some(decay) = self.decay {
-            let shape = match domain {
-                Domain::Continuous => Shape::HalfPlane(decay / unit),
-                Domain::Sampled { period } => around_zero((-decay * period).exp() / unit),
-            };
-            parts.push(Part { name: "decay", shape });
-        }
-        if let Some(Disc { center, radius }) = self.disc {
-            let disc = Disc { center: center / unit, radius: radius / unit };
-            parts.push(Part { name: "disc", shape: Shape::Disc(disc) });
-        }
-        if let Some(angle) = self.sector {
-            parts.push(Part { name: "sector", shape: Shape::Sector(angle) });
-        }
-        if parts.is_empty() {
-            let shape = match domain {
-                Domain::Continuous => Shape::HalfPlane(0.0),
-                Domain::Sampled { .. } => around_zero(1.0 / unit),
-            };
-            parts.push(Part { name: "stability", shape });
-        }
-        parts
+    /// The parts with the names by which a conflict reports them, with frequencies divided by `unit`.
+    fn parts(&self, domain: Domain, unit: f64) -> Vec<(&'static str, Shape)> {
+        let disc = |center: f64, radius: f64| {
+            Shape::Disc(Disc { center: center / unit, radius: radius / unit })
+        };
+        let decaying = |decay: f64| match domain {
+            Domain::Continuous => Shape::HalfPlane(decay / unit),
+            Domain::Sampled { period } => disc(0.0, (-decay * period).exp()),
+        };
+        let parts = [
+            self.decay.map(|decay| ("decay", decaying(decay))),
+            self.disc.map(|Disc { center, radius }| ("disc", disc(center, radius))),
+            self.sector.map(|angle| ("sector", Shape::Sector(angle))),
+        ];
+        let parts: Vec<_> = parts.into_iter().flatten().collect();
+        if parts.is_empty() { vec![("stability", decaying(0.0))] } else { parts }
     }
 
     /// The matrices of [`certify_region`] with their names, positive definite if P and the product
@@ -124,15 +109,15 @@ impl Region {
         domain: Domain,
         unit: f64,
     ) -> Vec<(&'static str, Affine)> {
-        let parts = self.parts(domain, unit);
-        parts.iter().map(|part| (part.name, part.shape.inequality(p, product))).collect()
+        let parts = self.parts(domain, unit).into_iter();
+        parts.map(|(name, shape)| (name, shape.inequality(p, product))).collect()
     }
 
     /// Whether the parts have a real interval in common.
     pub(super) fn has_real_numbers(&self, domain: Domain) -> bool {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for part in self.parts(domain, 1.0) {
-            let (from, to) = match part.shape {
+        for (_, shape) in self.parts(domain, 1.0) {
+            let (from, to) = match shape {
                 Shape::HalfPlane(decay) => (f64::NEG_INFINITY, -decay),
                 Shape::Disc(Disc { center, radius }) => (center - radius, center + radius),
                 Shape::Sector(_) => (f64::NEG_INFINITY, 0.0),
@@ -144,9 +129,10 @@ impl Region {
 
     /// Names of the parts that do not contain all eigenvalues.
     pub(super) fn violated(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
-        let parts = self.parts(domain, 1.0);
-        let outside = |part: &&Part| values.iter().any(|value| !part.shape.contains(value));
-        parts.iter().filter(outside).map(|part| part.name).collect()
+        let outside = |(name, shape): (_, Shape)| {
+            values.iter().any(|value| !shape.contains(value)).then_some(name)
+        };
+        self.parts(domain, 1.0).into_iter().filter_map(outside).collect()
     }
 }
 
@@ -251,12 +237,10 @@ pub(super) fn certify_in(
             problem.constrain(&matrix, MARGIN);
         }
     }
-    match problem.solve()? {
-        Outcome::Optimal(solution) => {
-            verify(vertices, region, domain, coordinates.certificate(&solution.value(&p)))
-        }
-        _ => Ok(Outcome::Inconclusive(NO_P)),
-    }
+    let Some(solution) = problem.solve()?.optimal() else {
+        return Ok(Outcome::Inconclusive(NO_P));
+    };
+    verify(vertices, region, domain, coordinates.certificate(&solution.value(&p)))
 }
 
 /// Verifies the inequalities of all vertices for P in the units of the data.
