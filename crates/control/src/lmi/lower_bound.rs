@@ -2,13 +2,14 @@
 
 use super::affine::Affine;
 use super::definite::margin;
+use super::noiseless::checked;
 use super::region::MARGIN;
 use super::{Performance, Problem};
 use crate::balance::power_of_two;
 use crate::blocks::symmetric_part;
 use crate::rank::controllable_part;
 use crate::riccati::kalman;
-use crate::{Domain, Error, check};
+use crate::{Domain, Error};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// A lower bound of the H-infinity norm of the estimation error of every linear filter, with proof.
@@ -71,10 +72,7 @@ pub fn observer_norm_lower_bound(
     performance: &Performance,
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
-    let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-    performance.check((n, k), (r, n), (c.nrows(), k))?;
+    checked(a, c, performance)?;
     match HiddenDisturbance::new(a, c, performance, domain)? {
         Some(hidden) => hidden.largest_ratio(),
         None => Ok(None),

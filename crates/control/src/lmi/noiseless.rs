@@ -109,6 +109,7 @@ pub fn noiseless_norm_lower_bound(
     largest_ratio(&nulling, &basis, &growing)
 }
 
+/// Checks the matrices of an observer; returns the numbers of states, of w and of z.
 pub(super) fn checked(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
@@ -117,7 +118,7 @@ pub(super) fn checked(
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
     let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-    performance.check((n, k), (r, n), (c.nrows(), k))?;
+    performance.check(n, (c.nrows(), k))?;
     Ok((n, k, r))
 }
 

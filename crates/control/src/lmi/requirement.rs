@@ -34,15 +34,10 @@ pub struct Synthesis {
 }
 
 impl Performance {
-    /// Checks the matrices against the given shapes, and the bound.
-    pub(super) fn check(
-        &self,
-        disturbance: (usize, usize),
-        output: (usize, usize),
-        feedthrough: (usize, usize),
-    ) -> Result<(), Error> {
-        check::shape("disturbance", &self.disturbance, disturbance)?;
-        check::shape("output", &self.output, output)?;
+    /// Checks the matrices for n states, with a feedthrough of the given shape, and the bound.
+    pub(super) fn check(&self, n: usize, feedthrough: (usize, usize)) -> Result<(), Error> {
+        check::shape("disturbance", &self.disturbance, (n, self.disturbance.ncols()))?;
+        check::shape("output", &self.output, (self.output.nrows(), n))?;
         check::shape("feedthrough", &self.feedthrough, feedthrough)?;
         check::positive("gamma", self.gamma.unwrap_or(1.0))
     }

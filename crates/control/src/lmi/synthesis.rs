@@ -77,8 +77,7 @@ pub fn observer_gain(
     check::shape("C", c, (c.nrows(), n))?;
     region.check(domain)?;
     if let Some(performance) = performance {
-        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-        performance.check((n, k), (r, n), (c.nrows(), k))?;
+        performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
     }
     let requirements =
         ObserverRequirements { a, c, region: *region, performance, domain, weighted: None };
@@ -127,8 +126,7 @@ pub fn state_feedback(
     check::shape("B", b, (n, b.ncols()))?;
     region.check(domain)?;
     if let Some(performance) = performance {
-        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-        performance.check((n, k), (r, n), (r, b.ncols()))?;
+        performance.check(n, (performance.output.nrows(), b.ncols()))?;
     }
     let dual = performance.map(Performance::transposed);
     let requirements = ObserverRequirements {

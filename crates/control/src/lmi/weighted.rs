@@ -143,7 +143,7 @@ impl ChannelWeights {
         check::shape("C", c, (c.nrows(), n))?;
         region.check(domain)?;
         let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-        performance.check((n, k), (r, n), (c.nrows(), k))?;
+        performance.check(n, (c.nrows(), k))?;
         let free = Performance { gamma: None, ..performance.clone() };
         let (wide_a, wide_c, wide) = self.extend(a, c, &free);
         let requirements = ObserverRequirements {
