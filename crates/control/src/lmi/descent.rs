@@ -2,9 +2,11 @@
 
 use super::limit;
 use super::region::Region;
+use super::synthesis::strictly_proper;
+use crate::Domain;
+use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::response::h_infinity;
-use crate::{Domain, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 
 const ITERATIONS: usize = 80;
@@ -42,13 +44,8 @@ impl GainNorm<'_> {
     pub(super) fn value(&self, gain: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
         let (n, order) = (gain.nrows(), self.a.nrows());
         let wide = gain.clone().resize_vertically(order, 0.0);
-        let system = StateSpace {
-            a: self.a - &wide * self.c,
-            b: self.b - &wide * self.d,
-            c: self.e.clone(),
-            d: DMatrix::zeros(self.e.nrows(), self.b.ncols()),
-            domain: self.domain,
-        };
+        let (a, b) = (self.a - &wide * self.c, self.b - &wide * self.d);
+        let system = strictly_proper(a, b, self.e.clone(), self.domain);
         let first = system.a.view((0, 0), (n, n)).into_owned();
         if !self.region.violated(&eigenvalues(&first).ok()?, self.domain).is_empty() {
             return None;
@@ -58,16 +55,15 @@ impl GainNorm<'_> {
             Domain::Continuous => Complex::new(0.0, norm.frequency),
             Domain::Sampled { period } => Complex::from_polar(1.0, norm.frequency * period),
         };
-        let complex = |m: &DMatrix<f64>| m.map(|entry| Complex::new(entry, 0.0));
-        let resolvent = (DMatrix::identity(order, order) * point - complex(&system.a)).lu();
-        let states = resolvent.solve(&complex(&system.b))?;
-        let transfer = complex(self.e) * &states;
+        let shifted = DMatrix::identity(order, order) * point - to_complex(&system.a);
+        let states = shifted.clone().lu().solve(&to_complex(&system.b))?;
+        let transfer = to_complex(self.e) * &states;
         let svd = transfer.svd(true, true);
         let (u, v) = (svd.u?.column(0).into_owned(), svd.v_t?.row(0).adjoint());
-        let measured = (complex(self.c) * states + complex(self.d)) * v;
+        let measured = (to_complex(self.c) * states + to_complex(self.d)) * v;
         // u' E R = (R' E' u)'
-        let turned = (DMatrix::identity(order, order) * point - complex(&system.a)).adjoint().lu();
-        let reached = turned.solve(&(complex(self.e).transpose() * u))?;
+        let turned = shifted.adjoint().lu();
+        let reached = turned.solve(&(to_complex(self.e).transpose() * u))?;
         let derivative =
             DMatrix::from_fn(n, gain.ncols(), |i, j| -(reached[i].conj() * measured[j]).re);
         Some((norm.upper, derivative))

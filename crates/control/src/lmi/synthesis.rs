@@ -1,6 +1,6 @@
 //! Gains from inequalities.
 
-use super::gain::{GainBound, Norm, certify_gain};
+use super::gain::{GainBound, certify_gain};
 use super::observer::{Candidate, ObserverRequirements};
 use super::region::{Region, certify_region};
 use super::requirement::{Performance, Synthesis};
@@ -85,15 +85,9 @@ pub fn observer_gain(
         let Candidate { gain, coordinates } = candidate;
         let dynamics = a - &gain * c;
         let bound = performance.map(|performance| Bound {
-            system: StateSpace {
-                a: dynamics.clone(),
-                b: &performance.disturbance - &gain * &performance.feedthrough,
-                c: performance.output.clone(),
-                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-                domain,
-            },
-            norm: performance.norm,
-            gamma: performance.gamma,
+            performance,
+            input: &performance.disturbance - &gain * &performance.feedthrough,
+            output: performance.output.clone(),
         });
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
@@ -141,26 +135,31 @@ pub fn state_feedback(
         let gain = -candidate.gain.transpose();
         let dynamics = a + b * &gain;
         let bound = performance.map(|performance| Bound {
-            system: StateSpace {
-                a: dynamics.clone(),
-                b: performance.disturbance.clone(),
-                c: &performance.output + &performance.feedthrough * &gain,
-                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
-                domain,
-            },
-            norm: performance.norm,
-            gamma: performance.gamma,
+            performance,
+            input: performance.disturbance.clone(),
+            output: &performance.output + &performance.feedthrough * &gain,
         });
         let coordinates = candidate.coordinates.transposed();
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
 }
 
-/// A bound to prove: that the norm of `system` is at most `gamma`, or any value if None.
-pub(super) struct Bound {
-    system: StateSpace,
-    norm: Norm,
-    gamma: Option<f64>,
+/// A bound to prove: that of `performance` for a closed loop from `input` to `output`.
+pub(super) struct Bound<'a> {
+    performance: &'a Performance,
+    input: DMatrix<f64>,
+    output: DMatrix<f64>,
+}
+
+/// The system {A, B, C, 0}.
+pub(super) fn strictly_proper(
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    domain: Domain,
+) -> StateSpace {
+    let d = DMatrix::zeros(c.nrows(), b.ncols());
+    StateSpace { a, b, c, d, domain }
 }
 
 /// Proves region and bound for the closed loop with a candidate gain.
@@ -171,7 +170,7 @@ pub(super) fn prove(
     candidate: Candidate,
     dynamics: &DMatrix<f64>,
     region: &Region,
-    bound: Option<Bound>,
+    bound: Option<Bound<'_>>,
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
     let Candidate { gain, coordinates } = candidate;
@@ -181,9 +180,10 @@ pub(super) fn prove(
         certificate => certificate,
     };
     let Some(region) = certificate else { return Ok(Outcome::Inconclusive(NOT_PROVEN)) };
-    let Some(Bound { system, norm, gamma }) = bound else {
+    let Some(Bound { performance: &Performance { norm, gamma, .. }, input, output }) = bound else {
         return Ok(Outcome::Optimal(Synthesis { gain, region, bound: None }));
     };
+    let system = strictly_proper(dynamics.clone(), input, output, domain);
     let is_met = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
     let bound = match gain::certify_in(coordinates, &system, norm)?.optimal().filter(is_met) {
         None => certify_gain(&system, norm)?.optimal().filter(is_met),

@@ -3,7 +3,7 @@
 use super::descent::GainNorm;
 use super::observer::{Candidate, ObserverRequirements, WeightedDynamics};
 use super::region::{Region, certify_region};
-use super::synthesis::prove;
+use super::synthesis::{prove, strictly_proper};
 use super::{Outcome, Performance, Synthesis, certify_gain, observer_gain};
 use crate::blocks::symmetric_part;
 use crate::riccati::kalman;
@@ -61,14 +61,9 @@ impl ChannelWeights {
         performance: &Performance,
     ) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
         let Performance { disturbance, output, feedthrough, norm, gamma } = performance;
-        let (r, k) = (output.nrows(), disturbance.ncols());
-        let StateSpace { a, b, c: e, .. } = self.around(&StateSpace {
-            a: a.clone(),
-            b: disturbance.clone(),
-            c: output.clone(),
-            d: DMatrix::zeros(r, k),
-            domain: self.input.domain,
-        });
+        let (b, e) = (disturbance.clone(), output.clone());
+        let plain = strictly_proper(a.clone(), b, e, self.input.domain);
+        let StateSpace { a, b, c: e, .. } = self.around(&plain);
         let measured = grid(&[&[
             c,
             &(feedthrough * &self.input.c),
@@ -142,8 +137,7 @@ impl ChannelWeights {
         let n = check::square("A", a)?;
         check::shape("C", c, (c.nrows(), n))?;
         region.check(domain)?;
-        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-        performance.check(n, (c.nrows(), k))?;
+        performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
         let free = Performance { gamma: None, ..performance.clone() };
         let (wide_a, wide_c, wide) = self.extend(a, c, &free);
         let requirements = ObserverRequirements {
@@ -197,14 +191,10 @@ impl ChannelWeights {
         if performance.gamma.is_some_and(|gamma| reached > gamma) {
             return Ok(Outcome::Inconclusive(NOT_KEPT));
         }
-        let system = self.around(&StateSpace {
-            a: a - &synthesis.gain * c,
-            b: &performance.disturbance - &synthesis.gain * &performance.feedthrough,
-            c: performance.output.clone(),
-            d: DMatrix::zeros(r, k),
-            domain,
-        });
-        synthesis.bound = certify_gain(&system, performance.norm)?.optimal();
+        let b = &performance.disturbance - &synthesis.gain * &performance.feedthrough;
+        let closed =
+            strictly_proper(a - &synthesis.gain * c, b, performance.output.clone(), domain);
+        synthesis.bound = certify_gain(&self.around(&closed), performance.norm)?.optimal();
         synthesis.bound = synthesis.bound.filter(|bound| bound.gamma <= LOOSE * reached);
         Ok(Outcome::Optimal(synthesis))
     }
