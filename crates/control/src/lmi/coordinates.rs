@@ -59,16 +59,14 @@ impl Coordinates {
         unit: f64,
     ) -> Result<Self, Error> {
         let (n, p) = (a.nrows(), c.nrows());
-        let inverse_norm = |norm: f64| if norm > 0.0 { 1.0 / power_of_two(norm) } else { 1.0 };
         let shifted = (a - DMatrix::identity(n, n) * mean_eigenvalue(a)) / speed;
-        let mut rows =
-            multiply_rows(c, &DVector::from_fn(p, |row, _| inverse_norm(c.row(row).norm())));
+        let mut rows = divide_rows(c, &row_units(c));
         let mut observability = DMatrix::zeros(n * (p + 1), n);
         for k in 0..n {
             observability.rows_mut(k * p, p).copy_from(&rows);
             rows *= &shifted;
         }
-        let scale = DVector::from_fn(n, |at, _| inverse_norm(observability.column(at).norm()));
+        let scale = DVector::from_fn(n, |at, _| 1.0 / unit_near(observability.column(at).norm()));
         observability = multiply_columns(&observability, &scale);
         let regularisation = observability.norm() / STRETCH;
         observability.rows_mut(n * p, n).fill_diagonal(regularisation);
@@ -151,6 +149,16 @@ impl Coordinates {
     pub(super) fn gain(&self, l: &DMatrix<f64>) -> DMatrix<f64> {
         &self.from * l * self.unit
     }
+}
+
+/// The power of two nearest to a size; 1 for 0.
+pub(super) fn unit_near(size: f64) -> f64 {
+    if size > 0.0 { power_of_two(size) } else { 1.0 }
+}
+
+/// Units of signals: powers of two near the lengths of the rows of a matrix.
+pub(super) fn row_units(m: &DMatrix<f64>) -> DVector<f64> {
+    DVector::from_fn(m.nrows(), |row, _| unit_near(m.row(row).norm()))
 }
 
 pub(super) fn mean_eigenvalue(a: &DMatrix<f64>) -> f64 {

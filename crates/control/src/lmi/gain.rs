@@ -1,11 +1,10 @@
 //! Bounds of the norm of a system, with certificates.
 
 use super::affine::Affine;
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, unit_near};
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Outcome, Problem};
-use crate::balance::power_of_two;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -139,8 +138,7 @@ pub(super) struct GainScaling {
 impl GainScaling {
     /// Units from B and C in the solver's coordinates.
     pub(super) fn new(norm: Norm, b: &DMatrix<f64>, c: &DMatrix<f64>, unit: f64) -> Self {
-        let size = |m: &DMatrix<f64>| if m.amax() > 0.0 { power_of_two(m.norm()) } else { 1.0 };
-        Self { norm, disturbance: size(b), output: size(c), unit }
+        Self { norm, disturbance: unit_near(b.norm()), output: unit_near(c.norm()), unit }
     }
 
     /// Unit of the disturbance.

@@ -1,11 +1,11 @@
 //! Lower bounds of the H-infinity norm that hold for every gain and every filter.
 
 use super::affine::Affine;
+use super::coordinates::unit_near;
 use super::definite::margin;
 use super::noiseless::checked;
 use super::region::MARGIN;
 use super::{Performance, Problem};
-use crate::balance::power_of_two;
 use crate::blocks::symmetric_part;
 use crate::rank::controllable_part;
 use crate::riccati::kalman;
@@ -153,8 +153,7 @@ impl HiddenDisturbance {
         let Some((a, b)) = solve(&self.a * scale).zip(solve(self.b.clone())) else {
             return Ok(None);
         };
-        let continuous = self.domain == Domain::Continuous;
-        let unit = if continuous && a.norm() > 0.0 { power_of_two(a.norm()) } else { 1.0 };
+        let unit = if self.domain == Domain::Continuous { unit_near(a.norm()) } else { 1.0 };
         let scaled = Self {
             a: a / unit,
             b: b / unit.sqrt(),

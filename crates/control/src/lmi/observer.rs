@@ -12,12 +12,12 @@
 //! feedback.
 
 use super::affine::Affine;
-use super::coordinates::{Coordinates, mean_eigenvalue};
+use super::coordinates::{Coordinates, mean_eigenvalue, row_units, unit_near};
 use super::gain::{GainInequality, GainScaling, Norm};
 use super::region::{Disc, MARGIN, Region};
 use super::requirement::{Performance, Synthesis};
 use super::{Outcome, Problem, Solution};
-use crate::balance::{divide_columns, divide_rows, power_of_two};
+use crate::balance::{divide_columns, divide_rows};
 use crate::eigen::eigenvalues;
 use crate::rank::observability;
 use crate::{Domain, Error};
@@ -128,8 +128,7 @@ pub(super) fn speed(
     };
     let disc = region.disc.map(|Disc { center, .. }| center);
     let target = disc.or(region.decay.map(limit)).unwrap_or(mean);
-    let speed = spread.max((target - mean).abs());
-    let speed = if speed > 0.0 { power_of_two(speed) } else { 1.0 };
+    let speed = unit_near(spread.max((target - mean).abs()));
     Ok((speed, if domain == Domain::Continuous { speed } else { 1.0 }))
 }
 /// The semidefinite program for L in given coordinates.
@@ -161,17 +160,12 @@ struct Program {
 
 impl<'a> ObserverProgram<'a> {
     fn new(requirements: ObserverRequirements<'a>, coordinates: Coordinates) -> Self {
-        let c = coordinates.output(requirements.c);
-        let units = DVector::from_fn(c.nrows(), |row, _| {
-            let norm = c.row(row).norm();
-            if norm > 0.0 { power_of_two(norm) } else { 1.0 }
-        });
+        let units = row_units(&coordinates.output(requirements.c));
         let extended = requirements.weighted.zip(requirements.performance);
         let extended = extended.map(|(WeightedDynamics { a, of_disturbance, .. }, performance)| {
             let order = coordinates.order();
             let output = performance.output.columns(0, order).into_owned();
-            let size = coordinates.output(&output).norm();
-            let size = if size > 0.0 { power_of_two(size) } else { 1.0 };
+            let size = unit_near(coordinates.output(&output).norm());
             coordinates.extended(&DVector::from_fn(a.nrows() - order, |at, _| {
                 if at < of_disturbance { 1.0 } else { size }
             }))

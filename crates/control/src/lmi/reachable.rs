@@ -1,10 +1,9 @@
 //! An ellipsoid that contains the reachable states of a family of systems.
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, unit_near};
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Affine, Outcome, Problem};
-use crate::balance::power_of_two;
 use crate::check::as_number;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
 use crate::stability::instability;
@@ -81,7 +80,7 @@ pub fn common_reachable_set(
         coordinates.unit = 1.0;
     }
     let scaled_b = coordinates.input(&b);
-    let size = if scaled_b.amax() > 0.0 { power_of_two(scaled_b.norm()) } else { 1.0 };
+    let size = unit_near(scaled_b.norm());
     let inequality = Reachability { b: scaled_b / size, rate: rate / coordinates.unit, domain };
     let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&mean))? else {
         return Ok(Outcome::Infeasible { conflict: vec!["rate"] });

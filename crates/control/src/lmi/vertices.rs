@@ -1,10 +1,10 @@
 //! One certificate, and one state feedback, for all members of a family of systems.
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, row_units};
 use super::observer::{Candidate, RELAXED_GAIN, norm_below, speed};
 use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
 use super::{Affine, Outcome, Problem};
-use crate::balance::{divide_columns, divide_rows, power_of_two};
+use crate::balance::{divide_columns, divide_rows};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
@@ -409,11 +409,7 @@ impl Synthesis<'_> {
 
     /// Units of the commands: powers of two near the lengths of the columns of B in the coordinates.
     fn units(&self, coordinates: &Coordinates) -> DVector<f64> {
-        let c = coordinates.output(&self.plants[0].b.transpose());
-        DVector::from_fn(c.nrows(), |row, _| {
-            let norm = c.row(row).norm();
-            if norm > 0.0 { power_of_two(norm) } else { 1.0 }
-        })
+        row_units(&coordinates.output(&self.plants[0].b.transpose()))
     }
 
     /// X >= I, the inequalities of `members`, and the size of Z.
