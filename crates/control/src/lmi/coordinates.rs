@@ -1,5 +1,6 @@
 //! Coordinates of the state in which the data of the solver are about one.
 
+use super::{Affine, Problem};
 use crate::Error;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
@@ -83,6 +84,11 @@ impl Coordinates {
         let root = p.clone().cholesky()?.l().transpose();
         let from = &self.from * inverse_of_upper(&root);
         Some(Self { to: root * &self.to, from, unit: self.unit })
+    }
+
+    /// Coordinates in which the most interior P~ = `p` of a program in these coordinates is the identity.
+    pub(super) fn refined_by(&self, problem: &Problem, p: &Affine) -> Option<Self> {
+        self.refined(&p.evaluate(&problem.most_interior()?))
     }
 
     /// Number of states.

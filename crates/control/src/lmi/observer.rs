@@ -16,7 +16,7 @@ use super::coordinates::{Coordinates, mean_eigenvalue, row_units, unit_near};
 use super::gain::{GainInequality, GainScaling, Norm};
 use super::region::{Disc, MARGIN, Region};
 use super::requirement::{Performance, Synthesis};
-use super::{Outcome, Problem, Solution};
+use super::{Outcome, Problem};
 use crate::balance::{divide_columns, divide_rows};
 use crate::eigen::eigenvalues;
 use crate::rank::observability;
@@ -27,8 +27,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 const RELAXED_BOUND: f64 = 1.05;
 /// The bound of norm(P L) within which a gain is designed, relative to the smallest one.
 pub(super) const RELAXED_GAIN: f64 = 2.0;
-/// How often the coordinates are refined before the search ends without a gain.
-const REFINEMENTS: usize = 3;
+/// How often the coordinates are refined before a search ends without an answer.
+pub(super) const REFINEMENTS: usize = 3;
 /// Bound of P and of norm(P L) in the solver's coordinates when a performance is required.
 const LARGEST: f64 = 1e6;
 
@@ -39,6 +39,13 @@ const NOT_DEFINITE: &str = "P is not positive definite in double precision";
 pub(super) struct Candidate {
     pub(super) gain: DMatrix<f64>,
     pub(super) coordinates: Coordinates,
+}
+
+impl Candidate {
+    /// K = -L' for the transposed system.
+    pub(super) fn transposed(&self) -> Self {
+        Self { gain: -self.gain.transpose(), coordinates: self.coordinates.transposed() }
+    }
 }
 
 /// The requirements on an observer gain L: eigenvalues of A - L C in `region`, and the norm of the
@@ -86,9 +93,11 @@ impl ObserverRequirements<'_> {
             if matches!(outcome, Outcome::Optimal(_)) {
                 return Ok(outcome);
             }
-            let refined =
-                if refinements < REFINEMENTS { program.refined_coordinates() } else { None };
-            let Some(refined) = refined else { return self.plausible(outcome) };
+            let refined = (refinements < REFINEMENTS).then(|| {
+                let Program { problem, p, .. } = program.program(None);
+                program.coordinates.refined_by(&problem, &p)
+            });
+            let Some(refined) = refined.flatten() else { return self.plausible(outcome) };
             coordinates = refined;
             refinements += 1;
         }
@@ -152,10 +161,30 @@ struct GainTerms {
 }
 
 /// A semidefinite program and its unknowns P (n x n) and Z (n x p).
-struct Program {
-    problem: Problem,
-    p: Affine,
-    z: Affine,
+pub(super) struct Program {
+    pub(super) problem: Problem,
+    pub(super) p: Affine,
+    pub(super) z: Affine,
+}
+
+impl Program {
+    /// L = P^-1 Z of the solution, in the coordinates of the data, from these coordinates with
+    /// measurements in `units`.
+    pub(super) fn solve(
+        &self,
+        coordinates: &Coordinates,
+        units: &DVector<f64>,
+    ) -> Result<Outcome<Candidate>, Error> {
+        self.problem.solve()?.then(|solution| {
+            let (p, z) = (solution.value(&self.p), solution.value(&self.z));
+            let parts = p.clone().cholesky().zip(coordinates.refined(&p));
+            let Some((factor, refined)) = parts else {
+                return Ok(Outcome::Inconclusive(NOT_DEFINITE));
+            };
+            let gain = coordinates.gain(&divide_columns(&factor.solve(&z), units));
+            Ok(Outcome::Optimal(Candidate { gain, coordinates: refined }))
+        })
+    }
 }
 
 impl<'a> ObserverProgram<'a> {
@@ -178,12 +207,6 @@ impl<'a> ObserverProgram<'a> {
         self.extended.as_ref().unwrap_or(&self.coordinates)
     }
 
-    /// Coordinates in which the most interior P of the program is the identity.
-    fn refined_coordinates(&self) -> Option<Coordinates> {
-        let Program { problem, p, .. } = self.program(None);
-        self.coordinates.refined(&p.evaluate(&problem.most_interior()?))
-    }
-
     /// Returns a gain that meets the given bound.
     ///
     /// Without a bound, the level is minimised. Then the gain with the largest margin of all
@@ -191,10 +214,11 @@ impl<'a> ObserverProgram<'a> {
     /// level is returned.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
+        let solve = |program: &Program| program.solve(&self.coordinates, &self.units);
         if let Some(performance) = performance
             && let Some(gamma) = performance.gamma
         {
-            return self.solve(&self.program(Some(self.scaling(performance).level(gamma))));
+            return solve(&self.program(Some(self.scaling(performance).level(gamma))));
         }
         let relaxation = match performance {
             None => RELAXED_GAIN,
@@ -203,27 +227,11 @@ impl<'a> ObserverProgram<'a> {
         };
         let program = self.program(None);
         if let Some((smallest, _)) = program.problem.minimum()
-            && let Outcome::Optimal(candidate) =
-                self.solve(&self.program(Some(smallest * relaxation)))?
+            && let Some(candidate) = solve(&self.program(Some(smallest * relaxation)))?.optimal()
         {
             return Ok(Outcome::Optimal(candidate));
         }
-        self.solve(&program)
-    }
-
-    fn solve(&self, program: &Program) -> Result<Outcome<Candidate>, Error> {
-        program.problem.solve()?.then(|solution| Ok(self.recovered(&solution, program)))
-    }
-
-    /// L = P^-1 Z, in the coordinates of the data.
-    fn recovered(&self, solution: &Solution, program: &Program) -> Outcome<Candidate> {
-        let (p, z) = (solution.value(&program.p), solution.value(&program.z));
-        let parts = p.clone().cholesky().zip(self.coordinates.refined(&p));
-        let Some((factor, coordinates)) = parts else {
-            return Outcome::Inconclusive(NOT_DEFINITE);
-        };
-        let l = divide_columns(&factor.solve(&z), &self.units);
-        Outcome::Optimal(Candidate { gain: self.coordinates.gain(&l), coordinates })
+        solve(&program)
     }
 
     /// The program at a given level, or with the level minimised.

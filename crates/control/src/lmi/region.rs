@@ -113,6 +113,20 @@ impl Region {
         parts.map(|(name, shape)| (name, shape.inequality(p, product))).collect()
     }
 
+    /// Adds the matrices of [`Self::inequalities`] to a program.
+    pub(super) fn constrain(
+        &self,
+        problem: &mut Problem,
+        p: &Affine,
+        product: &Affine,
+        domain: Domain,
+        unit: f64,
+    ) {
+        for (_, matrix) in self.inequalities(p, product, domain, unit) {
+            problem.constrain(&matrix, MARGIN);
+        }
+    }
+
     /// Whether the parts have a real interval in common.
     pub(super) fn has_real_numbers(&self, domain: Domain) -> bool {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -233,9 +247,7 @@ pub(super) fn certify_in(
     problem.constrain(&(&Affine::identity(n, 1.0) - &p), MARGIN);
     for a in vertices {
         let product = &p * &coordinates.dynamics(a);
-        for (_, matrix) in region.inequalities(&p, &product, domain, coordinates.unit) {
-            problem.constrain(&matrix, MARGIN);
-        }
+        region.constrain(&mut problem, &p, &product, domain, coordinates.unit);
     }
     let Some(solution) = problem.solve()?.optimal() else {
         return Ok(Outcome::Inconclusive(NO_P));

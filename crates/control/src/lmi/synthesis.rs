@@ -132,14 +132,13 @@ pub fn state_feedback(
         weighted: None,
     };
     requirements.search(|candidate| {
-        let gain = -candidate.gain.transpose();
+        let Candidate { gain, coordinates } = candidate.transposed();
         let dynamics = a + b * &gain;
         let bound = performance.map(|performance| Bound {
             performance,
             input: performance.disturbance.clone(),
             output: &performance.output + &performance.feedthrough * &gain,
         });
-        let coordinates = candidate.coordinates.transposed();
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
 }

@@ -1,17 +1,15 @@
 //! One certificate, and one state feedback, for all members of a family of systems.
 
 use super::coordinates::{Coordinates, row_units};
-use super::observer::{Candidate, RELAXED_GAIN, norm_below, speed};
+use super::observer::{Candidate, Program, REFINEMENTS, RELAXED_GAIN, norm_below, speed};
 use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
 use super::{Affine, Outcome, Problem};
-use crate::balance::{divide_columns, divide_rows};
+use crate::balance::divide_rows;
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// How often the coordinates are refined before a search ends without an answer.
-const REFINEMENTS: usize = 3;
 /// Bisections of [`largest_scaling`]: 1/128 of the family.
 const BISECTIONS: u32 = 7;
 
@@ -100,10 +98,32 @@ pub fn certify_common(
     if !outside.is_empty() {
         return Ok(Outcome::Infeasible { conflict: outside });
     }
-    let Some(coordinates) = Coordinates::of_dynamics(&vertices[0])? else {
+    let Some(mut coordinates) = Coordinates::of_dynamics(&vertices[0])? else {
         return Ok(Outcome::Inconclusive(NO_P));
     };
-    Analysis { vertices, region, domain }.certificate(coordinates)
+    // P >= I and the inequalities of some vertices.
+    let decision = |coordinates: &Coordinates, members: &[usize]| {
+        let mut problem = Problem::new();
+        let p = problem.symmetric(n);
+        problem.constrain(&p, 1.0);
+        for &at in members {
+            let product = &p * &coordinates.dynamics(&vertices[at]);
+            region.constrain(&mut problem, &p, &product, domain, coordinates.unit);
+        }
+        (problem, p)
+    };
+    let all: Vec<_> = (0..vertices.len()).collect();
+    for refinement in 0..=REFINEMENTS {
+        if let Some(certificate) = certify_in(&coordinates, vertices, region, domain)?.optimal() {
+            return Ok(Outcome::Optimal(certificate));
+        }
+        let (problem, p) = decision(&coordinates, &all);
+        match coordinates.refined_by(&problem, &p) {
+            Some(refined) if refinement < REFINEMENTS => coordinates = refined,
+            _ => break,
+        }
+    }
+    contradiction(all, |members| decision(&coordinates, members).0)
 }
 
 /// The certificate of [`certify_common`] if one is found at once, in the coordinates of the mean of the
@@ -126,9 +146,9 @@ pub(crate) fn find_common(
     let mean = vertices[1..].iter().fold(vertices[0].clone(), |sum, a| sum + a) / count;
     for a in [&mean, &vertices[0]] {
         let Some(coordinates) = Coordinates::of_dynamics(a)? else { continue };
-        let outcome = certify_in(&coordinates, vertices, region, domain)?;
-        if let Outcome::Optimal(certificate) = outcome {
-            return Ok(Some(certificate));
+        let certificate = certify_in(&coordinates, vertices, region, domain)?.optimal();
+        if certificate.is_some() {
+            return Ok(certificate);
         }
     }
     Ok(None)
@@ -138,50 +158,6 @@ fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     match first {
         Some(a) => check::square("A", a),
         None => Err(Error::Empty { matrix: "A", actual: (0, 0) }),
-    }
-}
-
-/// The search for a common P of given matrices.
-struct Analysis<'a> {
-    vertices: &'a [DMatrix<f64>],
-    region: &'a Region,
-    domain: Domain,
-}
-
-impl Analysis<'_> {
-    fn certificate(
-        &self,
-        mut coordinates: Coordinates,
-    ) -> Result<Outcome<RegionCertificate, usize>, Error> {
-        let all: Vec<_> = (0..self.vertices.len()).collect();
-        for refinement in 0..=REFINEMENTS {
-            let outcome = certify_in(&coordinates, self.vertices, self.region, self.domain)?;
-            if let Outcome::Optimal(certificate) = outcome {
-                return Ok(Outcome::Optimal(certificate));
-            }
-            let (problem, p) = self.decision(&coordinates, &all);
-            let refined = problem.most_interior().map(|unknowns| p.evaluate(&unknowns));
-            match refined.and_then(|p| coordinates.refined(&p)) {
-                Some(refined) if refinement < REFINEMENTS => coordinates = refined,
-                _ => break,
-            }
-        }
-        contradiction(all, |members| self.decision(&coordinates, members).0)
-    }
-
-    /// P >= I and the inequalities of some vertices.
-    fn decision(&self, coordinates: &Coordinates, members: &[usize]) -> (Problem, Affine) {
-        let mut problem = Problem::new();
-        let p = problem.symmetric(self.vertices[0].nrows());
-        problem.constrain(&p, 1.0);
-        for &at in members {
-            let product = &p * &coordinates.dynamics(&self.vertices[at]);
-            let matrices = self.region.inequalities(&p, &product, self.domain, coordinates.unit);
-            for (_, matrix) in matrices {
-                problem.constrain(&matrix, MARGIN);
-            }
-        }
-        (problem, p)
     }
 }
 
@@ -334,13 +310,6 @@ enum Size {
     Free,
 }
 
-/// A semidefinite program with its unknowns X (n x n) and Z (n x m).
-struct Program {
-    problem: Problem,
-    x: Affine,
-    z: Affine,
-}
-
 impl Synthesis<'_> {
     fn feedback(
         &self,
@@ -355,9 +324,8 @@ impl Synthesis<'_> {
                     return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
                 }
             }
-            let Program { problem, x, .. } = self.program(&coordinates, &all, Size::Least);
-            let refined = problem.most_interior().map(|unknowns| x.evaluate(&unknowns));
-            match refined.and_then(|x| coordinates.refined(&x)) {
+            let Program { problem, p, .. } = self.program(&coordinates, &all, Size::Least);
+            match coordinates.refined_by(&problem, &p) {
                 Some(refined) if refinement < REFINEMENTS => coordinates = refined,
                 _ => break,
             }
@@ -394,15 +362,9 @@ impl Synthesis<'_> {
         let Some((smallest, _)) = program.problem.minimum() else { return Ok(Vec::new()) };
         let relaxed = self.program(coordinates, members, Size::AtMost(smallest * RELAXED_GAIN));
         let mut candidates = Vec::new();
-        for Program { problem, x, z } in [relaxed, program] {
-            let Outcome::Optimal(solution) = problem.solve()? else { continue };
-            let (x, z) = (solution.value(&x), solution.value(&z));
-            let parts = x.clone().cholesky().zip(coordinates.refined(&x));
-            candidates.extend(parts.map(|(factor, refined)| {
-                let l = divide_columns(&factor.solve(&z), &units);
-                let gain = -coordinates.gain(&l).transpose();
-                Candidate { gain, coordinates: refined.transposed() }
-            }));
+        for program in [relaxed, program] {
+            let candidate = program.solve(coordinates, &units)?.optimal();
+            candidates.extend(candidate.map(|candidate| candidate.transposed()));
         }
         Ok(candidates)
     }
@@ -423,10 +385,7 @@ impl Synthesis<'_> {
             let Vertex { a, b } = &self.plants[at];
             let c = divide_rows(&coordinates.output(&b.transpose()), &units);
             let product = &(&x * &coordinates.dynamics(&a.transpose())) - &(&z * &c);
-            let matrices = self.region.inequalities(&x, &product, self.domain, coordinates.unit);
-            for (_, matrix) in matrices {
-                problem.constrain(&matrix, MARGIN);
-            }
+            self.region.constrain(&mut problem, &x, &product, self.domain, coordinates.unit);
         }
         match size {
             Size::Least => {
@@ -439,6 +398,6 @@ impl Synthesis<'_> {
             }
             Size::Free => {}
         }
-        Program { problem, x, z }
+        Program { problem, p: x, z }
     }
 }
