@@ -3,6 +3,7 @@
 use super::coordinates::Coordinates;
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
+use super::vertices::order;
 use super::{Affine, Problem};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
@@ -11,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Factor between the rates that [`largest_change`] tries, their number, and the bisections after them.
 const FACTOR: f64 = 0.25;
-const RATES: usize = 7;
+const RATES: i32 = 7;
 const BISECTIONS: usize = 3;
 
 /// A loop on an interval of its scheduling variable theta.
@@ -189,18 +190,17 @@ pub fn largest_change(
     intervals: &[Interval],
     domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
-    let limit = limit(intervals, domain)?;
-    let mut change = limit;
-    let mut certificate = None;
-    for _ in 0..RATES {
-        certificate = certify_schedule(intervals, change, domain)?;
-        if certificate.is_some() {
-            break;
+    let mut limit = check(intervals)?;
+    if domain == Domain::Continuous {
+        let mut fastest = f64::MIN_POSITIVE;
+        for a in intervals.iter().flat_map(|interval| &interval.coefficients) {
+            fastest = eigenvalues(a)?.iter().map(|value| value.norm()).fold(fastest, f64::max);
         }
-        change *= FACTOR;
+        limit *= fastest;
     }
-    let Some(mut best) = certificate else { return Ok(None) };
-    if change >= limit {
+    let proof = |rate| certify_schedule(intervals, limit * FACTOR.powi(rate), domain).transpose();
+    let Some(mut best) = (0..RATES).find_map(proof).transpose()? else { return Ok(None) };
+    if best.change >= limit {
         return Ok(Some(best));
     }
     let mut bad = best.change / FACTOR;
@@ -214,32 +214,14 @@ pub fn largest_change(
     Ok(Some(best))
 }
 
-/// The largest change that [`largest_change`] tries.
-fn limit(intervals: &[Interval], domain: Domain) -> Result<f64, Error> {
-    let shortest = check(intervals)?;
-    if domain != Domain::Continuous {
-        return Ok(shortest);
-    }
-    let mut fastest = f64::MIN_POSITIVE;
-    for a in intervals.iter().flat_map(|interval| &interval.coefficients) {
-        fastest = eigenvalues(a)?.iter().map(|value| value.norm()).fold(fastest, f64::max);
-    }
-    Ok(shortest * fastest)
-}
-
 /// The length of the shortest interval of a consistent list.
 fn check(intervals: &[Interval]) -> Result<f64, Error> {
-    let none = Error::Empty { matrix: "A", actual: (0, 0) };
-    let first = intervals.first().and_then(|interval| interval.coefficients.first());
-    let first = first.ok_or(none.clone())?;
-    let n = check::square("A", first)?;
+    let n = order(intervals.first().and_then(|interval| interval.coefficients.first()))?;
     let mut shortest = f64::INFINITY;
     for Interval { length, coefficients } in intervals {
         check::positive("length", *length)?;
         shortest = shortest.min(*length);
-        if coefficients.is_empty() {
-            return Err(none);
-        }
+        order(coefficients.first())?;
         for a in coefficients {
             check::square("A", a)?;
             check::shape("A", a, (n, n))?;
@@ -258,11 +240,9 @@ fn inequalities(
     let slope = |i: usize| &(&p[i + 1] - &p[i]) * (1.0 / intervals[i].length);
     let mut all = Vec::new();
     for (i, Interval { coefficients: a, .. }) in intervals.iter().enumerate() {
-        let right = (i + 1).min(intervals.len() - 1);
-        let left = i.saturating_sub(1);
-        let mut moves = vec![(i, change), (i, -change)];
-        moves.extend((right != i).then_some((right, change)));
-        moves.extend((left != i).then_some((left, -change)));
+        let right = (i + 1 < intervals.len()).then_some((i + 1, change));
+        let left = i.checked_sub(1).map(|left| (left, -change));
+        let moves = [(i, change), (i, -change)].into_iter().chain(right).chain(left);
         // The degree of P A is that of A and 1 more.
         let degree = a.len();
         for (interval, step) in moves {
@@ -273,14 +253,7 @@ fn inequalities(
                 let between = |[from, to]: [&Affine; 2]| &(from * (1.0 - t)) + &(to * t);
                 let now = between([&p[i], &p[i + 1]]);
                 let then = between([&ends[0], &ends[1]]);
-                let (n, _) = now.shape();
-                let mut product = Affine::zeros(n, n);
-                if j < degree {
-                    product = &product + &(&times(&ends[0], &a[j]) * (1.0 - t));
-                }
-                if j > 0 {
-                    product = &product + &(&times(&ends[1], &a[j - 1]) * t);
-                }
+                let product = product(&ends, a, j, &times);
                 all.push(Affine::blocks(&[&[&now, &product.transpose()], &[&product, &then]]));
             }
         }
@@ -288,23 +261,31 @@ fn inequalities(
     all
 }
 
+/// The Bernstein coefficient j of P A, of the degree of A and 1 more, with P linear between `p[0]` and `p[1]`.
+fn product(
+    p: &[Affine],
+    a: &[DMatrix<f64>],
+    j: usize,
+    times: &impl Fn(&Affine, &DMatrix<f64>) -> Affine,
+) -> Affine {
+    let (t, (rows, cols)) = (as_number(j) / as_number(a.len()), p[0].shape());
+    let mut product = Affine::zeros(rows, cols);
+    if j < a.len() {
+        product = &product + &(&times(&p[0], &a[j]) * (1.0 - t));
+    }
+    if j > 0 {
+        product = &product + &(&times(&p[1], &a[j - 1]) * t);
+    }
+    product
+}
+
 /// The Bernstein coefficients of -(A' P + P A + D) in continuous time.
 fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
     let mut all = Vec::new();
     for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {
         let slope = &(&p[i + 1] - &p[i]) * (rate / length);
-        let degree = a.len();
-        for j in 0..=degree {
-            let t = as_number(j) / as_number(degree);
-            let (n, _) = slope.shape();
-            let mut product = Affine::zeros(n, n);
-            if j < degree {
-                product = &product + &(&(&p[i] * &a[j]) * (1.0 - t));
-            }
-            if j > 0 {
-                product = &product + &(&(&p[i + 1] * &a[j - 1]) * t);
-            }
-            let sum = &product + &product.transpose();
+        for j in 0..=a.len() {
+            let sum = product(&p[i..], a, j, &|p, a| p * a).plus_transpose();
             all.extend([-&(&sum + &slope), -&(&sum - &slope)]);
         }
     }

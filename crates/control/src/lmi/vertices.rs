@@ -154,7 +154,8 @@ pub(crate) fn find_common(
     Ok(None)
 }
 
-fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
+/// The order of the first matrix of a family, which must be square.
+pub(super) fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     match first {
         Some(a) => check::square("A", a),
         None => Err(Error::Empty { matrix: "A", actual: (0, 0) }),
