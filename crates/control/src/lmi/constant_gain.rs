@@ -1,10 +1,12 @@
 //! A constant gain for a family of systems.
 
+use super::observer::norm_below;
 use super::{Affine, Problem};
 use crate::blocks::to_complex;
 use crate::response::{frequency_response, h_infinity};
-use crate::{Error, StateSpace, check};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
+use std::f64::consts::PI;
 
 const ROUNDS: usize = 60;
 /// Smallest relative width of a norm that is computed.
@@ -71,11 +73,8 @@ pub fn constant_gain(
         return Err(Error::Shape { matrix: "fixed", expected, actual });
     }
     let width = width.max(1e-5);
-    let mut points = Vec::new();
-    for system in family {
-        points.push(response(system, 0.0)?);
-        points.push(response(system, f64::INFINITY)?);
-    }
+    let ends = |system| [0.0, f64::INFINITY].map(|frequency| response(system, frequency));
+    let mut points = family.iter().flat_map(ends).collect::<Result<Vec<_>, _>>()?;
     let mut best: Option<ConstantGain> = None;
     for _ in 0..ROUNDS {
         let what = "the program for a constant gain";
@@ -83,7 +82,9 @@ pub fn constant_gain(
             .ok_or(Error::NotConverged { what, iterations: ROUNDS })?;
         let mut norms = Vec::with_capacity(family.len());
         for system in family {
-            let norm = h_infinity(&error_system(system, &gain, target), NORM_WIDTH)?;
+            // Q G - M.
+            let (c, d) = (&gain * &system.c, &gain * &system.d - target);
+            let norm = h_infinity(&StateSpace { c, d, ..system.clone() }, NORM_WIDTH)?;
             norms.push(norm.upper);
             if norm.lower > bound * (1.0 + 0.5 * width) {
                 points.push(response(system, norm.frequency)?);
@@ -102,21 +103,13 @@ pub fn constant_gain(
     Err(Error::NotConverged { what: "the exchange of frequencies", iterations: ROUNDS })
 }
 
-/// Q G - M.
-fn error_system(system: &StateSpace, gain: &DMatrix<f64>, target: &DMatrix<f64>) -> StateSpace {
-    StateSpace { c: gain * &system.c, d: gain * &system.d - target, ..system.clone() }
-}
-
 /// G at one frequency.
 fn response(system: &StateSpace, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
-    if frequency.is_infinite() {
-        return Ok(match system.domain {
-            crate::Domain::Continuous => to_complex(&system.d),
-            crate::Domain::Sampled { period } => {
-                frequency_response(system, &[std::f64::consts::PI / period])?.remove(0).gain
-            }
-        });
-    }
+    let frequency = match system.domain {
+        Domain::Continuous if frequency.is_infinite() => return Ok(to_complex(&system.d)),
+        Domain::Sampled { period } if frequency.is_infinite() => PI / period,
+        _ => frequency,
+    };
     Ok(frequency_response(system, &[frequency])?.remove(0).gain)
 }
 
@@ -127,7 +120,7 @@ fn minimum(
     fixed: &[(usize, usize, f64)],
     r: usize,
 ) -> Option<(f64, DMatrix<f64>)> {
-    let (s, m) = target.shape();
+    let s = target.nrows();
     // Entries of Q in units in which the rows of G have length one.
     let length = |row: usize| points.iter().map(|g| g.row(row).norm()).fold(0.0, f64::max);
     let units: Vec<f64> =
@@ -152,11 +145,7 @@ fn minimum(
         let real = &(&gain * &g.map(|entry| entry.re)) - &Affine::constant(target);
         let imaginary = &gain * &g.map(|entry| entry.im);
         let x = Affine::blocks(&[&[&real, &-&imaginary], &[&imaginary, &real]]);
-        let (above, below) = (
-            level.times(&DMatrix::identity(2 * s, 2 * s)),
-            level.times(&DMatrix::identity(2 * m, 2 * m)),
-        );
-        problem.constrain(&Affine::blocks(&[&[&above, &x], &[&x.transpose(), &below]]), 0.0);
+        problem.constrain(&norm_below(&x, &level), 0.0);
     }
     let (bound, unknowns) = problem.minimum()?;
     Some((bound, gain.evaluate(&unknowns)))
