@@ -226,7 +226,7 @@ impl HiddenDisturbance {
 }
 
 /// tr(M X).
-fn product_trace(x: &Affine, m: &DMatrix<f64>) -> Affine {
+pub(super) fn product_trace(x: &Affine, m: &DMatrix<f64>) -> Affine {
     let terms = x.terms.iter().map(|(at, unit)| (*at, DMatrix::from_element(1, 1, m.dot(unit))));
     Affine { constant: DMatrix::from_element(1, 1, m.dot(&x.constant)), terms: terms.collect() }
 }

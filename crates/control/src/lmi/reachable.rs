@@ -2,6 +2,7 @@
 
 use super::coordinates::{Coordinates, unit_near};
 use super::definite::{AccurateProduct, margin};
+use super::lower_bound::product_trace;
 use super::region::MARGIN;
 use super::{Affine, Outcome, Problem};
 use crate::check::as_number;
@@ -176,10 +177,7 @@ fn objective(q: &Affine, outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> Affi
             weight += row.tr_mul(&row) / size;
         }
     }
-    (0..n).fold(Affine::zeros(1, 1), |sum, i| {
-        let unit = DMatrix::from_fn(n, 1, |k, _| if k == i { 1.0 } else { 0.0 });
-        &sum + &(&weight.row(i).into_owned().resize_vertically(1, 0.0) * &(q * &unit))
-    })
+    product_trace(q, &weight)
 }
 
 /// The mean of square matrices of equal size.
