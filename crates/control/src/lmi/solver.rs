@@ -36,7 +36,7 @@ pub(super) fn minimise(
     let unknowns = objective.len();
     let mut cones = Vec::with_capacity(matrices.len());
     let mut right = Vec::new();
-    let mut columns = vec![Vec::new(); unknowns];
+    let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for matrix in matrices {
         let order = matrix.shape().0;
         cones.push(if order == 1 {
@@ -45,21 +45,18 @@ pub(super) fn minimise(
             Cone::PSDTriangleConeT(order)
         });
         for (unknown, m) in &matrix.terms {
-            let entries = triangle(m).into_iter().enumerate().filter(|(_, value)| *value != 0.0);
-            columns[*unknown].extend(entries.map(|(row, value)| (right.len() + row, -value)));
+            for (row, value) in triangle(m).into_iter().enumerate() {
+                if value != 0.0 {
+                    rows.push(right.len() + row);
+                    columns.push(*unknown);
+                    values.push(-value);
+                }
+            }
         }
         right.extend(triangle(&matrix.constant));
     }
-    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
-    for column in columns {
-        for (row, value) in column {
-            rows.push(row);
-            values.push(value);
-        }
-        starts.push(rows.len());
-    }
     let program = Program {
-        left: CscMatrix::new(right.len(), unknowns, starts, rows, values),
+        left: CscMatrix::new_from_triplets(right.len(), unknowns, rows, columns, values),
         right,
         costs: objective.as_slice().to_vec(),
         cones,
