@@ -161,8 +161,7 @@ impl Problem {
         {
             return Ok(Outcome::Optimal(solution));
         }
-        let all: Vec<_> = self.requirements.iter().collect();
-        let Some((slack, unknowns)) = self.largest_slack(&all) else {
+        let Some((slack, unknowns)) = self.largest_slack(&self.requirements) else {
             return Ok(Outcome::Inconclusive(if limit::is_over() {
                 "its time was over"
             } else {
@@ -200,24 +199,24 @@ impl Problem {
     /// The unknowns as far inside of all requirements as possible, or as little outside, not
     /// verified.
     pub(super) fn most_interior(&self) -> Option<DVector<f64>> {
-        let all: Vec<_> = self.requirements.iter().collect();
-        Some(self.largest_slack(&all)?.1)
+        Some(self.largest_slack(&self.requirements)?.1)
     }
 
     /// The largest common slack, at most one, and the unknowns there.
-    fn largest_slack(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
+    fn largest_slack<'a>(
+        &self,
+        requirements: impl IntoIterator<Item = &'a Requirement>,
+    ) -> Option<(f64, DVector<f64>)> {
         let mut extended = self.clone();
         let slack = extended.scalar();
         let mut matrices: Vec<_> =
-            requirements.iter().map(|each| each.semidefinite(Some(&slack))).collect();
+            requirements.into_iter().map(|each| each.semidefinite(Some(&slack))).collect();
         matrices.push(&Affine::identity(1, 1.0) - &slack);
         let mut costs = DVector::zeros(extended.unknowns);
         costs[self.unknowns] = -1.0;
         let (unknowns, end) = minimise(&costs, &matrices)?;
-        if end == End::Stalled {
-            return None;
-        }
-        Some((unknowns[self.unknowns], unknowns.rows(0, self.unknowns).into_owned()))
+        (end == End::Solved)
+            .then(|| (unknowns[self.unknowns], unknowns.rows(0, self.unknowns).into_owned()))
     }
 
     fn conflict(&self) -> Vec<&'static str> {
@@ -229,12 +228,9 @@ impl Problem {
         }
         for candidate in names.clone() {
             let rest: Vec<_> = names.iter().copied().filter(|name| *name != candidate).collect();
-            let others: Vec<_> = self
-                .requirements
-                .iter()
-                .filter(|each| each.name.is_none_or(|name| rest.contains(&name)))
-                .collect();
-            if self.largest_slack(&others).is_some_and(|(slack, _)| slack < -UNDECIDED) {
+            let remains = |each: &&Requirement| each.name.is_none_or(|name| rest.contains(&name));
+            let others = self.requirements.iter().filter(remains);
+            if self.largest_slack(others).is_some_and(|(slack, _)| slack < -UNDECIDED) {
                 names = rest;
             }
         }
