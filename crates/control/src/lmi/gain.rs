@@ -10,7 +10,7 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 /// Levels, relative to the smallest, that are tried in turn when the P of the smallest cannot be
-/// verified. errors.
+/// verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
 const NO_P: &str = "no bound of the gain could be proven in double precision";
@@ -66,6 +66,7 @@ impl GainInequality {
         let (inputs, outputs) = (self.input.shape().1, self.output.shape().0);
         let level = |order: usize| self.level.times(&DMatrix::identity(order, order));
         let one = |order: usize| Affine::identity(order, 1.0);
+        let zero = |cols: usize| Affine::zeros(self.p.shape().0, cols);
         let (turned, feedthrough) = (self.output.transpose(), self.feedthrough.transpose());
         let Self { p, dynamics, input, .. } = self;
         let decay = || -&dynamics.plus_transpose();
@@ -75,41 +76,36 @@ impl GainInequality {
                 &[&level(inputs), &-&feedthrough],
                 &[&level(outputs)],
             ])],
-            (Norm::HInfinity, false) => {
-                let zero = Affine::zeros(p.shape().0, inputs);
-                vec![upper(&[
-                    &[p, dynamics, input, &Affine::zeros(p.shape().0, outputs)],
-                    &[p, &zero, &turned],
-                    &[&level(inputs), &feedthrough],
-                    &[&level(outputs)],
-                ])]
-            }
+            (Norm::HInfinity, false) => vec![upper(&[
+                &[p, dynamics, input, &zero(outputs)],
+                &[p, &zero(inputs), &turned],
+                &[&level(inputs), &feedthrough],
+                &[&level(outputs)],
+            ])],
             (Norm::EnergyToPeak, true) => vec![
                 upper(&[&[&decay(), &-input], &[&one(inputs)]]),
                 upper(&[&[p, &turned], &[&level(outputs)]]),
             ],
-            (Norm::EnergyToPeak, false) => {
-                let zero = Affine::zeros(p.shape().0, inputs);
-                vec![
-                    upper(&[&[p, dynamics, input], &[p, &zero], &[&one(inputs)]]),
-                    upper(&[
-                        &[p, &zero, &turned],
-                        &[&one(inputs), &feedthrough],
-                        &[&level(outputs)],
-                    ]),
-                ]
-            }
+            (Norm::EnergyToPeak, false) => vec![
+                upper(&[&[p, dynamics, input], &[p, &zero(inputs)], &[&one(inputs)]]),
+                upper(&[
+                    &[p, &zero(inputs), &turned],
+                    &[&one(inputs), &feedthrough],
+                    &[&level(outputs)],
+                ]),
+            ],
             (Norm::ImpulseToEnergy, true) => vec![
                 upper(&[&[&decay(), &turned], &[&one(outputs)]]),
                 upper(&[&[p, input], &[&level(inputs)]]),
             ],
-            (Norm::ImpulseToEnergy, false) => {
-                let zero = Affine::zeros(p.shape().0, outputs);
-                vec![
-                    upper(&[&[p, dynamics, &zero], &[p, &turned], &[&one(outputs)]]),
-                    upper(&[&[p, input, &zero], &[&level(inputs), &feedthrough], &[&one(outputs)]]),
-                ]
-            }
+            (Norm::ImpulseToEnergy, false) => vec![
+                upper(&[&[p, dynamics, &zero(outputs)], &[p, &turned], &[&one(outputs)]]),
+                upper(&[
+                    &[p, input, &zero(outputs)],
+                    &[&level(inputs), &feedthrough],
+                    &[&one(outputs)],
+                ]),
+            ],
         }
     }
 }
@@ -130,7 +126,7 @@ fn upper(rows: &[&[&Affine]]) -> Affine {
 /// Units of disturbance, output and time for the solver, and the conversion of bounds and of P.
 pub(super) struct GainScaling {
     norm: Norm,
-    disturbance: f64,
+    pub(super) disturbance: f64,
     output: f64,
     unit: f64,
 }
@@ -139,11 +135,6 @@ impl GainScaling {
     /// Units from B and C in the solver's coordinates.
     pub(super) fn new(norm: Norm, b: &DMatrix<f64>, c: &DMatrix<f64>, unit: f64) -> Self {
         Self { norm, disturbance: unit_near(b.norm()), output: unit_near(c.norm()), unit }
-    }
-
-    /// Unit of the disturbance.
-    pub(super) fn disturbance(&self) -> f64 {
-        self.disturbance
     }
 
     /// Unit of the bound gamma.
@@ -182,17 +173,6 @@ impl GainScaling {
         let (w, z) = (self.disturbance, self.output);
         (b / w, c / z, d / (w * z))
     }
-}
-
-/// Checks the system, and that D is zero where the norm would be infinite otherwise.
-fn check(system: &StateSpace, norm: Norm) -> Result<(), Error> {
-    system.check()?;
-    let value = system.d.amax();
-    if system.domain == Domain::Continuous && norm != Norm::HInfinity && value > 0.0 {
-        let rule = "zero: the norm is infinite otherwise";
-        return Err(Error::OutOfRange { name: "D", value, rule });
-    }
-    Ok(())
 }
 
 /// Computes the smallest bound gamma of the norm of a system from w to z, with its certificate.
@@ -244,7 +224,12 @@ fn check(system: &StateSpace, norm: Norm) -> Result<(), Error> {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`]
 /// for a D other than zero where the norm is infinite; [`Error::NotConverged`].
 pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound>, Error> {
-    check(system, norm)?;
+    system.check()?;
+    let value = system.d.amax();
+    if system.domain == Domain::Continuous && norm != Norm::HInfinity && value > 0.0 {
+        let rule = "zero: the norm is infinite otherwise";
+        return Err(Error::OutOfRange { name: "D", value, rule });
+    }
     if instability(&system.a, system.domain)? >= 0.0 {
         return Ok(Outcome::Infeasible { conflict: vec!["stability"] });
     }
@@ -325,47 +310,38 @@ impl<'a> BoundProblem<'a> {
         (problem, p, value)
     }
 
-    /// The bound at `level`, if P proves it.
+    /// The bound at `level`, if P proves it in the units of the data.
+    ///
+    /// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms
+    /// have cancelled. The constant blocks appear in the matrices of the low part too and are
+    /// subtracted.
     fn verified(&self, level: f64, p: &DMatrix<f64>) -> Result<Option<GainBound>, Error> {
-        let gamma = self.scaling.gamma(level);
+        let (system, gamma) = (self.system, self.scaling.gamma(level));
         let p = self.coordinates.certificate(p) * self.scaling.certificate();
-        verify(self.system, self.norm, gamma, p)
-    }
-}
-
-/// Verifies the inequalities for P and gamma in the units of the data.
-///
-/// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms
-/// have cancelled. The constant blocks appear in the matrices of the low part too and are
-/// subtracted.
-fn verify(
-    system: &StateSpace,
-    norm: Norm,
-    gamma: f64,
-    p: DMatrix<f64>,
-) -> Result<Option<GainBound>, Error> {
-    let (dynamics, input) =
-        (AccurateProduct::new(&p, &system.a), AccurateProduct::new(&p, &system.b));
-    let matrices = |part: f64, p: &DMatrix<f64>, dynamics: &DMatrix<f64>, input: &DMatrix<f64>| {
-        let level = if norm == Norm::HInfinity { gamma } else { gamma * gamma };
-        GainInequality {
-            p: Affine::constant(p),
-            dynamics: Affine::constant(dynamics),
-            input: Affine::constant(input),
-            output: Affine::constant(&(&system.c * part)),
-            feedthrough: Affine::constant(&(&system.d * part)),
-            level: Affine::identity(1, level * part),
+        let (dynamics, input) =
+            (AccurateProduct::new(&p, &system.a), AccurateProduct::new(&p, &system.b));
+        let matrices =
+            |part: f64, p: &DMatrix<f64>, dynamics: &DMatrix<f64>, input: &DMatrix<f64>| {
+                let level = if self.norm == Norm::HInfinity { gamma } else { gamma * gamma };
+                GainInequality {
+                    p: Affine::constant(p),
+                    dynamics: Affine::constant(dynamics),
+                    input: Affine::constant(input),
+                    output: Affine::constant(&(&system.c * part)),
+                    feedthrough: Affine::constant(&(&system.d * part)),
+                    level: Affine::identity(1, level * part),
+                }
+                .matrices(self.norm, system.domain)
+            };
+        let zero = DMatrix::zeros(p.nrows(), p.nrows());
+        let rounded = matrices(1.0, &p, &dynamics.high, &input.high);
+        let corrections = matrices(0.0, &zero, &dynamics.low, &input.low);
+        let constants = matrices(0.0, &zero, &zero, &(&input.low * 0.0));
+        let mut smallest = margin(&p)?;
+        for ((matrix, correction), constant) in rounded.iter().zip(&corrections).zip(&constants) {
+            let exact = &matrix.constant + (&correction.constant - &constant.constant);
+            smallest = smallest.min(margin(&exact)?);
         }
-        .matrices(norm, system.domain)
-    };
-    let zero = DMatrix::zeros(p.nrows(), p.nrows());
-    let rounded = matrices(1.0, &p, &dynamics.high, &input.high);
-    let corrections = matrices(0.0, &zero, &dynamics.low, &input.low);
-    let constants = matrices(0.0, &zero, &zero, &(&input.low * 0.0));
-    let mut smallest = margin(&p)?;
-    for ((matrix, correction), constant) in rounded.iter().zip(&corrections).zip(&constants) {
-        let exact = &matrix.constant + (&correction.constant - &constant.constant);
-        smallest = smallest.min(margin(&exact)?);
+        Ok((smallest > 0.0).then_some(GainBound { gamma, p, margin: smallest }))
     }
-    Ok((smallest > 0.0).then_some(GainBound { gamma, p, margin: smallest }))
 }

@@ -307,7 +307,7 @@ impl<'a> ObserverProgram<'a> {
             &self.of_norm().output(&performance.output),
             &performance.feedthrough,
         );
-        let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance();
+        let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance;
         let inequality = GainInequality {
             input: &(&p * &b) - &(&z * &d_y),
             p,
