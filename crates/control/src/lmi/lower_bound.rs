@@ -5,6 +5,7 @@ use super::coordinates::unit_near;
 use super::definite::margin;
 use super::noiseless::checked;
 use super::region::MARGIN;
+use super::weighted::grid;
 use super::{Performance, Problem};
 use crate::blocks::symmetric_part;
 use crate::rank::controllable_part;
@@ -73,10 +74,8 @@ pub fn observer_norm_lower_bound(
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
     checked(a, c, performance)?;
-    match HiddenDisturbance::new(a, c, performance, domain)? {
-        Some(hidden) => hidden.largest_ratio(),
-        None => Ok(None),
-    }
+    let hidden = HiddenDisturbance::new(a, c, performance, domain)?;
+    hidden.map_or(Ok(None), |hidden| hidden.largest_ratio())
 }
 
 /// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of
@@ -188,10 +187,7 @@ impl HiddenDisturbance {
 
     /// [A, B].
     fn next(&self) -> DMatrix<f64> {
-        let (order, free) = self.b.shape();
-        let mut next = self.a.clone().resize_horizontally(order + free, 0.0);
-        next.columns_mut(order, free).copy_from(&self.b);
-        next
+        grid(&[&[&self.a, &self.b]])
     }
 
     /// A X + X A' + B Y + Y' B' of the covariance [X, Y'; Y, U]; sampled: [A, B] [X, Y'; Y, U]

@@ -84,26 +84,7 @@ impl ChannelWeights {
     pub fn transposed(&self) -> Self {
         Self { input: self.output.dual(), output: self.input.dual() }
     }
-}
 
-/// The matrix of the given blocks, row by row.
-fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
-    let height = rows.iter().map(|row| row[0].nrows()).sum();
-    let width = rows[0].iter().map(|block| block.ncols()).sum();
-    let mut whole = DMatrix::zeros(height, width);
-    let mut top = 0;
-    for row in rows {
-        let mut left = 0;
-        for block in *row {
-            whole.view_mut((top, left), block.shape()).copy_from(block);
-            left += block.ncols();
-        }
-        top += row[0].nrows();
-    }
-    whole
-}
-
-impl ChannelWeights {
     /// An observer gain L as by [`super::observer_gain`], for an H-infinity norm with weights.
     ///
     /// `performance`: as there, with [`super::Norm::HInfinity`].
@@ -221,6 +202,23 @@ impl ChannelWeights {
             Ok(Outcome::Optimal(Synthesis { gain, ..synthesis }))
         })
     }
+}
+
+/// The matrix of the given blocks, row by row.
+pub(super) fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
+    let height = rows.iter().map(|row| row[0].nrows()).sum();
+    let width = rows[0].iter().map(|block| block.ncols()).sum();
+    let mut whole = DMatrix::zeros(height, width);
+    let mut top = 0;
+    for row in rows {
+        let mut left = 0;
+        for block in *row {
+            whole.view_mut((top, left), block.shape()).copy_from(block);
+            left += block.ncols();
+        }
+        top += row[0].nrows();
+    }
+    whole
 }
 
 /// The first n rows of the gain of the Kalman filter, if there is one.
