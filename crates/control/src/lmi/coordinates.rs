@@ -5,6 +5,7 @@ use crate::Error;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
+use crate::blocks::symmetric_part;
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::svd::Svd;
@@ -41,8 +42,7 @@ impl Coordinates {
             p += power.transpose() * &p * &power;
             power = &power * &power;
         }
-        let p = (&p + p.transpose()) * 0.5;
-        let Some(factor) = p.cholesky() else { return Ok(None) };
+        let Some(factor) = symmetric_part(&p).cholesky() else { return Ok(None) };
         let root = factor.l().transpose();
         let inverse = inverse_of_upper(&root);
         let unit = power_of_two(center.abs() + radius);
@@ -120,8 +120,7 @@ impl Coordinates {
         inverse: &DMatrix<f64>,
         unit: f64,
     ) -> Self {
-        let from = DMatrix::from_fn(root.nrows(), root.nrows(), |i, j| scale[i] * inverse[(i, j)]);
-        Self { to: divide_columns(root, scale), from, unit }
+        Self { to: divide_columns(root, scale), from: multiply_rows(inverse, scale), unit }
     }
 
     /// A~ = T A T^-1 / unit.
@@ -141,14 +140,12 @@ impl Coordinates {
 
     /// P = T' P~ T.
     pub(super) fn certificate(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
-        let p = self.to.transpose() * p * &self.to;
-        (&p + p.transpose()) * 0.5
+        symmetric_part(&(self.to.transpose() * p * &self.to))
     }
 
     /// Q = T^-1 Q~ T'^-1.
     pub(super) fn shape(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
-        let q = &self.from * q * self.from.transpose();
-        (&q + q.transpose()) * 0.5
+        symmetric_part(&(&self.from * q * self.from.transpose()))
     }
 
     /// L = T^-1 L~ unit for the error dynamics A - L C.

@@ -18,8 +18,7 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// not round. The entries of S may have relative errors of a few units of rounding. The margin is
 /// set to zero unless it exceeds 16 n^2 units of rounding of the largest entry.
 pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
-    let scale: Vec<f64> =
-        s.diagonal().iter().map(|&entry| 1.0 / power_of_two(entry.sqrt())).collect();
+    let scale = s.diagonal().map(|entry| 1.0 / power_of_two(entry.sqrt()));
     if !scale.iter().all(|factor| factor.is_normal()) || s.iter().any(|entry| !entry.is_finite()) {
         return Ok(0.0);
     }
