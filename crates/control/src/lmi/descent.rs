@@ -62,8 +62,7 @@ impl GainNorm<'_> {
         let (u, v) = (svd.u?.column(0).into_owned(), svd.v_t?.row(0).adjoint());
         let measured = (to_complex(self.c) * states + to_complex(self.d)) * v;
         // u' E R = (R' E' u)'
-        let turned = shifted.adjoint().lu();
-        let reached = turned.solve(&(to_complex(self.e).transpose() * u))?;
+        let reached = shifted.adjoint().lu().solve(&(to_complex(self.e).transpose() * u))?;
         let derivative =
             DMatrix::from_fn(n, gain.ncols(), |i, j| -(reached[i].conj() * measured[j]).re);
         Some((norm.upper, derivative))

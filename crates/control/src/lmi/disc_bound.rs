@@ -80,7 +80,7 @@ pub fn disc_norm_lower_bound(
     if c.nrows() == k && constant {
         let Zeros { finite, rank } = zeros(a, b, c)?;
         let eigenvalues = Inverses {
-            count: n,
+            count: order,
             least: slowest_rate(disc, decay),
             largest: 1.0 / (-center - radius).max(decay).max(0.0),
         };
@@ -94,7 +94,7 @@ pub fn disc_norm_lower_bound(
 
 /// The range of Re(-1 / s) of the eigenvalues s; the upper end may be infinite.
 struct Inverses {
-    count: usize,
+    count: f64,
     least: f64,
     largest: f64,
 }
@@ -102,16 +102,16 @@ struct Inverses {
 impl Inverses {
     /// The logarithm of the largest product of 1 / (1 + a v) over all v with this sum.
     fn largest_log(&self, sum: f64, a: f64) -> f64 {
-        let free = (sum - as_number(self.count) * self.least).max(0.0);
+        let free = (sum - self.count * self.least).max(0.0);
         let width = self.largest - self.least;
         let of = |v: f64| -(a * v).ln_1p();
         let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
-        if at_end >= as_number(self.count) {
-            return as_number(self.count) * of(self.largest);
+        if at_end >= self.count {
+            return self.count * of(self.largest);
         }
         let ends = if at_end > 0.0 { at_end * of(self.largest) } else { 0.0 };
         let left = if at_end > 0.0 { free - at_end * width } else { free };
-        ends + of(self.least + left) + (as_number(self.count) - at_end - 1.0) * of(self.least)
+        ends + of(self.least + left) + (self.count - at_end - 1.0) * of(self.least)
     }
 }
 
@@ -133,8 +133,8 @@ fn by_zeros(eigenvalues: &Inverses, zeros: &[Complex<f64>], sizes: &DVector<f64>
             .map(|point| at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
             .fold(0.0, f64::max)
     };
-    let count = as_number(eigenvalues.count);
-    let [mut low, mut high] = [eigenvalues.least, eigenvalues.largest].map(|end| count * end);
+    let [mut low, mut high] =
+        [eigenvalues.least, eigenvalues.largest].map(|end| eigenvalues.count * end);
     if low <= 0.0 {
         return 0.0;
     }

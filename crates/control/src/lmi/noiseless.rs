@@ -136,9 +136,8 @@ fn largest_ratio(
     let Some(factor) = of_w.cholesky() else { return Ok(None) };
     let lower = factor.l();
     let solve = |m: &DMatrix<f64>| lower.solve_lower_triangular(m);
-    let Some(half) = solve(&of_z) else { return Ok(None) };
-    let Some(ratios) = solve(&half.transpose()) else { return Ok(None) };
-    let ratios = symmetric_part(&ratios);
+    let ratios = solve(&of_z).and_then(|half| solve(&half.transpose()));
+    let Some(ratios) = ratios.as_ref().map(symmetric_part) else { return Ok(None) };
     check::finite("P_w^-1 P_z", &ratios)?;
     let largest = SymmetricEigen::new(ratios).eigenvalues.max().max(0.0);
     Ok(Some(largest.sqrt() * (1.0 - ROUNDING)))

@@ -8,7 +8,7 @@ use super::{Affine, Problem};
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Factor between the rates that [`largest_change`] tries, their number, and the bisections after them.
 const FACTOR: f64 = 0.25;
@@ -325,8 +325,8 @@ fn verified(
             let times = |p: &Affine, a: &DMatrix<f64>| {
                 Affine::constant(&AccurateProduct::new(&p.constant, a).high)
             };
-            let all = inequalities(intervals, &known, change, times);
-            all.iter().map(|matrix| matrix.evaluate(&DVector::zeros(0))).collect()
+            let all = inequalities(intervals, &known, change, times).into_iter();
+            all.map(|matrix| matrix.constant).collect()
         }
     };
     let mut smallest = f64::INFINITY;

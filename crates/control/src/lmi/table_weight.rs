@@ -66,8 +66,7 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
     }
     let unit = (first * last).sqrt();
     let points = interpolated(table);
-    let size = points.iter().map(|(_, m)| m.ln()).sum::<f64>() / as_number(points.len());
-    let size = size.exp();
+    let size = (points.iter().map(|(_, m)| m.ln()).sum::<f64>() / as_number(points.len())).exp();
     let fit = |deviation: f64| {
         let scaled = points.iter().map(|(w, m)| ((w / unit).powi(2), (m / size).powi(2)));
         coefficients(&scaled.collect::<Vec<_>>(), order, deviation.powi(2))
@@ -82,9 +81,8 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
             None => low = middle,
         }
     }
-    let Some((numerator, denominator)) = best else {
-        return Err(Error::NotConverged { what: "the weight of a table", iterations: 1 });
-    };
+    let what = "the weight of a table";
+    let (numerator, denominator) = best.ok_or(Error::NotConverged { what, iterations: 1 })?;
     let lead = denominator[0];
     let monic = |all: &[f64], factor: f64| all.iter().map(|one| one * factor / lead).collect();
     let weight = Weight::from_coefficients(monic(&numerator, size), monic(&denominator, 1.0), unit);
@@ -95,16 +93,13 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
 
 /// The table with further points between its own.
 fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut points = Vec::new();
-    for pair in table.windows(2) {
+    let before_last = table.windows(2).flat_map(|pair| {
         let ((w, m), (w_next, m_next)) = (pair[0], pair[1]);
-        for at in 0..BETWEEN {
-            let part = as_number(at) / as_number(BETWEEN);
-            points.push((w * (w_next / w).powf(part), m * (m_next / m).powf(part)));
-        }
-    }
-    points.extend(table.last());
-    points
+        let part = |at| as_number(at) / as_number(BETWEEN);
+        let between = move |part| (w * (w_next / w).powf(part), m * (m_next / m).powf(part));
+        (0..BETWEEN).map(part).map(between)
+    });
+    before_last.chain(table.last().copied()).collect()
 }
 
 /// Coefficients of numerator and denominator in p, the highest power first, whose squared magnitude is
