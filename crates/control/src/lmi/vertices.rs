@@ -163,8 +163,7 @@ pub(super) fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
 }
 
 /// The members that contradict each other, each of them necessary, the first ones if there is a choice;
-/// inconclusive if the program of
-/// all members is not infeasible.
+/// inconclusive if the program of all members is not infeasible.
 fn contradiction<T>(
     all: Vec<usize>,
     program: impl Fn(&[usize]) -> Problem,
@@ -250,8 +249,27 @@ pub fn common_feedback(
     region.check(domain)?;
     let (a, c) = (plants[0].a.transpose(), plants[0].b.transpose());
     let (speed, unit) = speed(&a, region, domain)?;
-    let coordinates = Coordinates::of_observation(&a, &c, speed, unit)?;
-    Synthesis { plants, region, domain }.feedback(coordinates)
+    let mut coordinates = Coordinates::of_observation(&a, &c, speed, unit)?;
+    let search = Synthesis { plants, region, domain };
+    let all: Vec<_> = (0..plants.len()).collect();
+    let mut proposed = false;
+    for refinement in 0..=REFINEMENTS {
+        let program = search.program(&coordinates, &all, Size::Least);
+        for Candidate { gain, coordinates } in search.candidates(&program, &coordinates, &all)? {
+            proposed = true;
+            if let Some(certificate) = search.proof(&gain, &coordinates)? {
+                return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
+            }
+        }
+        match coordinates.refined_by(&program.problem, &program.p) {
+            Some(refined) if refinement < REFINEMENTS => coordinates = refined,
+            _ => break,
+        }
+    }
+    if proposed {
+        return Ok(Outcome::Inconclusive(NOT_PROVEN));
+    }
+    contradiction(all, |members| search.program(&coordinates, members, Size::Free).problem)
 }
 
 /// The largest scaling, from 0 to 1, of a family around its first member for which
@@ -277,7 +295,7 @@ pub fn largest_scaling(
             Vertex { a: &from.a + (&to.a - &from.a) * s, b: &from.b + (&to.b - &from.b) * s }
         };
         let scaled: Vec<_> = plants.iter().map(scaled).collect();
-        Ok::<_, Error>(common_feedback(&scaled, region, domain)?.optimal().is_some())
+        common_feedback(&scaled, region, domain).map(|outcome| outcome.optimal().is_some())
     };
     if feasible(1.0)? {
         return Ok(Some(1.0));
@@ -312,31 +330,6 @@ enum Size {
 }
 
 impl Synthesis<'_> {
-    fn feedback(
-        &self,
-        mut coordinates: Coordinates,
-    ) -> Result<Outcome<CommonFeedback, usize>, Error> {
-        let all: Vec<_> = (0..self.plants.len()).collect();
-        let mut proposed = false;
-        for refinement in 0..=REFINEMENTS {
-            for Candidate { gain, coordinates } in self.candidates(&coordinates, &all)? {
-                proposed = true;
-                if let Some(certificate) = self.proof(&gain, &coordinates)? {
-                    return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
-                }
-            }
-            let Program { problem, p, .. } = self.program(&coordinates, &all, Size::Least);
-            match coordinates.refined_by(&problem, &p) {
-                Some(refined) if refinement < REFINEMENTS => coordinates = refined,
-                _ => break,
-            }
-        }
-        if proposed {
-            return Ok(Outcome::Inconclusive(NOT_PROVEN));
-        }
-        contradiction(all, |members| self.program(&coordinates, members, Size::Free).problem)
-    }
-
     /// One P for the closed loops, first in the coordinates of the gain, then in others.
     fn proof(
         &self,
@@ -344,8 +337,7 @@ impl Synthesis<'_> {
         coordinates: &Coordinates,
     ) -> Result<Option<RegionCertificate>, Error> {
         let closed: Vec<_> = self.plants.iter().map(|Vertex { a, b }| a + b * gain).collect();
-        let outcome = certify_in(coordinates, &closed, self.region, self.domain)?;
-        match outcome.optimal() {
+        match certify_in(coordinates, &closed, self.region, self.domain)?.optimal() {
             None => Ok(certify_common(&closed, self.region, self.domain)?.optimal()),
             certificate => Ok(certificate),
         }
@@ -355,15 +347,15 @@ impl Synthesis<'_> {
     /// interior one for a norm of Z up to twice the smallest, and the one of the smallest norm.
     fn candidates(
         &self,
+        program: &Program,
         coordinates: &Coordinates,
         members: &[usize],
     ) -> Result<Vec<Candidate>, Error> {
         let units = self.units(coordinates);
-        let program = self.program(coordinates, members, Size::Least);
         let Some((smallest, _)) = program.problem.minimum() else { return Ok(Vec::new()) };
         let relaxed = self.program(coordinates, members, Size::AtMost(smallest * RELAXED_GAIN));
         let mut candidates = Vec::new();
-        for program in [relaxed, program] {
+        for program in [&relaxed, program] {
             let candidate = program.solve(coordinates, &units)?.optimal();
             candidates.extend(candidate.map(|candidate| candidate.transposed()));
         }
