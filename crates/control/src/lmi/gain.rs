@@ -289,10 +289,7 @@ impl<'a> BoundProblem<'a> {
         let (system, coordinates) = (self.system, &self.coordinates);
         let mut problem = Problem::new();
         let p = problem.symmetric(system.a.nrows());
-        let value = level.map_or_else(|| problem.scalar(), |value| Affine::identity(1, value));
-        if level.is_none() {
-            problem.minimise(&value);
-        }
+        let level = problem.level(level);
         let (b, c) = (coordinates.input(&system.b), coordinates.output(&system.c));
         let (b, c, d) = self.scaling.scale(&b, &c, &system.d);
         let terms = GainInequality {
@@ -300,14 +297,14 @@ impl<'a> BoundProblem<'a> {
             input: &p * &b,
             output: Affine::constant(&c),
             feedthrough: Affine::constant(&d),
-            level: value.clone(),
+            level: level.clone(),
             p: p.clone(),
         };
         problem.constrain(&p, MARGIN);
         for matrix in terms.matrices(self.norm, self.system.domain) {
             problem.constrain(&matrix, MARGIN);
         }
-        (problem, p, value)
+        (problem, p, level)
     }
 
     /// The bound at `level`, if P proves it in the units of the data.

@@ -168,6 +168,13 @@ pub(super) struct Program {
 }
 
 impl Program {
+    /// Requires a norm of Z of at most a level, or the least one.
+    pub(super) fn with_norm(mut self, level: Option<f64>) -> Self {
+        let level = self.problem.level(level);
+        self.problem.constrain(&norm_below(&self.z, &level), MARGIN);
+        self
+    }
+
     /// L = P^-1 Z of the solution, in the coordinates of the data, from these coordinates with
     /// measurements in `units`.
     pub(super) fn solve(
@@ -252,13 +259,7 @@ impl<'a> ObserverProgram<'a> {
         for (name, matrix) in region.inequalities(&p, &dynamics, domain, self.coordinates.unit) {
             problem.require(name, &matrix, MARGIN);
         }
-        let level = if let Some(value) = level {
-            Affine::identity(1, value)
-        } else {
-            let unknown = problem.scalar();
-            problem.minimise(&unknown);
-            unknown
-        };
+        let level = problem.level(level);
         if let Some(performance) = performance {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);

@@ -149,6 +149,16 @@ impl Problem {
         self.objective = Some(objective.clone());
     }
 
+    /// A known number, or without one an unknown that is minimised; of one row and column.
+    pub(super) fn level(&mut self, value: Option<f64>) -> Affine {
+        if let Some(value) = value {
+            return Affine::identity(1, value);
+        }
+        let unknown = self.scalar();
+        self.minimise(&unknown);
+        unknown
+    }
+
     /// Solves the program; without an objective, computes an x as far inside of all requirements as
     /// possible.
     ///

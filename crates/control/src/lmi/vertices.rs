@@ -1,9 +1,9 @@
 //! One certificate, and one state feedback, for all members of a family of systems.
 
 use super::coordinates::{Coordinates, row_units};
-use super::observer::{Candidate, Program, REFINEMENTS, RELAXED_GAIN, norm_below, speed};
-use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
-use super::{Affine, Outcome, Problem};
+use super::observer::{Candidate, Program, REFINEMENTS, RELAXED_GAIN, speed};
+use super::region::{NO_P, Region, RegionCertificate, certify_in};
+use super::{Outcome, Problem};
 use crate::balance::divide_rows;
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
@@ -254,7 +254,7 @@ pub fn common_feedback(
     let all: Vec<_> = (0..plants.len()).collect();
     let mut proposed = false;
     for refinement in 0..=REFINEMENTS {
-        let program = search.program(&coordinates, &all, Size::Least);
+        let program = search.program(&coordinates, &all).with_norm(None);
         for Candidate { gain, coordinates } in search.candidates(&program, &coordinates, &all)? {
             proposed = true;
             if let Some(certificate) = search.proof(&gain, &coordinates)? {
@@ -269,7 +269,7 @@ pub fn common_feedback(
     if proposed {
         return Ok(Outcome::Inconclusive(NOT_PROVEN));
     }
-    contradiction(all, |members| search.program(&coordinates, members, Size::Free).problem)
+    contradiction(all, |members| search.program(&coordinates, members).problem)
 }
 
 /// The largest scaling, from 0 to 1, of a family around its first member for which
@@ -318,17 +318,6 @@ struct Synthesis<'a> {
     domain: Domain,
 }
 
-/// What a program requires of the norm of Z.
-#[derive(Clone, Copy)]
-enum Size {
-    /// The least one.
-    Least,
-    /// At most this.
-    AtMost(f64),
-    /// Nothing.
-    Free,
-}
-
 impl Synthesis<'_> {
     /// One P for the closed loops, first in the coordinates of the gain, then in others.
     fn proof(
@@ -353,7 +342,7 @@ impl Synthesis<'_> {
     ) -> Result<Vec<Candidate>, Error> {
         let units = self.units(coordinates);
         let Some((smallest, _)) = program.problem.minimum() else { return Ok(Vec::new()) };
-        let relaxed = self.program(coordinates, members, Size::AtMost(smallest * RELAXED_GAIN));
+        let relaxed = self.program(coordinates, members).with_norm(Some(smallest * RELAXED_GAIN));
         let mut candidates = Vec::new();
         for program in [&relaxed, program] {
             let candidate = program.solve(coordinates, &units)?.optimal();
@@ -367,8 +356,8 @@ impl Synthesis<'_> {
         row_units(&coordinates.output(&self.plants[0].b.transpose()))
     }
 
-    /// X >= I, the inequalities of `members`, and the size of Z.
-    fn program(&self, coordinates: &Coordinates, members: &[usize], size: Size) -> Program {
+    /// X >= I and the inequalities of `members`.
+    fn program(&self, coordinates: &Coordinates, members: &[usize]) -> Program {
         let units = self.units(coordinates);
         let (n, m) = self.plants[0].b.shape();
         let mut problem = Problem::new();
@@ -379,17 +368,6 @@ impl Synthesis<'_> {
             let c = divide_rows(&coordinates.output(&b.transpose()), &units);
             let product = &(&x * &coordinates.dynamics(&a.transpose())) - &(&z * &c);
             self.region.constrain(&mut problem, &x, &product, self.domain, coordinates.unit);
-        }
-        match size {
-            Size::Least => {
-                let level = problem.scalar();
-                problem.minimise(&level);
-                problem.constrain(&norm_below(&z, &level), MARGIN);
-            }
-            Size::AtMost(level) => {
-                problem.constrain(&norm_below(&z, &Affine::identity(1, level)), MARGIN);
-            }
-            Size::Free => {}
         }
         Program { problem, p: x, z }
     }
