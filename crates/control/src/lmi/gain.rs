@@ -246,17 +246,15 @@ pub(super) fn certify_in(
     norm: Norm,
 ) -> Result<Outcome<GainBound>, Error> {
     let search = BoundProblem::new(coordinates, system, norm);
-    let (problem, p, level) = search.problem(None);
+    let (problem, p) = search.problem(None);
     let Some((smallest, unknowns)) = problem.minimum() else {
         return Ok(Outcome::Inconclusive(NO_P));
     };
-    if let Some(bound) =
-        search.verified(level.evaluate(&unknowns)[(0, 0)], &p.evaluate(&unknowns))?
-    {
+    if let Some(bound) = search.verified(smallest, &p.evaluate(&unknowns))? {
         return Ok(Outcome::Optimal(bound));
     }
     for relaxation in RELAXED_LEVELS {
-        let (problem, p, _) = search.problem(Some(smallest * relaxation));
+        let (problem, p) = search.problem(Some(smallest * relaxation));
         if let Outcome::Optimal(solution) = problem.solve()?
             && let Some(bound) = search.verified(smallest * relaxation, &solution.value(&p))?
         {
@@ -284,12 +282,11 @@ impl<'a> BoundProblem<'a> {
         Self { system, norm, coordinates, scaling }
     }
 
-    /// The program, its P, and its level: a given number, or an unknown that is minimised.
-    fn problem(&self, level: Option<f64>) -> (Problem, Affine, Affine) {
+    /// The program and its P at a given level, or with the level minimised.
+    fn problem(&self, level: Option<f64>) -> (Problem, Affine) {
         let (system, coordinates) = (self.system, &self.coordinates);
         let mut problem = Problem::new();
         let p = problem.symmetric(system.a.nrows());
-        let level = problem.level(level);
         let (b, c) = (coordinates.input(&system.b), coordinates.output(&system.c));
         let (b, c, d) = self.scaling.scale(&b, &c, &system.d);
         let terms = GainInequality {
@@ -297,14 +294,14 @@ impl<'a> BoundProblem<'a> {
             input: &p * &b,
             output: Affine::constant(&c),
             feedthrough: Affine::constant(&d),
-            level: level.clone(),
+            level: problem.level(level),
             p: p.clone(),
         };
         problem.constrain(&p, MARGIN);
         for matrix in terms.matrices(self.norm, self.system.domain) {
             problem.constrain(&matrix, MARGIN);
         }
-        (problem, p, level)
+        (problem, p)
     }
 
     /// The bound at `level`, if P proves it in the units of the data.
