@@ -66,8 +66,7 @@ impl AccurateProduct {
                     error += x.mul_add(y, -term) + lost;
                     sum = next;
                 }
-                let (high, low) = two_sum(sum, error);
-                (product.high[(row, col)], product.low[(row, col)]) = (high, low);
+                (product.high[(row, col)], product.low[(row, col)]) = two_sum(sum, error);
             }
         }
         product

@@ -181,15 +181,13 @@ impl Problem {
         if slack < -UNDECIDED {
             return Ok(Outcome::Infeasible { conflict: self.conflict() });
         }
-        match self.verified(Some(unknowns))? {
-            None => {
-                Ok(Outcome::Inconclusive("the requirements are met or missed by a rounding error"))
-            }
-            Some(_) if self.objective.is_some() => Ok(Outcome::Inconclusive(
+        Ok(match self.verified(Some(unknowns))? {
+            None => Outcome::Inconclusive("the requirements are met or missed by a rounding error"),
+            Some(_) if self.objective.is_some() => Outcome::Inconclusive(
                 "the requirements can be met, but the smallest value is not found",
-            )),
-            Some(solution) => Ok(Outcome::Optimal(solution)),
-        }
+            ),
+            Some(solution) => Outcome::Optimal(solution),
+        })
     }
 
     /// The smallest value of the objective and the unknowns there, as computed by the solver and

@@ -60,7 +60,7 @@ impl ChannelWeights {
         c: &DMatrix<f64>,
         performance: &Performance,
     ) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
-        let Performance { disturbance, output, feedthrough, norm, gamma } = performance;
+        let Performance { disturbance, output, feedthrough, .. } = performance;
         let (b, e) = (disturbance.clone(), output.clone());
         let plain = strictly_proper(a.clone(), b, e, self.input.domain);
         let StateSpace { a, b, c: e, .. } = self.around(&plain);
@@ -73,8 +73,7 @@ impl ChannelWeights {
             disturbance: b,
             output: e,
             feedthrough: feedthrough * &self.input.d,
-            norm: *norm,
-            gamma: *gamma,
+            ..performance.clone()
         };
         (a, measured, performance)
     }
@@ -149,10 +148,7 @@ impl ChannelWeights {
             domain,
         };
         let inequalities = [plain, by_norm];
-        let starts = inequalities.iter().filter_map(|outcome| match outcome {
-            Outcome::Optimal(synthesis) => Some(synthesis.gain.clone()),
-            _ => None,
-        });
+        let starts = inequalities.iter().filter_map(|one| Some(one.clone().optimal()?.gain));
         let mut candidates = Vec::new();
         for start in starts.chain(kalman_gain(&norm, n)) {
             let lower = norm.descend(&start);
@@ -165,7 +161,7 @@ impl ChannelWeights {
         let most = performance.gamma.map_or(NEARLY_LEAST * least, |gamma| gamma.max(least));
         let good = candidates.into_iter().filter(|(value, _)| *value <= most);
         let smallest = good.min_by(|one, other| one.1.gain.norm().total_cmp(&other.1.gain.norm()));
-        let Some((reached, mut synthesis)) = smallest else {
+        let Some((reached, synthesis)) = smallest else {
             let [_, by_norm] = inequalities;
             return Ok(by_norm);
         };
@@ -175,9 +171,9 @@ impl ChannelWeights {
         let b = &performance.disturbance - &synthesis.gain * &performance.feedthrough;
         let closed =
             strictly_proper(a - &synthesis.gain * c, b, performance.output.clone(), domain);
-        synthesis.bound = certify_gain(&self.around(&closed), performance.norm)?.optimal();
-        synthesis.bound = synthesis.bound.filter(|bound| bound.gamma <= LOOSE * reached);
-        Ok(Outcome::Optimal(synthesis))
+        let bound = certify_gain(&self.around(&closed), performance.norm)?.optimal();
+        let bound = bound.filter(|bound| bound.gamma <= LOOSE * reached);
+        Ok(Outcome::Optimal(Synthesis { bound, ..synthesis }))
     }
 
     /// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not
