@@ -82,14 +82,13 @@ pub fn observer_gain(
     let requirements =
         ObserverRequirements { a, c, region: *region, performance, domain, weighted: None };
     requirements.search(|candidate| {
-        let Candidate { gain, coordinates } = candidate;
-        let dynamics = a - &gain * c;
+        let dynamics = a - &candidate.gain * c;
         let bound = performance.map(|performance| Bound {
             performance,
-            input: &performance.disturbance - &gain * &performance.feedthrough,
+            input: &performance.disturbance - &candidate.gain * &performance.feedthrough,
             output: performance.output.clone(),
         });
-        prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
+        prove(candidate, &dynamics, region, bound, domain)
     })
 }
 
@@ -132,14 +131,14 @@ pub fn state_feedback(
         weighted: None,
     };
     requirements.search(|candidate| {
-        let Candidate { gain, coordinates } = candidate.transposed();
-        let dynamics = a + b * &gain;
+        let candidate = candidate.transposed();
+        let dynamics = a + b * &candidate.gain;
         let bound = performance.map(|performance| Bound {
             performance,
             input: performance.disturbance.clone(),
-            output: &performance.output + &performance.feedthrough * &gain,
+            output: &performance.output + &performance.feedthrough * &candidate.gain,
         });
-        prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
+        prove(candidate, &dynamics, region, bound, domain)
     })
 }
 

@@ -120,17 +120,15 @@ impl ChannelWeights {
         performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
         let free = Performance { gamma: None, ..performance.clone() };
         let (wide_a, wide_c, wide) = self.extend(a, c, &free);
+        let of_disturbance = self.input.a.nrows();
+        let weighted = Some(WeightedDynamics { a: &wide_a, c: &wide_c, of_disturbance });
         let requirements = ObserverRequirements {
             a,
             c,
             region: *region,
             performance: Some(&wide),
             domain,
-            weighted: Some(WeightedDynamics {
-                a: &wide_a,
-                c: &wide_c,
-                of_disturbance: self.input.a.nrows(),
-            }),
+            weighted,
         };
         let proven = |candidate: Candidate| {
             let dynamics = a - &candidate.gain * c;
@@ -138,15 +136,8 @@ impl ChannelWeights {
         };
         let by_norm = requirements.search(proven)?;
         let plain = observer_gain(a, c, region, None, domain)?;
-        let norm = GainNorm {
-            a: &wide_a,
-            b: &wide.disturbance,
-            c: &wide_c,
-            d: &wide.feedthrough,
-            e: &wide.output,
-            region,
-            domain,
-        };
+        let Performance { disturbance: b, feedthrough: d, output: e, .. } = &wide;
+        let norm = GainNorm { a: &wide_a, b, c: &wide_c, d, e, region, domain };
         let inequalities = [plain, by_norm];
         let starts = inequalities.iter().filter_map(|one| Some(one.clone().optimal()?.gain));
         let mut candidates = Vec::new();
