@@ -1,7 +1,6 @@
 //! Coordinates of the state in which the data of the solver are about one.
 
 use super::{Affine, Problem};
-use crate::Error;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
@@ -9,6 +8,7 @@ use crate::blocks::symmetric_part;
 use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::svd::Svd;
+use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Radius of the disc around the eigenvalues, relative to the smallest possible.
@@ -152,6 +152,11 @@ impl Coordinates {
     pub(super) fn gain(&self, l: &DMatrix<f64>) -> DMatrix<f64> {
         &self.from * l * self.unit
     }
+}
+
+/// The unit of frequency of a program: 1 in sampled time.
+pub(super) fn time_unit(domain: Domain, unit: f64) -> f64 {
+    if domain == Domain::Continuous { unit } else { 1.0 }
 }
 
 /// The power of two nearest to a size; 1 for 0.

@@ -1,7 +1,7 @@
 //! Bounds of the norm of a system, with certificates.
 
 use super::affine::Affine;
-use super::coordinates::{Coordinates, unit_near};
+use super::coordinates::{Coordinates, time_unit, unit_near};
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Outcome, Problem};
@@ -274,9 +274,7 @@ struct BoundProblem<'a> {
 
 impl<'a> BoundProblem<'a> {
     fn new(mut coordinates: Coordinates, system: &'a StateSpace, norm: Norm) -> Self {
-        if system.domain != Domain::Continuous {
-            coordinates.unit = 1.0;
-        }
+        coordinates.unit = time_unit(system.domain, coordinates.unit);
         let (b, c) = (coordinates.input(&system.b), coordinates.output(&system.c));
         let scaling = GainScaling::new(norm, &b, &c, coordinates.unit);
         Self { system, norm, coordinates, scaling }

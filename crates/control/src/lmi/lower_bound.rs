@@ -1,7 +1,7 @@
 //! Lower bounds of the H-infinity norm that hold for every gain and every filter.
 
 use super::affine::Affine;
-use super::coordinates::unit_near;
+use super::coordinates::{time_unit, unit_near};
 use super::definite::margin;
 use super::noiseless::checked;
 use super::region::MARGIN;
@@ -152,7 +152,7 @@ impl HiddenDisturbance {
         let Some((a, b)) = solve(&self.a * scale).zip(solve(self.b.clone())) else {
             return Ok(None);
         };
-        let unit = if self.domain == Domain::Continuous { unit_near(a.norm()) } else { 1.0 };
+        let unit = time_unit(self.domain, unit_near(a.norm()));
         let scaled = Self {
             a: a / unit,
             b: b / unit.sqrt(),

@@ -12,7 +12,7 @@
 //! feedback.
 
 use super::affine::Affine;
-use super::coordinates::{Coordinates, mean_eigenvalue, row_units, unit_near};
+use super::coordinates::{Coordinates, mean_eigenvalue, row_units, time_unit, unit_near};
 use super::gain::{GainInequality, GainScaling, Norm};
 use super::region::{Disc, MARGIN, Region};
 use super::requirement::{Performance, Synthesis};
@@ -138,8 +138,9 @@ pub(super) fn speed(
     let disc = region.disc.map(|Disc { center, .. }| center);
     let target = disc.or(region.decay.map(limit)).unwrap_or(mean);
     let speed = unit_near(spread.max((target - mean).abs()));
-    Ok((speed, if domain == Domain::Continuous { speed } else { 1.0 }))
+    Ok((speed, time_unit(domain, speed)))
 }
+
 /// The semidefinite program for L in given coordinates.
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,

@@ -1,6 +1,6 @@
 //! An ellipsoid that contains the reachable states of a family of systems.
 
-use super::coordinates::{Coordinates, unit_near};
+use super::coordinates::{Coordinates, time_unit, unit_near};
 use super::definite::{AccurateProduct, margin};
 use super::lower_bound::product_trace;
 use super::region::MARGIN;
@@ -77,9 +77,7 @@ pub fn common_reachable_set(
     let Some(mut coordinates) = Coordinates::of_dynamics(&mean)? else {
         return Ok(Outcome::Inconclusive(NOT_PROVEN));
     };
-    if domain != Domain::Continuous {
-        coordinates.unit = 1.0;
-    }
+    coordinates.unit = time_unit(domain, coordinates.unit);
     let scaled_b = coordinates.input(&b);
     let size = unit_near(scaled_b.norm());
     let inequality = Reachability { b: scaled_b / size, rate: rate / coordinates.unit, domain };

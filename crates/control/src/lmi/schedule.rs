@@ -1,6 +1,6 @@
 //! The certificate of a loop that depends on a scheduling variable.
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, time_unit};
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::vertices::order;
@@ -145,9 +145,7 @@ pub fn certify_schedule(
     let Some(mut coordinates) = Coordinates::of_dynamics(&intervals[0].coefficients[0])? else {
         return Ok(None);
     };
-    if domain != Domain::Continuous {
-        coordinates.unit = 1.0;
-    }
+    coordinates.unit = time_unit(domain, coordinates.unit);
     let inside: Vec<_> = intervals
         .iter()
         .map(|Interval { length, coefficients }| Interval {

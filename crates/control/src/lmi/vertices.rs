@@ -142,8 +142,7 @@ pub(crate) fn find_common(
             return Ok(None);
         }
     }
-    let count = as_number(vertices.len());
-    let mean = vertices[1..].iter().fold(vertices[0].clone(), |sum, a| sum + a) / count;
+    let mean = vertices.iter().sum::<DMatrix<f64>>() / as_number(vertices.len());
     for a in [&mean, &vertices[0]] {
         let Some(coordinates) = Coordinates::of_dynamics(a)? else { continue };
         let certificate = certify_in(&coordinates, vertices, region, domain)?.optimal();
