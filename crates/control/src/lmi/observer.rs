@@ -152,15 +152,6 @@ struct ObserverProgram<'a> {
     units: DVector<f64>,
 }
 
-/// What the inequalities of a norm contain, linear in the unknowns.
-struct GainTerms {
-    p: Affine,
-    /// Z = P L.
-    z: Affine,
-    /// P (A - L C).
-    dynamics: Affine,
-}
-
 /// A semidefinite program and its unknowns P (n x n) and Z (n x p).
 pub(super) struct Program {
     pub(super) problem: Problem,
@@ -265,9 +256,8 @@ impl<'a> ObserverProgram<'a> {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
             problem.constrain(&norm_below(&z, &Affine::identity(1, LARGEST)), MARGIN);
-            let terms = GainTerms { p: p.clone(), z: z.clone(), dynamics };
-            let terms = self.of_weighted(&mut problem, terms);
-            for matrix in self.gain_inequalities(performance, terms, level) {
+            let (p, z) = self.of_weighted(&mut problem, &p, &z);
+            for matrix in self.gain_inequalities(performance, p, &z, level) {
                 problem.require("gain", &matrix, MARGIN);
             }
         } else {
@@ -277,32 +267,32 @@ impl<'a> ObserverProgram<'a> {
         Program { problem, p, z }
     }
 
-    /// The terms of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
-    fn of_weighted(&self, problem: &mut Problem, terms: GainTerms) -> GainTerms {
-        let Some(WeightedDynamics { a, c, .. }) = self.requirements.weighted else {
-            return terms;
+    /// P and Z of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
+    fn of_weighted(&self, problem: &mut Problem, p: &Affine, z: &Affine) -> (Affine, Affine) {
+        let Some(WeightedDynamics { a, .. }) = self.requirements.weighted else {
+            return (p.clone(), z.clone());
         };
-        let (n, outputs) = terms.z.shape();
+        let (n, outputs) = z.shape();
         let more = a.nrows() - n;
         let p_2 = problem.symmetric(more);
         problem.constrain(&p_2, MARGIN);
         problem.constrain(&(&Affine::identity(more, LARGEST) - &p_2), MARGIN);
         let side = Affine::zeros(n, more);
-        let p = Affine::blocks(&[&[&terms.p, &side], &[&side.transpose(), &p_2]]);
-        let z = Affine::blocks(&[&[&terms.z], &[&Affine::zeros(more, outputs)]]);
-        let c = divide_rows(&self.of_norm().output(c), &self.units);
-        let dynamics = &(&p * &self.of_norm().dynamics(a)) - &(&z * &c);
-        GainTerms { p, z, dynamics }
+        let p = Affine::blocks(&[&[p, &side], &[&side.transpose(), &p_2]]);
+        (p, Affine::blocks(&[&[z], &[&Affine::zeros(more, outputs)]]))
     }
 
     /// The inequalities of the norm of {A - L C, B - L `D_y`, E, 0}.
     fn gain_inequalities(
         &self,
         performance: &Performance,
-        terms: GainTerms,
+        p: Affine,
+        z: &Affine,
         level: Affine,
     ) -> Vec<Affine> {
-        let GainTerms { p, z, dynamics } = terms;
+        let ObserverRequirements { a, c, weighted, domain, .. } = self.requirements;
+        let (a, c) = weighted.map_or((a, c), |wide| (wide.a, wide.c));
+        let c = divide_rows(&self.of_norm().output(c), &self.units);
         let scaling = self.scaling(performance);
         let (b, e, _) = scaling.scale(
             &self.of_norm().input(&performance.disturbance),
@@ -311,14 +301,14 @@ impl<'a> ObserverProgram<'a> {
         );
         let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance;
         let inequality = GainInequality {
-            input: &(&p * &b) - &(&z * &d_y),
+            dynamics: &(&p * &self.of_norm().dynamics(a)) - &(z * &c),
+            input: &(&p * &b) - &(z * &d_y),
             p,
-            dynamics,
             output: Affine::constant(&e),
             feedthrough: Affine::zeros(e.nrows(), b.ncols()),
             level,
         };
-        inequality.matrices(performance.norm, self.requirements.domain)
+        inequality.matrices(performance.norm, domain)
     }
 
     fn scaling(&self, performance: &Performance) -> GainScaling {
