@@ -215,12 +215,11 @@ impl Problem {
         &self,
         requirements: impl IntoIterator<Item = &'a Requirement>,
     ) -> Option<(f64, DVector<f64>)> {
-        let mut extended = self.clone();
-        let slack = extended.scalar();
+        let slack = Self { unknowns: self.unknowns, ..Self::new() }.scalar();
         let mut matrices: Vec<_> =
             requirements.into_iter().map(|each| each.semidefinite(Some(&slack))).collect();
         matrices.push(&Affine::identity(1, 1.0) - &slack);
-        let mut costs = DVector::zeros(extended.unknowns);
+        let mut costs = DVector::zeros(self.unknowns + 1);
         costs[self.unknowns] = -1.0;
         let (unknowns, end) = minimise(&costs, &matrices)?;
         (end == End::Solved)
