@@ -1,6 +1,6 @@
 //! Coordinates of the state in which the data of the solver are about one.
 
-use super::{Affine, Problem};
+use super::{Affine, Disc, Problem, Region};
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
@@ -32,9 +32,7 @@ impl Coordinates {
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::new(a);
-        let center = mean_eigenvalue(a);
-        let distance = |value: &Complex<f64>| (value - Complex::new(center, 0.0)).norm();
-        let farthest = eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max);
+        let (center, farthest) = spread(a)?;
         let radius = (WIDER * farthest).max(0.1 * center.abs()).max(f64::MIN_POSITIVE);
         let mut power = (matrix - DMatrix::identity(n, n) * center) / radius;
         let mut p = DMatrix::identity(n, n);
@@ -50,17 +48,18 @@ impl Coordinates {
     }
 
     /// Coordinates in which all states are equally observable through C for an observer whose
-    /// eigenvalues are at a distance `speed` from the eigenvalues of A: T'T is the sum of (C
+    /// eigenvalues are at a distance [`speed`] from the eigenvalues of A: T'T is the sum of (C
     /// `M^k`)' (C `M^k`), k from 0 to n - 1, with M = (A - c I) / speed, c the mean of the
-    /// eigenvalues of A.
+    /// eigenvalues of A. The unit of frequency is the speed in continuous time, 1 in sampled time.
     pub(super) fn of_observation(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
-        speed: f64,
-        unit: f64,
+        region: &Region,
+        domain: Domain,
     ) -> Result<Self, Error> {
         let (n, p) = (a.nrows(), c.nrows());
-        let shifted = (a - DMatrix::identity(n, n) * mean_eigenvalue(a)) / speed;
+        let (center, speed) = speed(a, region, domain)?;
+        let shifted = (a - DMatrix::identity(n, n) * center) / speed;
         let mut rows = divide_rows(c, &row_units(c));
         let mut observability = DMatrix::zeros(n * (p + 1), n);
         for k in 0..n {
@@ -75,7 +74,7 @@ impl Coordinates {
         let (directions, values) = (svd.left.columns(0, n), svd.values.rows(0, n).into_owned());
         let root = multiply_rows(&directions.transpose(), &values);
         let inverse = divide_columns(&directions.into_owned(), &values);
-        Ok(Self::within(&scale, &root, &inverse, unit))
+        Ok(Self::within(&scale, &root, &inverse, time_unit(domain, speed)))
     }
 
     /// Coordinates in which the matrix P~ = `p` of these coordinates becomes the identity; None if
@@ -169,8 +168,26 @@ pub(super) fn row_units(m: &DMatrix<f64>) -> DVector<f64> {
     DVector::from_fn(m.nrows(), |row, _| unit_near(m.row(row).norm()))
 }
 
-pub(super) fn mean_eigenvalue(a: &DMatrix<f64>) -> f64 {
-    a.trace() / as_number(a.nrows())
+/// The mean of the eigenvalues, and the largest distance of one of them from it.
+fn spread(a: &DMatrix<f64>) -> Result<(f64, f64), Error> {
+    let mean = a.trace() / as_number(a.nrows());
+    let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
+    Ok((mean, eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max)))
+}
+
+/// The mean of the eigenvalues, and a power of two near the distance by which eigenvalues are moved.
+///
+/// The distance is that from the mean eigenvalue of A to the target (the centre of the disc, else
+/// the limit of the decay rate), at least the largest distance of an eigenvalue of A from the mean.
+fn speed(a: &DMatrix<f64>, region: &Region, domain: Domain) -> Result<(f64, f64), Error> {
+    let (mean, spread) = spread(a)?;
+    let limit = |alpha: f64| match domain {
+        Domain::Continuous => -alpha,
+        Domain::Sampled { period } => (-alpha * period).exp(),
+    };
+    let disc = region.disc.map(|Disc { center, .. }| center);
+    let target = disc.or(region.decay.map(limit)).unwrap_or(mean);
+    Ok((mean, unit_near(spread.max((target - mean).abs()))))
 }
 
 fn inverse_of_upper(u: &DMatrix<f64>) -> DMatrix<f64> {

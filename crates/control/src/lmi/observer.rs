@@ -12,16 +12,15 @@
 //! feedback.
 
 use super::affine::Affine;
-use super::coordinates::{Coordinates, mean_eigenvalue, row_units, time_unit, unit_near};
+use super::coordinates::{Coordinates, row_units, unit_near};
 use super::gain::{GainInequality, GainScaling, Norm};
-use super::region::{Disc, MARGIN, Region};
+use super::region::{MARGIN, Region};
 use super::requirement::{Performance, Synthesis};
 use super::{Outcome, Problem};
 use crate::balance::{divide_columns, divide_rows};
-use crate::eigen::eigenvalues;
 use crate::rank::observability;
 use crate::{Domain, Error};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// The bound for which a gain is designed, relative to the smallest bound.
 const RELAXED_BOUND: f64 = 1.05;
@@ -84,8 +83,8 @@ impl ObserverRequirements<'_> {
         self,
         proof: impl Fn(Candidate) -> Result<Outcome<Synthesis>, Error>,
     ) -> Result<Outcome<Synthesis>, Error> {
-        let (speed, unit) = speed(self.a, &self.region, self.domain)?;
-        let mut coordinates = Coordinates::of_observation(self.a, self.c, speed, unit)?;
+        let mut coordinates =
+            Coordinates::of_observation(self.a, self.c, &self.region, self.domain)?;
         let mut refinements = 0;
         loop {
             let program = ObserverProgram::new(self, coordinates);
@@ -116,29 +115,6 @@ impl ObserverRequirements<'_> {
         }
         Ok(outcome)
     }
-}
-
-/// A power of two near the distance by which eigenvalues are moved, and the unit of frequency.
-///
-/// The distance is that from the mean eigenvalue of A to the target (the centre of the disc,
-/// else the limit of the decay rate), at least the largest distance of an eigenvalue of A from
-/// the mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
-pub(super) fn speed(
-    a: &DMatrix<f64>,
-    region: &Region,
-    domain: Domain,
-) -> Result<(f64, f64), Error> {
-    let mean = mean_eigenvalue(a);
-    let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
-    let spread = eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max);
-    let limit = |alpha: f64| match domain {
-        Domain::Continuous => -alpha,
-        Domain::Sampled { period } => (-alpha * period).exp(),
-    };
-    let disc = region.disc.map(|Disc { center, .. }| center);
-    let target = disc.or(region.decay.map(limit)).unwrap_or(mean);
-    let speed = unit_near(spread.max((target - mean).abs()));
-    Ok((speed, time_unit(domain, speed)))
 }
 
 /// The semidefinite program for L in given coordinates.

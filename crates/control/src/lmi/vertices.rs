@@ -1,7 +1,7 @@
 //! One certificate, and one state feedback, for all members of a family of systems.
 
 use super::coordinates::{Coordinates, row_units};
-use super::observer::{Candidate, Program, REFINEMENTS, RELAXED_GAIN, speed};
+use super::observer::{Candidate, Program, REFINEMENTS, RELAXED_GAIN};
 use super::region::{NO_P, Region, RegionCertificate, certify_in};
 use super::{Outcome, Problem};
 use crate::balance::divide_rows;
@@ -247,8 +247,7 @@ pub fn common_feedback(
     }
     region.check(domain)?;
     let (a, c) = (plants[0].a.transpose(), plants[0].b.transpose());
-    let (speed, unit) = speed(&a, region, domain)?;
-    let mut coordinates = Coordinates::of_observation(&a, &c, speed, unit)?;
+    let mut coordinates = Coordinates::of_observation(&a, &c, region, domain)?;
     let search = Synthesis { plants, region, domain };
     let all: Vec<_> = (0..plants.len()).collect();
     let mut proposed = false;
