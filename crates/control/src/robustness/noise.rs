@@ -16,14 +16,7 @@ use nalgebra::DMatrix;
 /// Same as [`energy`].
 pub fn noise_gains(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
     if system.c.nrows() < system.b.ncols() {
-        let transposed = StateSpace {
-            a: system.a.transpose(),
-            b: system.c.transpose(),
-            c: system.b.transpose(),
-            d: system.d.transpose(),
-            domain: system.domain,
-        };
-        return Ok(noise_gains(&transposed)?.transpose());
+        return Ok(noise_gains(&system.dual())?.transpose());
     }
     let mut gains = DMatrix::zeros(system.c.nrows(), system.b.ncols());
     for input in 0..system.b.ncols() {
