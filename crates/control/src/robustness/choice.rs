@@ -67,15 +67,9 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
 
 /// The largest singular values of S at input and output over the frequencies.
 fn peaks(closed: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
-    let (at_input, at_output) =
-        (closed.sensitivity(Point::Input), closed.sensitivity(Point::Output));
-    let (m, p) = (at_input.b.ncols(), at_output.b.ncols());
-    let mut b = at_input.b.resize_horizontally(m + p, 0.0);
-    b.columns_mut(m, p).copy_from(&at_output.b);
-    let mut c = at_input.c.resize_vertically(m + p, 0.0);
-    c.rows_mut(m, p).copy_from(&at_output.c);
+    let (p, m) = closed.plant().d.shape();
     let d = DMatrix::identity(m + p, m + p);
-    let transfer = Transfer::new(&StateSpace { a: at_input.a, b, c, d, domain: at_input.domain });
+    let transfer = Transfer::new(&StateSpace { d, ..closed.system() });
     let mut peaks = [0.0_f64; 2];
     for frequency in frequencies {
         let gain = transfer.gain(*frequency)?;
