@@ -98,10 +98,15 @@ pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> 
     Ok(StateSpace {
         a: a.resize(n + m, n + m, 0.0),
         b: stacked(&b, &DMatrix::identity(m, m)),
-        c: stacked(&plant.c.transpose(), &plant.d.transpose()).transpose(),
+        c: beside(&plant.c, &plant.d),
         d: DMatrix::zeros(plant.c.nrows(), m),
         domain,
     })
+}
+
+/// [left, right].
+pub(crate) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    stacked(&left.transpose(), &right.transpose()).transpose()
 }
 
 /// The loop y = G u, u = K y of a plant G and a controller K, of which one is strictly proper.
@@ -163,9 +168,6 @@ impl Loop {
     /// Commands and measurements from the states of plant and controller: [`D_k` C, `C_k`] and [C, D `C_k`].
     fn signals(&self) -> [DMatrix<f64>; 2] {
         let (plant, controller) = (&self.plant, &self.controller);
-        let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-            stacked(&left.transpose(), &right.transpose()).transpose()
-        };
         [
             beside(&(&controller.d * &plant.c), &controller.c),
             beside(&plant.c, &(&plant.d * &controller.c)),
@@ -192,7 +194,7 @@ impl Loop {
         let (p, m) = plant.d.shape();
         StateSpace {
             a: self.dynamics(),
-            b: stacked(&to_commands.transpose(), &to_measurements.transpose()).transpose(),
+            b: beside(&to_commands, &to_measurements),
             c: stacked(&commands, &measurements),
             d: block_2x2([&zeros(m), &controller.d], [&plant.d, &zeros(p)]),
             domain: plant.domain,

@@ -1,12 +1,12 @@
 //! The effect of single entries of the plant's matrices on a peak of S.
 
 use super::scaling::scaled_norm;
-use super::{Loop, Point, held_plant};
-use crate::blocks::{block_2x2, stacked, to_complex};
+use super::{Loop, Point, beside, held_plant};
+use crate::blocks::{block_2x2, to_complex};
 use crate::exponential::exponential;
 use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
@@ -102,13 +102,9 @@ impl Loop {
             Domain::Continuous => Complex::new(0.0, frequency),
             Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
         };
-        let dynamics = to_complex(&self.dynamics());
-        let pencil = ComplexMatrix::identity(n + k, n + k) * s - dynamics;
-        // Signals added to the commands and to the measurements; commands and measurements.
+        let StateSpace { a: dynamics, b: inputs, c: outputs, .. } = self.system();
+        let pencil = ComplexMatrix::identity(n + k, n + k) * s - to_complex(&dynamics);
         let (m, p) = controller.d.shape();
-        let ([from_u, from_y], [to_u, to_y]) = (self.entries(), self.signals());
-        let inputs = stacked(&from_u.transpose(), &from_y.transpose()).transpose();
-        let outputs = stacked(&to_u, &to_y);
         let singular = Error::Overflow { what: "S at its peak" };
         let x = pencil.clone().lu().solve(&to_complex(&inputs)).ok_or(singular.clone())?;
         let y = pencil.transpose().lu().solve(&to_complex(&outputs.transpose()));
@@ -130,7 +126,7 @@ impl Loop {
         let units = if scaled {
             scaled_norm(&sensitivity)?.1.map(f64::exp)
         } else {
-            nalgebra::DVector::from_element(count, 1.0)
+            DVector::from_element(count, 1.0)
         };
         let unit = |i: usize, j: usize| units[i] / units[j];
         let weighted = DMatrix::from_fn(count, count, |i, j| sensitivity[(i, j)] * unit(i, j));
@@ -146,13 +142,9 @@ impl Loop {
         let on_outputs = left.adjoint() * response.view((from, m), (count, p));
         let of_states = x.view((0, from), (n, count)) * &right;
         let of_commands = response.view((0, from), (m, count)) * &right;
-        let outer = |row: &ComplexMatrix, column: &ComplexMatrix| {
-            DMatrix::from_fn(row.ncols(), column.nrows(), |i, j| (row[(0, i)] * column[(j, 0)]).re)
+        let outer = |row: &RowDVector<Complex<f64>>, column: &DVector<Complex<f64>>| {
+            DMatrix::from_fn(row.len(), column.len(), |i, j| (row[i] * column[j]).re)
         };
-        let matrix = |v: nalgebra::DVector<Complex<f64>>| DMatrix::from_columns(&[v]);
-        let (of_states, of_commands) = (matrix(of_states), matrix(of_commands));
-        let row = |v: nalgebra::RowDVector<Complex<f64>>| DMatrix::from_rows(&[v]);
-        let (on_states, on_outputs) = (row(on_states), row(on_outputs));
         Ok(PeakDerivatives {
             value,
             a: outer(&on_states, &of_states),
@@ -171,12 +163,8 @@ fn through_hold(
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let (n, m) = plant.b.shape();
     let order = n + m;
-    let mut both = DMatrix::zeros(order, order);
-    both.view_mut((0, 0), (n, n)).copy_from(&plant.a);
-    both.view_mut((0, n), (n, m)).copy_from(&plant.b);
-    let mut gradient = DMatrix::zeros(order, order);
-    gradient.view_mut((0, 0), (n, n)).copy_from(&sampled.a);
-    gradient.view_mut((0, n), (n, m)).copy_from(&sampled.b);
+    let square = |a: &DMatrix<f64>, b: &DMatrix<f64>| beside(a, b).resize_vertically(order, 0.0);
+    let (both, gradient) = (square(&plant.a, &plant.b), square(&sampled.a, &sampled.b));
     let adjoint = both.transpose() * period;
     // The derivative is linear in the gradient: with one of the size of the matrix the exponential
     // needs no further squarings.

@@ -2,10 +2,10 @@
 
 use super::blocks::Block;
 use super::gauss::{Gauss, Step};
-use super::opened::{Channels, Opened, beside};
+use super::opened::{Channels, Opened};
 use super::remainder::remainder;
 use crate::balance::Balance;
-use crate::robustness::{Loop, held_plant};
+use crate::robustness::{Loop, beside, held_plant};
 use crate::svd::norm_2;
 use crate::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};

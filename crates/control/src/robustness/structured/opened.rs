@@ -1,6 +1,7 @@
 //! A plant with the channels of its perturbations, and the loop of a controller around it.
 
 use crate::blocks::{block_2x2, stacked};
+use crate::robustness::beside;
 use crate::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
@@ -56,11 +57,6 @@ impl Channels {
         }
         channels
     }
-}
-
-/// [left, right].
-pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    stacked(&left.transpose(), &right.transpose()).transpose()
 }
 
 /// L and R of the least common inner size with P = L R', by elimination with complete pivoting.
