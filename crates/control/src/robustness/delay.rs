@@ -95,12 +95,12 @@ pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Resu
     refined(plant, controller, estimate)
 }
 
-fn period_of(controller: &StateSpace) -> Result<f64, Error> {
+/// The period of a sampled controller; [`Error::OutOfRange`] for a continuous one.
+pub(super) fn period_of(controller: &StateSpace) -> Result<f64, Error> {
     let rule = "that of a sampled controller";
-    let refused = Error::OutOfRange { name: "the domain", value: f64::NAN, rule };
     match controller.domain {
         Domain::Sampled { period } => Ok(period),
-        Domain::Continuous => Err(refused),
+        Domain::Continuous => Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule }),
     }
 }
 

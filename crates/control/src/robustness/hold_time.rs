@@ -1,12 +1,13 @@
 //! The longest time over which the signals between plant and controller may be held.
 
 use super::crossing::{Evaluation, narrowed};
+use super::delay::period_of;
 use super::held::Mean;
 use super::{Loop, held_plant};
 use crate::blocks::block_2x2;
 use crate::eigen::eigenvalues;
 use crate::stability::instability;
-use crate::{Domain, Error, StateSpace};
+use crate::{Error, StateSpace};
 use nalgebra::DMatrix;
 
 /// The search begins at this part of the shortest time constant of the loop and ends at `LONGEST`
@@ -81,10 +82,7 @@ fn with_held_commands(
 ///
 /// Same as [`crate::hold::zero_order_hold`]; [`Error::OutOfRange`] when the controller is continuous.
 pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
-    let Domain::Sampled { period } = controller.domain else {
-        let rule = "that of a sampled controller";
-        return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
-    };
+    let period = period_of(controller)?;
     let value = |h: f64| {
         let sampled = StateSpace { domain: controller.domain, ..held_plant(plant, h)? };
         let closed = Loop::new(sampled, controller.clone())?;
