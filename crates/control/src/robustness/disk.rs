@@ -188,9 +188,8 @@ impl Largest {
         for _ in 0..REFINEMENTS {
             let third = (high - low) / 3.0;
             let (first, second) = (low + third, high - third);
-            let values = [first, second].map(|w| self.offer(&sweep.at(w)?, w, 0.0));
-            let [left, right] = values;
-            let (left, right) = (left?, right?);
+            let left = self.offer(&sweep.at(first)?, first, 0.0)?;
+            let right = self.offer(&sweep.at(second)?, second, 0.0)?;
             // As flat as the values are precise.
             if left.min(right) >= (1.0 - FLAT) * self.value {
                 break;
