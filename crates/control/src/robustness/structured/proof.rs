@@ -3,7 +3,7 @@
 use super::blocks::Block;
 use super::held::HeldFamily;
 use super::opened::{Channels, Opened};
-use super::{StructuredBound, structured_bound};
+use super::structured_bound;
 use crate::robustness::tolerance::EntryFamily;
 use crate::robustness::{Loop, held_plant};
 use crate::{Domain, Error, StateSpace};
@@ -127,28 +127,17 @@ impl Perturbed<'_> {
         if channels > LARGEST || states > LARGEST {
             return Ok(Err(Unproven::Large { channels, states, most: LARGEST }));
         }
-        if channels == 0 {
-            let (frequency, intervals) = (0.0, 0);
-            return Ok(Ok(ProvenTolerance {
-                fraction: most,
-                frequency,
-                deviations: 0,
-                channels,
-                intervals,
-            }));
-        }
-        let Some(bound) = structured_bound(system, blocks, 1.0 / most, ending)? else {
-            return Ok(Err(Unproven::Ended));
-        };
-        let StructuredBound { upper, frequency, intervals } = bound;
         let deviations = self.changes.len();
-        Ok(Ok(ProvenTolerance {
-            fraction: 1.0 / upper,
-            frequency,
-            deviations,
-            channels,
-            intervals,
-        }))
+        let proven = |fraction: f64, frequency: f64, intervals: usize| {
+            Ok(Ok(ProvenTolerance { fraction, frequency, deviations, channels, intervals }))
+        };
+        if channels == 0 {
+            return proven(most, 0.0, 0);
+        }
+        match structured_bound(system, blocks, 1.0 / most, ending)? {
+            Some(bound) => proven(1.0 / bound.upper, bound.frequency, bound.intervals),
+            None => Ok(Err(Unproven::Ended)),
+        }
     }
 
     /// The fraction for a plant in the time domain of the controller.
