@@ -39,7 +39,7 @@ pub use fault_loop::{error_part, fault_gains, fault_rate_system, fault_system};
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub(crate) use frequency::{Transfer, grid};
 pub use h_infinity::{HInfinity, h_infinity};
-pub(crate) use h_infinity::{continuous_equivalent, norm_of};
+pub(crate) use h_infinity::{continuous_equivalent, norm_of, original_frequency};
 pub(crate) use known::KnownResponse;
 pub use peak_gain::peak_gain;
 pub use trace::{TimeResponse, ramp_response, settled_output, step_response};

@@ -90,8 +90,11 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
     let width = width.max(1e-10);
     let system = &known.system;
     let continuous = continuous_equivalent(system)?;
-    let mut best = HInfinity::at_ends(known, &continuous.d)?;
-    for frequency in known.resonances() {
+    // At the highest frequency G is the D of the continuous equivalent.
+    let lower = norm_2(&continuous.d)?;
+    let frequency = original_frequency(f64::INFINITY, system.domain);
+    let mut best = HInfinity { lower, upper: lower, frequency };
+    for frequency in std::iter::once(0.0).chain(known.resonances()) {
         best.offer(known, frequency)?;
     }
     best.climb(known, width)?;
@@ -113,16 +116,6 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
 }
 
 impl HInfinity {
-    /// The larger of the values at frequency zero and at the highest frequency, where G is `d`, the
-    /// D of the continuous equivalent.
-    fn at_ends(known: &KnownResponse, d: &DMatrix<f64>) -> Result<Self, Error> {
-        let frequency = original_frequency(f64::INFINITY, known.system.domain);
-        let lower = norm_2(d)?;
-        let mut best = Self { lower, upper: lower, frequency };
-        best.offer(known, 0.0)?;
-        Ok(best)
-    }
-
     /// Raises the lower bound to the local maximum about its frequency, by steps that grow while they
     /// climb and shrink otherwise: each of them saves eigenvalues of a Hamiltonian matrix.
     fn climb(&mut self, known: &KnownResponse, width: f64) -> Result<(), Error> {
@@ -143,8 +136,7 @@ impl HInfinity {
     fn offer(&mut self, known: &KnownResponse, frequency: f64) -> Result<(), Error> {
         let size = known.size(frequency)?;
         if size > self.lower {
-            self.lower = size;
-            self.frequency = frequency;
+            (self.lower, self.frequency) = (size, frequency);
         }
         Ok(())
     }
@@ -210,7 +202,7 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
 }
 
 /// The frequency of a system at which its [`continuous_equivalent`] has the given frequency.
-fn original_frequency(frequency: f64, domain: Domain) -> f64 {
+pub(crate) fn original_frequency(frequency: f64, domain: Domain) -> f64 {
     match domain {
         Domain::Continuous => frequency,
         Domain::Sampled { period } => 2.0 * frequency.atan() / period,

@@ -20,8 +20,8 @@ mod scales;
 pub use blocks::Block;
 pub use proof::{ProvenTolerance, Unproven, proven_tolerance};
 
-use crate::response::continuous_equivalent;
-use crate::{Domain, Error, StateSpace, check};
+use crate::response::{continuous_equivalent, original_frequency};
+use crate::{Error, StateSpace, check};
 use cover::Cover;
 
 /// Part by which a bound is above the one whose intervals were computed, for rounding errors.
@@ -110,10 +110,7 @@ pub fn structured_bound(
     if !cover.complete(ending)? {
         return Ok(None);
     }
-    let frequency = match system.domain {
-        Domain::Continuous => cover.frequency,
-        Domain::Sampled { period } => 2.0 * cover.frequency.atan() / period,
-    };
+    let frequency = original_frequency(cover.frequency, system.domain);
     let upper = cover.bound * (1.0 + ROUNDING);
     Ok(Some(StructuredBound { upper, frequency, intervals: cover.intervals }))
 }
