@@ -4,6 +4,7 @@ use super::blocks::{Block, Direction, SparseEntry, directions};
 use super::form::{form, form_size};
 use super::hermitian::{ComplexMatrix, factor, forward, times};
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
+use std::iter::successors;
 
 /// The largest G, relative to D and the size of M: a number with a smaller angle to the real axis than about the
 /// inverse counts as real.
@@ -58,10 +59,9 @@ impl<'a> Barrier<'a> {
             Point { coefficients, d: ComplexMatrix::zeros(r, r), g: ComplexMatrix::zeros(r, r) };
         for (direction, value) in self.directions.iter().zip(point.coefficients.iter()) {
             let matrix = if direction.of_g { &mut point.g } else { &mut point.d };
-            direction
-                .entries
-                .iter()
-                .for_each(|(row, column, entry)| matrix[(*row, *column)] += entry * *value);
+            for (row, column, entry) in &direction.entries {
+                matrix[(*row, *column)] += entry * *value;
+            }
         }
         point
     }
@@ -150,19 +150,14 @@ impl<'a> Barrier<'a> {
                 length *= 2.0;
             }
             let before = Self::value(&factors);
-            let mut moved = None;
-            for _ in 0..HALVINGS {
+            let moved_by = |length: f64| {
                 let next = self.point(&point.coefficients - &step * length);
-                if let Some(inside) = self.factors(&next, bound)
-                    && Self::value(&inside) < before
-                {
-                    moved = Some((next, inside));
-                    break;
-                }
-                length *= 0.5;
-            }
-            let Some((next, inside)) = moved else { break };
-            (point, factors) = (next, inside);
+                let inside = self.factors(&next, bound)?;
+                (Self::value(&inside) < before).then_some((next, inside))
+            };
+            let mut lengths = successors(Some(length), |length| Some(0.5 * length)).take(HALVINGS);
+            let Some(moved) = lengths.find_map(moved_by) else { break };
+            (point, factors) = moved;
             if decrement < NEAR {
                 break;
             }

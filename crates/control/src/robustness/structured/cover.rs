@@ -143,14 +143,9 @@ impl<'a> Cover<'a> {
             }
             let before = Interval { from: gap.from, to: covered.from };
             let after = Interval { from: covered.to, to: gap.to };
-            let mut parts = Vec::new();
-            if covered.from >= gap.from {
-                parts.push(before);
-            }
-            if covered.to <= gap.to && covered.to.is_finite() {
-                parts.push(after);
-            }
-            parts
+            let ends_inside = covered.to <= gap.to && covered.to.is_finite();
+            let before = (covered.from >= gap.from).then_some(before);
+            before.into_iter().chain(ends_inside.then_some(after)).collect()
         };
         self.gaps = self.gaps.iter().flat_map(rest).collect();
     }

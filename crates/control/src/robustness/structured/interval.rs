@@ -64,29 +64,22 @@ impl Response {
         let above: Vec<f64> = places.iter().copied().filter(|place| *place > frequency).collect();
         let below: Vec<f64> =
             places.iter().rev().copied().filter(|place| *place <= frequency).collect();
-        let mut to = f64::INFINITY;
-        for (at, &place) in above.iter().enumerate() {
-            let middle = above.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (place + next));
-            if !(holds(place)? && holds(middle)?) {
-                to = place;
-                break;
+        // The first of `places` that is negative or about which the scales do not hold; `last` is beyond them.
+        let end = |places: &[f64], last: f64| {
+            for (at, &place) in places.iter().enumerate() {
+                let middle = places.get(at + 1).map_or(last, |next| 0.5 * (place + next));
+                if place < 0.0 || !(holds(place)? && holds(middle)?) {
+                    return Ok(Some(place));
+                }
             }
-        }
-        if to.is_infinite() && !holds(f64::INFINITY)? {
-            to = f64::MAX;
-        }
-        let mut from = f64::NEG_INFINITY;
-        for (at, &place) in below.iter().enumerate() {
-            if place < 0.0 {
-                from = place;
-                break;
-            }
-            let middle = below.get(at + 1).map_or(-1.0, |next| 0.5 * (place + next));
-            if !(holds(place)? && holds(middle)?) {
-                from = place;
-                break;
-            }
-        }
+            Ok::<_, Error>(None)
+        };
+        let to = match end(&above, f64::INFINITY)? {
+            Some(place) => place,
+            None if holds(f64::INFINITY)? => f64::INFINITY,
+            None => f64::MAX,
+        };
+        let from = end(&below, -1.0)?.unwrap_or(f64::NEG_INFINITY);
         Ok(Some(Interval { from, to }))
     }
 
