@@ -3,6 +3,7 @@
 
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
+use std::iter::successors;
 
 /// A weight W of order 0, 1 or 2.
 ///
@@ -108,21 +109,14 @@ impl Weight {
         domain.check()?;
         let order = self.denominator.len() - 1;
         let direct = self.numerator[0];
-        let mut a = DMatrix::zeros(order, order);
-        let mut c = DMatrix::zeros(1, order);
-        let mut b = DMatrix::zeros(order, 1);
-        for state in 0..order {
-            a[(0, state)] = -self.denominator[state + 1];
-            c[(0, state)] = self.numerator[state + 1] - direct * self.denominator[state + 1];
-        }
-        for state in 1..order {
-            a[(state, state - 1)] = 1.0;
-        }
-        if order > 0 {
-            b[0] = 1.0;
-        }
+        let (numerator, denominator) = (&self.numerator[1..], &self.denominator[1..]);
+        let a = DMatrix::from_fn(order, order, |i, j| match i {
+            0 => -denominator[j],
+            _ => f64::from(u8::from(i == j + 1)),
+        });
+        let c = DMatrix::from_fn(1, order, |_, j| numerator[j] - direct * denominator[j]);
         let d = DMatrix::from_element(1, 1, direct);
-        let (a, b) = (a * self.unit, b * self.unit);
+        let (a, b) = (a * self.unit, DMatrix::identity(order, 1) * self.unit);
         let Domain::Sampled { period } = domain else {
             return Ok(StateSpace { a, b, c, d, domain });
         };
@@ -143,7 +137,14 @@ impl Weight {
     #[must_use]
     pub fn polynomials(&self, domain: Domain) -> (Vec<f64>, Vec<f64>) {
         let convert = |coefficients: &[f64]| match domain {
-            Domain::Continuous => powers_of_s(coefficients, self.unit),
+            Domain::Continuous => {
+                let powers = successors(Some(1.0), |power| Some(power * self.unit));
+                coefficients
+                    .iter()
+                    .zip(powers)
+                    .map(|(coefficient, power)| coefficient * power)
+                    .collect()
+            }
             Domain::Sampled { period } => powers_of_z(coefficients, 2.0 / (period * self.unit)),
         };
         let (numerator, denominator) = (convert(&self.numerator), convert(&self.denominator));
@@ -178,16 +179,6 @@ pub fn diagonal(weights: &[Weight], domain: Domain) -> Result<StateSpace, Error>
         first += n;
     }
     Ok(whole)
-}
-
-fn powers_of_s(coefficients: &[f64], unit: f64) -> Vec<f64> {
-    let mut factor = 1.0;
-    let mut scaled = Vec::new();
-    for coefficient in coefficients {
-        scaled.push(coefficient * factor);
-        factor *= unit;
-    }
-    scaled
 }
 
 /// The polynomial for p = `rate` (z - 1) / (z + 1), times (z + 1)^order.
