@@ -107,7 +107,7 @@ pub fn lqr(
     let p = problem.refined(&problem.start()?)?;
     let (p, gain) = (problem.restored(&p)?, problem.restored_gain(&p)?);
     let eigenvalues = stability::require_stable("A + B K", &(a + b * &gain), domain)?;
-    let residual = problem.residual(&problem.scaled_solution(&p));
+    let residual = problem.residual(&p);
     if residual > ALLOWED_RESIDUAL {
         let (equation, allowed) = ("the Riccati equation", ALLOWED_RESIDUAL);
         return Err(Error::ResidualTooLarge { equation, residual, allowed });

@@ -2,7 +2,7 @@
 
 use super::equation::identity;
 use crate::Error;
-use crate::blocks::symmetric_part;
+use crate::blocks::{block_2x2, symmetric_part};
 use crate::eigen::eigenvalues;
 use nalgebra::DMatrix;
 
@@ -49,15 +49,8 @@ pub(super) fn continuous(
     q: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, Error> {
     let n = a.nrows();
-    let blocks = |upper_left: &DMatrix<f64>, lower_right: &DMatrix<f64>| {
-        let mut all = DMatrix::zeros(2 * n, 2 * n);
-        all.view_mut((0, 0), (n, n)).copy_from(upper_left);
-        all.view_mut((0, n), (n, n)).copy_from(&-g);
-        all.view_mut((n, 0), (n, n)).copy_from(&-q);
-        all.view_mut((n, n), (n, n)).copy_from(lower_right);
-        all
-    };
-    let sizes: Vec<f64> = eigenvalues(&blocks(a, &-a.transpose()))?
+    let blocks = |a: &DMatrix<f64>| block_2x2([a, &-g], [&-q, &-a.transpose()]);
+    let sizes: Vec<f64> = eigenvalues(&blocks(a))?
         .iter()
         .map(|value| value.norm())
         .filter(|&size| size > 0.0)
@@ -65,10 +58,9 @@ pub(super) fn continuous(
     let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let gamma = if largest > 0.0 { (least * largest).sqrt() } else { 1.0 };
-    let (minus, plus) = (a - identity(n) * gamma, a + identity(n) * gamma);
     // [A - gamma I, -G; -Q, -(A - gamma I)'] takes the pencil to its symplectic form.
-    let left = blocks(&minus, &-minus.transpose());
-    let right = blocks(&plus, &-plus.transpose());
+    let left = blocks(&(a - identity(n) * gamma));
+    let right = blocks(&(a + identity(n) * gamma));
     let solved =
         left.lu().solve(&right).ok_or(Error::NotConverged { what: WHAT, iterations: 0 })?;
     let start = solved.view((0, 0), (n, n)).into();

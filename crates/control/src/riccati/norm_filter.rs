@@ -1,8 +1,7 @@
 //! The filter whose error keeps a bound of its H-infinity norm.
 
-use super::problem::{balancing, scaled_equation};
+use super::problem::{balancing, divided, multiplied, similar};
 use super::{KalmanFilter, doubling, kalman};
-use crate::balance::{divide_columns, divide_rows};
 use crate::blocks::symmetric_part;
 use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;
@@ -151,12 +150,13 @@ impl NormFilter {
     fn doubled(&self, gamma: f64) -> Option<DMatrix<f64>> {
         let (a, g) = (self.a.transpose(), self.information(gamma));
         let scale = balancing(&a, &g, &self.process);
-        let (a, g, q) = scaled_equation(&a, &g, &self.process, &scale);
+        let q = multiplied(&self.process, &scale);
+        let (a, g) = (similar(&a, &scale), divided(&g, &scale));
         let x = match self.domain {
             Domain::Continuous => doubling::continuous(&a, &g, &q),
             Domain::Sampled { .. } => doubling::sampled(&a, &g, &q),
         };
-        Some(divide_rows(&divide_columns(&x.ok()?, &scale), &scale))
+        Some(divided(&x.ok()?, &scale))
     }
 
     /// The gain of X, if X is the stabilising and positive semidefinite solution.
@@ -178,16 +178,13 @@ impl NormFilter {
     /// The process noise that X adds: X E' E X / `gamma^2`, in sampled time X E' (`gamma^2` I - E X E')^-1 E X, by
     /// which the covariance then grows itself.
     fn added(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
+        if self.domain == Domain::Continuous {
+            return Some(DMatrix::zeros(x.nrows(), x.ncols()));
+        }
         let output = &self.output * x / gamma;
-        let added = match self.domain {
-            Domain::Continuous => return Some(DMatrix::zeros(x.nrows(), x.ncols())),
-            Domain::Sampled { .. } => {
-                let rest = DMatrix::identity(output.nrows(), output.nrows())
-                    - &output * self.output.transpose() / gamma;
-                output.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&output))
-            }
-        };
-        Some(symmetric_part(&added))
+        let rest = DMatrix::identity(output.nrows(), output.nrows())
+            - &output * self.output.transpose() / gamma;
+        Some(symmetric_part(&output.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&output))))
     }
 
     /// L - S R^-1 for a covariance: X, in sampled time Y.

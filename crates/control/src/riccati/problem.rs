@@ -7,7 +7,7 @@ use super::semidefinite::require_semidefinite;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
-use crate::blocks::symmetric_part;
+use crate::blocks::{block_2x2, symmetric_part};
 use crate::lyapunov;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -52,13 +52,12 @@ impl ScaledProblem {
             check::in_range("Q - N R^-1 N'", &weights.q - symmetric_part(&(&n * n.transpose())))?;
         require_semidefinite(&free_q, &weights.q)?;
         let scale = balancing(&free, &check::in_range("B R^-1 B'", &b * b.transpose())?, &free_q);
-        let both = |m: &DMatrix<f64>| multiply_rows(&multiply_columns(m, &scale), &scale);
-        let similar = |m: &DMatrix<f64>| divide_rows(&multiply_columns(m, &scale), &scale);
-        let (a, b, n) = (similar(a), divide_rows(&b, &scale), multiply_rows(&n, &scale));
+        let (a, q) = (similar(a, &scale), multiplied(&weights.q, &scale));
+        let (b, n) = (divide_rows(&b, &scale), multiply_rows(&n, &scale));
         Ok(Self {
-            free: similar(&free),
-            free_q: both(&free_q),
-            equation: RiccatiEquation { a, b, q: both(&weights.q), n, domain },
+            free: similar(&free, &scale),
+            free_q: multiplied(&free_q, &scale),
+            equation: RiccatiEquation { a, b, q, n, domain },
             scale,
             factor,
         })
@@ -101,24 +100,21 @@ impl ScaledProblem {
             }
             p = next;
         }
-        if self.residual(&best) <= super::ALLOWED_RESIDUAL {
+        if self.equation.residual(&best) <= super::ALLOWED_RESIDUAL {
             return Ok(best);
         }
         let what = "Newton's method for the Riccati equation";
         Err(Error::NotConverged { what, iterations: NEWTON_STEPS })
     }
 
-    pub(super) fn residual(&self, scaled_p: &DMatrix<f64>) -> f64 {
-        self.equation.residual(scaled_p)
-    }
-
-    /// S^-1 P S^-1, and back.
+    /// P of the problem without scales.
     pub(super) fn restored(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-        check::in_range("P", divide_rows(&divide_columns(p, &self.scale), &self.scale))
+        check::in_range("P", divided(p, &self.scale))
     }
 
-    pub(super) fn scaled_solution(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
-        multiply_rows(&multiply_columns(p, &self.scale), &self.scale)
+    /// The residual of a P of the problem without scales.
+    pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
+        self.equation.residual(&multiplied(p, &self.scale))
     }
 
     /// L^-T K S^-1.
@@ -138,26 +134,23 @@ fn per_unit(m: &DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Diagonal S that balances the Hamiltonian matrix [A, -G; -Q, -A'] by diag(S, S^-1).
 pub(super) fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f64> {
-    let order = a.nrows();
-    let mut hamiltonian = DMatrix::zeros(2 * order, 2 * order);
-    hamiltonian.view_mut((0, 0), (order, order)).copy_from(&a.abs());
-    hamiltonian.view_mut((0, order), (order, order)).copy_from(&g.abs());
-    hamiltonian.view_mut((order, 0), (order, order)).copy_from(&q.abs());
-    hamiltonian.view_mut((order, order), (order, order)).copy_from(&a.abs().transpose());
+    let (order, dynamics) = (a.nrows(), a.abs());
+    let hamiltonian = block_2x2([&dynamics, &g.abs()], [&q.abs(), &dynamics.transpose()]);
     let scale = Balance::new(&hamiltonian).scale;
     DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
 }
 
-/// (S^-1 A S, S^-1 G S^-1, S Q S).
-pub(super) fn scaled_equation(
-    a: &DMatrix<f64>,
-    g: &DMatrix<f64>,
-    q: &DMatrix<f64>,
-    scale: &DVector<f64>,
-) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    (
-        divide_rows(&multiply_columns(a, scale), scale),
-        divide_rows(&divide_columns(g, scale), scale),
-        multiply_rows(&multiply_columns(q, scale), scale),
-    )
+/// S^-1 M S.
+pub(super) fn similar(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    divide_rows(&multiply_columns(m, scale), scale)
+}
+
+/// S M S.
+pub(super) fn multiplied(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    multiply_rows(&multiply_columns(m, scale), scale)
+}
+
+/// S^-1 M S^-1.
+pub(super) fn divided(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    divide_rows(&divide_columns(m, scale), scale)
 }
