@@ -3,7 +3,8 @@
 mod doubling;
 mod triangular;
 
-use crate::balance::{Balance, multiply_columns, multiply_rows};
+use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
+use crate::blocks::symmetric_part;
 use crate::svd::Svd;
 use crate::{Domain, Error, check, stability};
 use doubling::Doubling;
@@ -64,7 +65,7 @@ pub struct Solution {
 /// matrix; [`Error::NotHurwitz`]; [`Error::NotConverged`] when the Schur form is not found;
 /// [`Error::Overflow`]; [`Error::ResidualTooLarge`].
 pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
-    CONTINUOUS.solve_checked(a, q, Domain::Continuous)
+    CONTINUOUS.solve_checked(a, q)
 }
 
 /// Solves A' P A - P = -Q.
@@ -94,7 +95,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
 /// matrix; [`Error::NotSchur`]; [`Error::NotConverged`] when the Schur form is not found;
 /// [`Error::Overflow`]; [`Error::ResidualTooLarge`].
 pub fn discrete_lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
-    DISCRETE.solve_checked(a, q, Domain::Sampled { period: 1.0 })
+    DISCRETE.solve_checked(a, q)
 }
 
 /// The smallest and the largest eigenvalue of a symmetric positive definite matrix.
@@ -158,17 +159,20 @@ pub(crate) const DISCRETE: Equation = Equation {
 };
 
 impl Equation {
-    fn solve_checked(
-        &self,
-        a: &DMatrix<f64>,
-        q: &DMatrix<f64>,
-        domain: Domain,
-    ) -> Result<Solution, Error> {
+    fn solve_checked(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
         let n = check::square("A", a)?;
         check::shape("Q", q, (n, n))?;
         symmetric("Q", q)?;
-        stability::require_stable("A", a, domain)?;
-        self.verified(a, self.solve(a, q)?, q)
+        stability::require_stable("A", a, self.domain)?;
+        let p = self.solve(a, q)?;
+        let residual = self.residual(a, &p, q);
+        if residual > ALLOWED_RESIDUAL {
+            let (equation, allowed) = (self.name, ALLOWED_RESIDUAL);
+            return Err(Error::ResidualTooLarge { equation, residual, allowed });
+        }
+        let (remainder, size) = ((self.remainder)(a, &p, q).norm(), q.norm());
+        let defect = if size > 0.0 { remainder / size } else { remainder };
+        Ok(Solution { p, residual, defect })
     }
 
     /// Computes P for a stable A and a symmetric Q.
@@ -188,8 +192,7 @@ impl Equation {
             Some(other) if residual(&other) < residual(&p) => other,
             _ => p,
         };
-        let restore = |i: usize, j: usize| p[(i, j)] / scale[i] / scale[j];
-        check::in_range("P", DMatrix::from_fn(p.nrows(), p.ncols(), restore))
+        check::in_range("P", divide_columns(&divide_rows(&p, &scale), &scale))
     }
 
     fn by_schur_form(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
@@ -198,29 +201,12 @@ impl Equation {
         for _ in 0..REFINEMENTS {
             p += (self.substitute)(&triangular, &(self.remainder)(a, &p, q));
         }
-        Ok((&p + p.transpose()) * 0.5)
+        Ok(symmetric_part(&p))
     }
 
     /// See [`Solution::residual`].
     fn residual(&self, a: &DMatrix<f64>, p: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
         relative(&(self.remainder)(a, p, q), &(self.terms)(&a.abs(), &sizes(p), &q.abs()))
-    }
-
-    fn verified(
-        &self,
-        a: &DMatrix<f64>,
-        p: DMatrix<f64>,
-        q: &DMatrix<f64>,
-    ) -> Result<Solution, Error> {
-        let remainder = (self.remainder)(a, &p, q);
-        let residual = self.residual(a, &p, q);
-        if residual > ALLOWED_RESIDUAL {
-            let (equation, allowed) = (self.name, ALLOWED_RESIDUAL);
-            return Err(Error::ResidualTooLarge { equation, residual, allowed });
-        }
-        let size = q.norm();
-        let defect = if size > 0.0 { remainder.norm() / size } else { remainder.norm() };
-        Ok(Solution { p, residual, defect })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::LeftSide;
 use crate::Domain;
+use crate::blocks::symmetric_part;
 use nalgebra::DMatrix;
 
 const DOUBLINGS: usize = 60;
@@ -57,7 +58,7 @@ impl<'a> Doubling<'a> {
     pub(super) fn solve(&self, q: &DMatrix<f64>, remainder: LeftSide) -> Option<DMatrix<f64>> {
         let mut p = self.sum(q);
         p += self.sum(&remainder(self.a, &p, q));
-        p = (&p + p.transpose()) * 0.5;
+        let p = symmetric_part(&p);
         p.iter().all(|entry| entry.is_finite()).then_some(p)
     }
 

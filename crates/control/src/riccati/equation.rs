@@ -2,7 +2,7 @@
 
 use crate::Domain;
 use crate::blocks::symmetric_part;
-use crate::lyapunov::{self, Equation, relative, sizes};
+use crate::lyapunov::{self, relative, sizes};
 use nalgebra::DMatrix;
 
 /// Terms below this fraction of the largest ones hold their rounding.
@@ -93,15 +93,12 @@ impl RiccatiEquation {
         let gain = self.gain(p)?;
         let closed = &self.a + &self.b * &gain;
         crate::stability::require_stable("A + B K", &closed, self.domain).ok()?;
-        let step = self.equation().solve(&closed, &self.left_side(p, &gain)).ok()?;
+        let equation = match self.domain {
+            Domain::Continuous => lyapunov::CONTINUOUS,
+            Domain::Sampled { .. } => lyapunov::DISCRETE,
+        };
+        let step = equation.solve(&closed, &self.left_side(p, &gain)).ok()?;
         Some(symmetric_part(&(p + step)))
-    }
-
-    fn equation(&self) -> &'static Equation {
-        match self.domain {
-            Domain::Continuous => &lyapunov::CONTINUOUS,
-            Domain::Sampled { .. } => &lyapunov::DISCRETE,
-        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The Kalman filter in steady state, the dual of the regulator.
 
 use super::{Weights, lqr};
+use crate::blocks::symmetric_part;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
 
@@ -74,8 +75,7 @@ pub fn kalman(
     let current_gain = match domain {
         Domain::Continuous => None,
         Domain::Sampled { .. } => {
-            let innovation = v + c * &dual.p * c.transpose();
-            let innovation = (&innovation + innovation.transpose()) * 0.5;
+            let innovation = symmetric_part(&(v + c * &dual.p * c.transpose()));
             let factor = innovation.cholesky().ok_or(Error::Overflow { what: "V + C P C'" })?;
             Some(factor.solve(&(c * &dual.p)).transpose())
         }
