@@ -20,7 +20,7 @@ pub use structured::Structure;
 
 use crate::blocks::{block_2x2, stacked};
 use crate::response::h_infinity;
-use crate::robustness::{Loop, Point};
+use crate::robustness::{Loop, Point, beside};
 use crate::weight::Weight;
 use crate::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
@@ -145,11 +145,10 @@ impl Term {
                 let whole = closed.system();
                 let (p, m) = closed.plant().d.shape();
                 StateSpace {
-                    a: whole.a,
                     b: whole.b.columns(m, p).into(),
                     c: whole.c.rows(0, m).into(),
                     d: closed.controller().d.clone(),
-                    domain: whole.domain,
+                    ..whole
                 }
             }
             Transfer::Tracking => {
@@ -173,15 +172,10 @@ impl Term {
         let channels = vec![self.weight.clone(); x.d.nrows()];
         let weight = crate::weight::diagonal(&channels, x.domain)?;
         let none = DMatrix::zeros(x.a.nrows(), weight.a.ncols());
-        let n = x.a.nrows();
-        let mut b = x.b.clone().resize_vertically(n + weight.a.nrows(), 0.0);
-        b.rows_mut(n, weight.a.nrows()).copy_from(&(&weight.b * &x.d));
-        let mut c = (&weight.d * &x.c).resize_horizontally(n + weight.a.nrows(), 0.0);
-        c.columns_mut(n, weight.a.nrows()).copy_from(&weight.c);
         Ok(StateSpace {
             a: block_2x2([&x.a, &none], [&(&weight.b * &x.c), &weight.a]),
-            b,
-            c,
+            b: stacked(&x.b, &(&weight.b * &x.d)),
+            c: beside(&(&weight.d * &x.c), &weight.c),
             d: &weight.d * &x.d,
             domain: x.domain,
         })
