@@ -33,6 +33,7 @@ pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
 pub use windup::windup_gain;
 
 use crate::blocks::{block_2x2, stacked};
+use crate::robustness::beside;
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -206,12 +207,16 @@ pub fn feedforward(
     let identity = DMatrix::identity(t, t);
     let first = solve(&identity);
     let n_r = &first + solve(&(&identity - gain(&first)?));
-    let residual = (gain(&n_r)? - identity).amax();
-    if residual.is_nan() || residual > 1e-9 {
-        let (equation, allowed) = ("G N_r = I", 1e-9);
-        return Err(Error::ResidualTooLarge { equation, residual, allowed });
-    }
+    require_residual("G N_r = I", (gain(&n_r)? - identity).amax(), 1e-9)?;
     Ok(n_r)
+}
+
+/// Refuses a residual above `allowed`, or one that is no number.
+fn require_residual(equation: &'static str, residual: f64, allowed: f64) -> Result<(), Error> {
+    if residual <= allowed {
+        return Ok(());
+    }
+    Err(Error::ResidualTooLarge { equation, residual, allowed })
 }
 
 /// The loop from the references to [x; u], without faults and estimation errors.
@@ -243,7 +248,7 @@ pub fn reference_system(
             let t = output.nrows();
             check::shape("K_i", gain, (m, t))?;
             let (a_e, b_e) = extended_pair(a, b, output, domain)?;
-            let k = stacked(&k_x.transpose(), &gain.transpose()).transpose();
+            let k = beside(k_x, gain);
             let mut into = DMatrix::zeros(n + t, t);
             into.rows_mut(n, t).fill_diagonal(integration(domain).0);
             let mut direct = DMatrix::zeros(m, t);

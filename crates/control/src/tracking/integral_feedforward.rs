@@ -1,6 +1,6 @@
 //! The feedforward of references beside integral action.
 
-use super::{extended_pair, integration};
+use super::{extended_pair, integration, require_residual};
 use crate::eigen::eigenvalues;
 use crate::rank::controllable_part;
 use crate::svd::Svd;
@@ -100,13 +100,7 @@ fn of_controllable(
     let dynamics = w.transpose() * &controlled * &w;
     let residual =
         (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
-    if residual.is_nan() || residual > 1e-8 {
-        return Err(Error::ResidualTooLarge {
-            equation: "W' (A_e + B_e K) = S W'",
-            residual,
-            allowed: 1e-8,
-        });
-    }
+    require_residual("W' (A_e + B_e K) = S W'", residual, 1e-8)?;
     let acting = w.rows(0, n).transpose() * b;
     let svd = Svd::new(&acting.transpose())?;
     if svd.rank(1e-9) < t {
@@ -120,13 +114,7 @@ fn of_controllable(
     let left = svd.left.columns(0, t);
     let gain = left * svd.whitening(t).transpose() * &required;
     let residual = (&acting * &gain - &required).norm() / required.norm();
-    if residual.is_nan() || residual > 1e-9 {
-        return Err(Error::ResidualTooLarge {
-            equation: "W' [B N_r; I] = 0",
-            residual,
-            allowed: 1e-9,
-        });
-    }
+    require_residual("W' [B N_r; I] = 0", residual, 1e-9)?;
     Ok(Ok(IntegralFeedforward { gain, silent }))
 }
 
