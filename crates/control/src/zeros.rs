@@ -70,8 +70,7 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     let system = scaled(a, b, c);
     let size = system.a.norm().hypot(system.b.norm()).hypot(system.c.norm());
     let all = n + b.ncols() + c.nrows();
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let zero = TOLERANCE_PER_STATE * all as f64 * size;
+    let zero = TOLERANCE_PER_STATE * check::as_number(all) * size;
     let (system, _) = reduced(system, DMatrix::zeros(0, n), zero)?;
     let dual = system.dual();
     let none = DMatrix::zeros(0, dual.a.nrows());

@@ -2,6 +2,7 @@
 
 use super::bracket::Bracket;
 use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::check::as_number;
 use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
@@ -79,8 +80,7 @@ pub(super) fn impulse_sums(
 /// The largest number of samples of contraction by half for which adding all samples needs fewer
 /// operations than intervals do.
 fn affordable(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(|count| count as f64);
+    let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(as_number);
     let oscillations = |value: &Complex<f64>| {
         let decay = -value.norm().max(f64::MIN_POSITIVE).ln();
         value.arg().abs() / TAU * HALVINGS / decay

@@ -177,8 +177,7 @@ fn integral(
         let (lower, upper) = (sum(|bounds| bounds.lower), sum(|bounds| bounds.upper));
         let allowed = width * lower + sum(|bounds| bounds.rounding);
         let count: usize = pieces.iter().map(Vec::len).sum();
-        #[expect(clippy::cast_precision_loss, reason = "at most 2^19 pieces")]
-        let share = allowed / count as f64;
+        let share = allowed / check::as_number(count);
         let widest = pieces[1..].iter().flatten().map(Piece::open).fold(0.0, f64::max);
         if upper - lower <= allowed || widest <= share {
             return Ok((lower, upper + tail));

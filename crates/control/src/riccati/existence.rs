@@ -2,6 +2,7 @@
 
 use super::problem::ScaledProblem;
 use crate::blocks::{stacked, to_complex};
+use crate::check::as_number;
 use crate::eigen::eigenvalues;
 use crate::svd::ComplexSvd;
 use crate::{Domain, Error};
@@ -53,9 +54,7 @@ fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result
 }
 
 fn tolerance(a: &DMatrix<f64>) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let n = a.nrows() as f64;
-    TOLERANCE_PER_STATE * n
+    TOLERANCE_PER_STATE * as_number(a.nrows())
 }
 
 /// A lower bound of the singular values of [A - lambda I; Q] for every lambda, Q scaled to the size

@@ -1,6 +1,7 @@
 //! Weights that are positive semidefinite up to rounding.
 
 use crate::Error;
+use crate::check::as_number;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Negative eigenvalues of a weight down to this part of its scale are rounding, per state.
@@ -25,7 +26,5 @@ pub(super) fn require_semidefinite(m: &DMatrix<f64>, before: &DMatrix<f64>) -> R
     let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, iterations);
     let what = "the eigenvalue iteration of a weight";
     let values = eigen.ok_or(Error::NotConverged { what, iterations })?.eigenvalues;
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let allowed = SEMIDEFINITE * n as f64;
-    if values.min() < -allowed { Err(refused) } else { Ok(()) }
+    if values.min() < -(SEMIDEFINITE * as_number(n)) { Err(refused) } else { Ok(()) }
 }

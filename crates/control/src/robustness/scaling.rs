@@ -1,6 +1,7 @@
 //! The structured singular value for independent complex changes in each channel.
 
 use crate::Error;
+use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
 /// Widths of ln(mu) at which the search ends.
@@ -53,8 +54,7 @@ pub(super) fn scaled_norm_above(
     let mut shape = DMatrix::from_diagonal_element(free, free, RANGE * RANGE);
     let mut best = (first.norm, start.clone());
     let mut lower = f64::NEG_INFINITY;
-    #[expect(clippy::cast_precision_loss, reason = "a number of channels")]
-    let n = free as f64;
+    let n = as_number(free);
     for _ in 0..STEPS_PER_DIMENSION * free {
         let exponents = &start + center.clone().resize_vertically(k, 0.0);
         let scaled = Scaled::new(m, &exponents)?;

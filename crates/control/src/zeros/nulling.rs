@@ -46,8 +46,8 @@ pub(crate) fn output_nulling(
         domain: system.domain,
     };
     let norms = [&scaled.a, &scaled.b, &scaled.c, &scaled.d].map(DMatrix::norm);
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let zero = TOLERANCE_PER_STATE * all as f64 * norms.into_iter().fold(0.0, f64::hypot);
+    let size = norms.into_iter().fold(0.0, f64::hypot);
+    let zero = TOLERANCE_PER_STATE * check::as_number(all) * size;
     let (core, output) = reduced(scaled, multiply_columns(output, &scale), zero)?;
     let inputs = core.b.ncols();
     if core.d.nrows() != inputs || Svd::new(&core.d)?.rank_above(zero) < inputs {
