@@ -1,6 +1,7 @@
 //! Step and ramp responses, on a time grid that is adapted to the modes.
 
 use crate::balance::power_of_two;
+use crate::check::as_number;
 use crate::hold::FirstOrderHold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -33,12 +34,12 @@ pub struct TimeResponse {
 
 impl TimeResponse {
     /// The response to an input that is `factor` times as large.
-    pub(super) fn scaled(&self, factor: f64) -> Self {
+    pub(super) fn scaled(self, factor: f64) -> Self {
         Self {
-            time: self.time.clone(),
-            output: &self.output * factor,
-            final_value: &self.final_value * factor,
-            slope: &self.slope * factor,
+            output: self.output * factor,
+            final_value: self.final_value * factor,
+            slope: self.slope * factor,
+            ..self
         }
     }
 }
@@ -106,10 +107,8 @@ fn check_input(system: &StateSpace, input: usize) -> Result<(), Error> {
     if input < system.b.ncols() {
         return Ok(());
     }
-    #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
-    let value = input as f64;
     let rule = "an index below the number of columns of B";
-    Err(Error::OutOfRange { name: "input", value, rule })
+    Err(Error::OutOfRange { name: "input", value: as_number(input), rule })
 }
 
 fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<TimeResponse, Error> {
@@ -148,7 +147,7 @@ struct Modes {
 /// Steps of one length.
 struct Segment {
     step: f64,
-    count: usize,
+    count: u64,
     /// Whether the steps are too long to follow the fastest oscillation.
     is_coarse: bool,
 }
@@ -165,8 +164,7 @@ impl Modes {
             Domain::Continuous => 0.0,
             Domain::Sampled { period } => period,
         };
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let shift_register = period * eigenvalues.len() as f64;
+        let shift_register = period * as_number(eigenvalues.len());
         let life = |exponent: Complex<f64>| {
             ((FOLLOWED / exponent.re.abs()).max(shift_register), exponent.norm())
         };
@@ -207,8 +205,7 @@ impl Modes {
             }
             let rate = self.lives[first..].iter().fold(0.0_f64, |most, life| most.max(life.1));
             let resolving = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
-            #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-            let reserved = RESERVED * (self.lives.len() - first) as f64;
+            let reserved = RESERVED * as_number(self.lives.len() - first);
             let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
             if self.period == 0.0 && until < end {
@@ -251,8 +248,8 @@ impl Modes {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of samples")]
-fn whole(samples: f64) -> usize {
-    samples as usize
+fn whole(samples: f64) -> u64 {
+    samples as u64
 }
 
 /// The simulation of a system along the grid.
@@ -363,16 +360,11 @@ fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
     let Domain::Sampled { period } = *domain else {
         return FirstOrderHold::new(a, b, step);
     };
+    let mut left = whole((step / period).round());
     let (n, m) = b.shape();
     let (zero, identity) = (DMatrix::zeros(n, m), DMatrix::identity(n, n));
     let mut whole = FirstOrderHold { phi: identity, gamma_0: zero.clone(), gamma_1: zero.clone() };
     let mut power = FirstOrderHold { phi: a.clone(), gamma_0: b.clone(), gamma_1: zero };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a whole number of samples, at least one"
-    )]
-    let mut left = (step / period).round() as u64;
     let (mut power_time, mut time) = (period, 0.0);
     while left > 0 {
         if left % 2 == 1 {
