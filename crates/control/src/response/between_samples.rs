@@ -1,7 +1,8 @@
 //! Bounds of a sampled loop at all times, between the samples too.
 
-use super::fault_loop::{error_part, loop_dynamics, outputs, require_rows};
+use super::fault_loop::{error_part, loop_dynamics, outputs, require_rows, with_integrals};
 use super::peak_gain;
+use crate::blocks::stacked;
 use crate::faults::ExtendedPlant;
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
@@ -117,14 +118,6 @@ impl<'a> Lifted<'a> {
         if j < i { &self.phi[i - 1 - j] * &self.entry } else { &self.entry * 0.0 }
     }
 
-    /// Completes a matrix of the plant's states by the rows of the filter.
-    fn with_filter(&self, states: &DMatrix<f64>, filter: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut all = DMatrix::zeros(self.plant.a.nrows(), states.ncols());
-        all.rows_mut(0, self.states).copy_from(states);
-        all.rows_mut(self.states, filter.nrows()).copy_from(filter);
-        all
-    }
-
     /// The rows of the sampled `F_a` of the filter, which sees the fault at the samples.
     fn at_samples(&self) -> DMatrix<f64> {
         let all = self.plant.a.nrows();
@@ -135,7 +128,7 @@ impl<'a> Lifted<'a> {
     fn faults(&self) -> Effects {
         let count = self.parts();
         let filter = |j| self.at_samples() * f64::from(u8::from(j == 0));
-        let states_after = |j| self.with_filter(&self.effect(count, j), &filter(j));
+        let states_after = |j| stacked(&self.effect(count, j), &filter(j));
         Effects {
             states_after: (0..count).map(states_after).collect(),
             outputs: (0..count).map(|i| (0..count).map(|j| self.effect(i, j)).collect()).collect(),
@@ -152,7 +145,7 @@ impl<'a> Lifted<'a> {
             (r + 1..i).fold(zero, |sum, j| sum + self.effect(i, j)) * self.part
         };
         let nothing = self.at_samples() * 0.0;
-        let states_after = |r| self.with_filter(&sum(count, r), &nothing);
+        let states_after = |r| stacked(&sum(count, r), &nothing);
         Effects {
             states_after: (0..count).map(states_after).collect(),
             outputs: (0..count).map(|i| (0..count).map(|r| sum(i, r)).collect()).collect(),
@@ -166,7 +159,7 @@ impl<'a> Lifted<'a> {
         let Gains { k_f, .. } = self.gains;
         let until = |i: usize| (0..i).fold(&self.gamma[i] * k_f, |sum, j| sum + self.effect(i, j));
         Effects {
-            states_after: vec![self.with_filter(&until(self.parts()), &self.at_samples())],
+            states_after: vec![stacked(&until(self.parts()), &self.at_samples())],
             outputs: (0..self.parts()).map(|i| vec![until(i)]).collect(),
             next_error: vec![0.0],
             present_error: vec![0.0],
@@ -205,15 +198,8 @@ impl<'a> Lifted<'a> {
         if self.gains.estimator == Estimator::Current {
             errors -= self.gains.observer_gain() * &self.plant.c * states_after;
         }
-        let t = self.gains.integrals();
-        let mut column = DMatrix::zeros(2 * n + q + t, q);
-        column.view_mut((0, 0), (n, q)).copy_from(states_after);
-        column.view_mut((n, 0), (n + q, q)).copy_from(&errors);
-        if let Some(integral) = &self.gains.integral {
-            let sensed = &integral.faults * (self.period * inputs.present_error[j]);
-            column.rows_mut(2 * n + q, t).copy_from(&sensed);
-        }
-        column
+        let factor = self.period * inputs.present_error[j];
+        with_integrals(self.gains, &stacked(states_after, &errors), factor)
     }
 
     /// See [`gains_between_samples`].

@@ -55,7 +55,7 @@ pub fn fault_bounds(
     magnitudes: &[f64],
     rates: &[f64],
 ) -> Result<FaultBounds, Error> {
-    let (n, q) = (plant.f_a.nrows(), plant.f_a.ncols());
+    let (n, q) = plant.f_a.shape();
     for (name, bounds) in [("magnitudes", magnitudes), ("rates", rates)] {
         if bounds.len() != q {
             let (expected, actual) = ((q, 1), (bounds.len(), 1));
@@ -68,7 +68,7 @@ pub fn fault_bounds(
             check::positive("rate", rate)?;
         }
     }
-    let rows: Vec<usize> = (0..2 * plant.f_a.nrows() + q).collect();
+    let rows: Vec<usize> = (0..2 * n + q).collect();
     let [gain_of_fault, gain_of_rate, uncancelled] =
         fault_gains(plant, gains, domain, &rows, WIDTH)?;
     let bound = |output: usize| {
@@ -169,7 +169,7 @@ pub fn reversal(
         }
     };
     let trace = unit.scaled(change);
-    let (n, q) = (plant.f_a.nrows(), plant.f_a.ncols());
+    let (n, q) = plant.f_a.shape();
     let transients = |from: usize, count: usize| {
         (from..from + count).map(|output| trace.transient(output, fraction)).collect()
     };

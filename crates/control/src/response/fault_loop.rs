@@ -1,10 +1,12 @@
 //! Plant and controller of [`crate::aso`] as one system with the fault as its input.
 
 use super::peak_gain;
+use crate::blocks::stacked;
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
+use crate::robustness::beside;
 use crate::tracking::{IntegralAction, integration};
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// The closed loop as a system from the fault f to [x; e; eps].
@@ -36,22 +38,20 @@ pub fn fault_system(
 ) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
-    let order = 2 * n + q + gains.integrals();
-    let mut b = DMatrix::zeros(order, q);
-    b.view_mut((0, 0), (n, q)).copy_from(&plant.f_a);
     let mut errors = plant.f_a.clone().resize_vertically(n + q, 0.0);
     if gains.estimator == Estimator::Current {
         errors -= gains.observer_gain() * &plant.c * &plant.f_a;
     }
-    b.view_mut((n, 0), (n + q, q)).copy_from(&errors);
-    if let Some(integral) = &gains.integral {
-        b.rows_mut(2 * n + q, gains.integrals())
-            .copy_from(&(&integral.faults * -integration(domain).0));
-    }
-    let mut d = DMatrix::zeros(2 * n + q, q);
-    d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
+    let b = with_integrals(gains, &stacked(&plant.f_a, &errors), -integration(domain).0);
+    let d = stacked(&DMatrix::zeros(2 * n, q), &-DMatrix::identity(q, q));
     let c = outputs(plant, gains);
     Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
+}
+
+/// `b`, the effect of a fault on [x; e; `f_hat`], and below it its effect `factor` H `F_s` on the integrals.
+pub(super) fn with_integrals(gains: &Gains, b: &DMatrix<f64>, factor: f64) -> DMatrix<f64> {
+    let none = DMatrix::zeros(0, b.ncols());
+    stacked(b, &gains.integral.as_ref().map_or(none, |integral| &integral.faults * factor))
 }
 
 /// The closed loop as a system from [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the
@@ -122,11 +122,9 @@ pub fn fault_gains(
     let mut all = fault_system(plant, gains, domain)?;
     let of_rates = fault_rate_system(plant, gains, domain)?;
     let q = plant.f_a.ncols();
-    all.b = all.b.resize_horizontally(3 * q, 0.0);
-    all.d = all.d.resize_horizontally(3 * q, 0.0);
-    all.b.columns_mut(q, 2 * q).copy_from(&of_rates.b);
-    all.d.columns_mut(q, 2 * q).copy_from(&of_rates.d);
-    (all.c, all.d) = (all.c.select_rows(rows), all.d.select_rows(rows));
+    all.b = beside(&all.b, &of_rates.b);
+    all.c = all.c.select_rows(rows);
+    all.d = beside(&all.d, &of_rates.d).select_rows(rows);
     if rows.iter().all(|row| *row >= plant.a.nrows()) {
         all = error_part(plant, &all);
     }
@@ -138,10 +136,8 @@ pub fn fault_gains(
 pub(super) fn require_rows(plant: &FaultyPlant, rows: &[usize]) -> Result<(), Error> {
     let (n, q) = plant.f_a.shape();
     let Some(row) = rows.iter().find(|row| **row >= 2 * n + q) else { return Ok(()) };
-    #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
-    let value = *row as f64;
     let rule = "an index below the number of states and errors";
-    Err(Error::OutOfRange { name: "rows", value, rule })
+    Err(Error::OutOfRange { name: "rows", value: check::as_number(*row), rule })
 }
 
 /// [x; e; eps] of the state of both systems: the identity without a direct term and integrals.
