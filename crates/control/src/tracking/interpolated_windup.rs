@@ -99,16 +99,13 @@ pub fn interpolated_windup(
             k_i.map(|k| DMatrix::from_fn(at_limit.len(), t, |i, j| k[(at_limit[i], j)] / units[i]));
         let l =
             l_w.map(|l| DMatrix::from_fn(t, at_limit.len(), |i, j| l[(i, at_limit[j])] * units[j]));
-        match examine(&follows(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain)? {
-            Examined::Stable => {}
-            Examined::Unstable { part, instability } => {
-                return Ok(InterpolatedWindup::Unstable { part, limited: at_limit, instability });
-            }
-            Examined::Undecided => undecided = undecided.or(Some(at_limit)),
+        match examine(&follows(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain, &at_limit)? {
+            InterpolatedWindup::Stable => {}
+            unstable @ InterpolatedWindup::Unstable { .. } => return Ok(unstable),
+            open @ InterpolatedWindup::Undecided { .. } => undecided = undecided.or(Some(open)),
         }
     }
-    Ok(undecided
-        .map_or(InterpolatedWindup::Stable, |limited| InterpolatedWindup::Undecided { limited }))
+    Ok(undecided.unwrap_or(InterpolatedWindup::Stable))
 }
 
 /// The Bernstein coefficients of M(s).
@@ -137,62 +134,57 @@ fn follows(
     ])
 }
 
-enum Examined {
-    Stable,
-    Unstable { part: f64, instability: f64 },
-    Undecided,
-}
-
-/// Examines M(s) for s between `ends`, from its Bernstein coefficients there.
+/// Examines M(s) for s between `ends`, from its Bernstein coefficients there; `limited`: the commands at their limits.
 fn examine(
     coefficients: &[DMatrix<f64>; 3],
     ends: [f64; 2],
     bisections: usize,
     domain: Domain,
-) -> Result<Examined, Error> {
+    limited: &[usize],
+) -> Result<InterpolatedWindup, Error> {
     let [first, inner, last] = coefficients;
     if first.is_empty() {
-        return Ok(Examined::Stable);
+        return Ok(InterpolatedWindup::Stable);
     }
+    let undecided = || InterpolatedWindup::Undecided { limited: limited.to_vec() };
     let halves = [(first + inner) * 0.5, (inner + last) * 0.5];
     let middle = (&halves[0] + &halves[1]) * 0.5;
     let centre = (ends[0] + ends[1]) * 0.5;
+    let neutral = match domain {
+        Domain::Continuous => NEUTRAL * coefficients.iter().map(DMatrix::amax).fold(0.0, f64::max),
+        Domain::Sampled { .. } => NEUTRAL,
+    };
     for (part, value) in [(ends[0], first), (centre, &middle), (ends[1], last)] {
         let instability = instability(value, domain)?;
-        let neutral = match domain {
-            Domain::Continuous => {
-                NEUTRAL * coefficients.iter().map(DMatrix::amax).fold(0.0, f64::max)
-            }
-            Domain::Sampled { .. } => NEUTRAL,
-        };
         if instability > neutral {
-            return Ok(Examined::Unstable { part, instability });
+            return Ok(InterpolatedWindup::Unstable {
+                part,
+                limited: limited.to_vec(),
+                instability,
+            });
         }
         if instability > -neutral {
-            return Ok(Examined::Undecided);
+            return Ok(undecided());
         }
     }
-    let proven = match domain {
-        Domain::Continuous => decreases(&middle, coefficients)?,
-        Domain::Sampled { .. } => contracts(&middle, coefficients)?,
-    };
-    if proven {
-        return Ok(Examined::Stable);
+    let proves = if domain == Domain::Continuous { decreases } else { contracts };
+    if proves(&middle, coefficients)? {
+        return Ok(InterpolatedWindup::Stable);
     }
     if bisections == 0 {
-        return Ok(Examined::Undecided);
+        return Ok(undecided());
     }
     let [left, right] = halves;
     let parts = [
         ([first.clone(), left, middle.clone()], [ends[0], centre]),
         ([middle, right, last.clone()], [centre, ends[1]]),
     ];
-    let mut outcome = Examined::Stable;
+    let mut outcome = InterpolatedWindup::Stable;
     for (coefficients, ends) in parts {
-        match examine(&coefficients, ends, bisections - 1, domain)? {
-            Examined::Stable => {}
-            Examined::Undecided => outcome = Examined::Undecided,
-            unstable @ Examined::Unstable { .. } => return Ok(unstable),
+        match examine(&coefficients, ends, bisections - 1, domain, limited)? {
+            InterpolatedWindup::Stable => {}
+            unstable @ InterpolatedWindup::Unstable { .. } => return Ok(unstable),
+            open @ InterpolatedWindup::Undecided { .. } => outcome = open,
         }
     }
     Ok(outcome)
