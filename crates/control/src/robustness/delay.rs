@@ -121,7 +121,7 @@ pub(super) fn refined(
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most twenty")]
     let samples = whole as usize;
     let value = |part: f64| {
-        let dynamics = delayed(plant, controller, period, Delay { samples, part })?;
+        let dynamics = delayed(plant, controller, period, samples, part)?;
         instability(&dynamics, controller.domain)
     };
     // Rounding may hide that the loop is stable at the start and unstable at the end.
@@ -130,23 +130,15 @@ pub(super) fn refined(
     Ok(period * (whole + narrowed(start, end, value)?.0))
 }
 
-/// A delay of whole samples and a part of one.
-#[derive(Clone, Copy)]
-struct Delay {
-    samples: usize,
-    /// 0 to 1.
-    part: f64,
-}
-
-/// The loop with delayed commands: its states are those of plant and controller and the last
-/// `samples` + 1 commands, the newest first.
+/// The loop whose commands are delayed by `samples` and a part of one, 0 to 1: its states are those of plant and
+/// controller and the last `samples` + 1 commands, the newest first.
 fn delayed(
     plant: &StateSpace,
     controller: &StateSpace,
     period: f64,
-    delay: Delay,
+    samples: usize,
+    part: f64,
 ) -> Result<DMatrix<f64>, Error> {
-    let Delay { samples, part } = delay;
     let (n, m) = plant.b.shape();
     let k = controller.a.nrows();
     let mut a = DMatrix::identity(n, n);
