@@ -55,7 +55,18 @@ pub fn frequency_response(
 ) -> Result<Vec<FrequencyPoint>, Error> {
     system.check()?;
     let transfer = Transfer::new(system);
-    frequencies.iter().map(|&frequency| transfer.point(frequency)).collect()
+    let point = |&frequency: &f64| {
+        let gain = transfer.gain(frequency)?;
+        Ok(FrequencyPoint { frequency, singular_values: singular_values(&gain)?, gain })
+    };
+    frequencies.iter().map(point).collect()
+}
+
+/// The singular values of a complex matrix, descending, as many as rows or columns, whichever are fewer.
+pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, Error> {
+    let is_wide = gain.nrows() < gain.ncols();
+    let svd = if is_wide { ComplexSvd::new(&gain.transpose()) } else { ComplexSvd::new(gain) };
+    Ok(svd?.values())
 }
 
 /// Frequencies for a figure: `per_decade` points in each decade, evenly on the logarithmic scale.
@@ -98,6 +109,14 @@ pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32
     (0..=steps).map(|k| point(k).min(to)).collect()
 }
 
+/// The point s = j w of a frequency w on the limit of stability; z = e^(j w h) in sampled time.
+pub(crate) fn on_limit(frequency: f64, domain: Domain) -> Complex<f64> {
+    match domain {
+        Domain::Continuous => Complex::new(0.0, frequency),
+        Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
+    }
+}
+
 /// A system in coordinates in which A is balanced and in Hessenberg form, so that each frequency needs
 /// n^2 multiplications only.
 ///
@@ -138,13 +157,6 @@ impl Transfer {
         }
     }
 
-    fn point(&self, frequency: f64) -> Result<FrequencyPoint, Error> {
-        let gain = self.gain(frequency)?;
-        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain.clone() };
-        let singular_values = ComplexSvd::new(&tall)?.values();
-        Ok(FrequencyPoint { frequency, gain, singular_values })
-    }
-
     /// G at one frequency.
     pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
         self.with_direct(self.without_direct(frequency)?)
@@ -156,11 +168,7 @@ impl Transfer {
             let rule = "a finite number, not negative";
             return Err(Error::OutOfRange { name: "frequency", value: frequency, rule });
         }
-        let s = match self.domain {
-            Domain::Continuous => Complex::new(0.0, frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-        };
-        Ok(&self.c * self.states(s))
+        Ok(&self.c * self.states(on_limit(frequency, self.domain)))
     }
 
     /// G from C (s I - A)^-1 B.

@@ -1,8 +1,7 @@
 //! A stable system whose eigenvalues and frequency response are computed once.
 
-use super::frequency::{Transfer, grid};
+use super::frequency::{Transfer, grid, singular_values};
 use crate::balance::{divide_columns, multiply_rows};
-use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::HashMap;
@@ -11,6 +10,17 @@ use std::f64::consts::PI;
 const PER_DECADE: u32 = 60;
 /// Below this order a scaled system is computed afresh, with the same bits as alone.
 const LARGE: usize = 48;
+
+/// The system from one input to the output of the same number.
+pub(crate) fn of_channel(system: &StateSpace, channel: usize) -> StateSpace {
+    StateSpace {
+        a: system.a.clone(),
+        b: system.b.columns(channel, 1).into(),
+        c: system.c.rows(channel, 1).into(),
+        d: system.d.view((channel, channel), (1, 1)).into(),
+        domain: system.domain,
+    }
+}
 
 /// A stable system with its eigenvalues, its Hessenberg form, and its response at frequencies of a sweep.
 ///
@@ -55,9 +65,7 @@ impl KnownResponse {
 
     /// The largest singular value of G at a frequency.
     pub(super) fn size(&self, frequency: f64) -> Result<f64, Error> {
-        let gain = self.gain(frequency)?;
-        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain };
-        Ok(ComplexSvd::new(&tall)?.values()[0])
+        Ok(singular_values(&self.gain(frequency)?)?[0])
     }
 
     /// The frequencies of the eigenvalues, where G may have peaks.
@@ -101,17 +109,14 @@ impl KnownResponse {
 
     /// The system from one input to the output of the same number.
     pub(crate) fn channel(&self, channel: usize) -> Self {
-        let StateSpace { a, b, c, d, domain } = &self.system;
-        let (b, c) = (b.columns(channel, 1).into(), c.rows(channel, 1).into());
-        let d = d.view((channel, channel), (1, 1)).into_owned();
-        let of_channel = |(at, gain): (&u64, &DMatrix<Complex<f64>>)| {
+        let entry = |(at, gain): (&u64, &DMatrix<Complex<f64>>)| {
             (*at, gain.view((channel, channel), (1, 1)).into())
         };
         Self {
+            system: of_channel(&self.system, channel),
             modes: self.modes.clone(),
             transfer: self.transfer.channel(channel),
-            known: self.known.iter().map(of_channel).collect(),
-            system: StateSpace { a: a.clone(), b, c, d, domain: *domain },
+            known: self.known.iter().map(entry).collect(),
         }
     }
 

@@ -1,11 +1,10 @@
 //! Margins of one channel, the others closed.
 
 use super::crossing::{Evaluation, narrowed};
-use super::disk::single;
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::eigen::RankOne;
-use crate::response::KnownResponse;
+use crate::response::{KnownResponse, of_channel};
 use crate::stability::largest_excess;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -51,7 +50,7 @@ pub struct ChannelMargins {
 /// [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable; same as
 /// [`crate::response::frequency_response`].
 pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<ChannelMargins, Error> {
-    margins_of(&KnownResponse::new(single(&closed.complementary(at), channel))?)
+    margins_of(&KnownResponse::new(of_channel(&closed.complementary(at), channel))?)
 }
 
 /// The margins of the channel with this T.
@@ -62,7 +61,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     let mut limits = vec![];
     let ends = [0, sweep.frequencies.len() - 1].map(|end| sweep.frequencies[end]);
     for frequency in crossings.into_iter().chain(ends) {
-        let l = transfer(&sweep.at(frequency)?);
+        let l = transfer(&complementary.gain(frequency)?);
         let limit = -1.0 / l.re;
         let searched = (1.0 / LARGEST_GAIN..LARGEST_GAIN).contains(&limit);
         if searched && l.im.abs() <= ON_AXIS * l.re.abs() {
@@ -72,7 +71,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     let gain = Gains::new(&complementary.system).limits(&limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
     for frequency in sweep.crossings(|t| transfer(t).norm() - 1.0)? {
-        let lag = (-transfer(&sweep.at(frequency)?)).arg();
+        let lag = (-transfer(&complementary.gain(frequency)?)).arg();
         if lag.abs() < phase {
             (phase, phase_frequency) = (lag.abs(), frequency);
         }
@@ -80,7 +79,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     }
     if let Domain::Sampled { period } = complementary.system.domain
         && delay >= period
-        && transfer(&sweep.at(PI / period)?).norm() > 1.0
+        && transfer(&complementary.gain(PI / period)?).norm() > 1.0
     {
         delay = 0.0;
     }

@@ -45,13 +45,13 @@ pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
         let excess: Vec<_> = all.iter().map(|loci| loci[rank].excess).collect();
         let value = |t: &DMatrix<Complex<f64>>| Ok(loci(t)?[rank].excess);
         for frequency in sweep.crossings_of(&excess, value)? {
-            let at = loci(&sweep.at(frequency)?)?[rank].value;
+            let at = loci(&complementary.gain(frequency)?)?[rank].value;
             delay = delay.min((-at).arg().rem_euclid(TAU) / frequency);
         }
     }
     if let Domain::Sampled { period } = complementary.system.domain
         && delay >= period
-        && loci(&sweep.at(PI / period)?)?.iter().any(|locus| locus.excess > 0.0)
+        && loci(&complementary.gain(PI / period)?)?.iter().any(|locus| locus.excess > 0.0)
     {
         delay = 0.0;
     }

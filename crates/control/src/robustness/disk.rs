@@ -4,7 +4,7 @@ use super::scaling::{ScaledPeak, balanced_norm, scaled_norm_above};
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::to_complex;
-use crate::response::{HInfinity, KnownResponse, norm_of};
+use crate::response::{HInfinity, KnownResponse, norm_of, of_channel};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -85,7 +85,7 @@ impl DiskMargin {
 pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<DiskMargin, Error> {
     let mut system = closed.sensitivity(at);
     if let Some(channel) = channel {
-        system = single(&system, channel);
+        system = of_channel(&system, channel);
     }
     margin_of(KnownResponse::new(system)?)
 }
@@ -99,17 +99,6 @@ pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error>
         certified: 1.0 / peak.certified,
         frequency: peak.frequency,
     })
-}
-
-/// The system from one input to the output of the same number.
-pub(super) fn single(system: &StateSpace, channel: usize) -> StateSpace {
-    StateSpace {
-        a: system.a.clone(),
-        b: system.b.columns(channel, 1).into(),
-        c: system.c.rows(channel, 1).into(),
-        d: system.d.view((channel, channel), (1, 1)).into(),
-        domain: system.domain,
-    }
 }
 
 /// Computes the largest value over frequency of the structured singular value of a square system,
@@ -188,8 +177,8 @@ impl Largest {
         for _ in 0..REFINEMENTS {
             let third = (high - low) / 3.0;
             let (first, second) = (low + third, high - third);
-            let left = self.offer(&sweep.at(first)?, first, 0.0)?;
-            let right = self.offer(&sweep.at(second)?, second, 0.0)?;
+            let left = self.offer(&sweep.response.gain(first)?, first, 0.0)?;
+            let right = self.offer(&sweep.response.gain(second)?, second, 0.0)?;
             // As flat as the values are precise.
             if left.min(right) >= (1.0 - FLAT) * self.value {
                 break;

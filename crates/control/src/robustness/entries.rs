@@ -4,6 +4,7 @@ use super::scaling::scaled_norm;
 use super::{Loop, Point, beside, held_plant};
 use crate::blocks::{block_2x2, to_complex};
 use crate::exponential::exponential;
+use crate::response::on_limit;
 use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
@@ -71,13 +72,12 @@ pub fn peak_derivatives(
         Domain::Sampled { period } => held_plant(plant, period)?,
     };
     let closed = Loop::new(model, controller.clone())?;
-    let mut derivatives = if peak.frequency.is_finite() {
-        closed.derivatives(peak)?
-    } else {
+    if !peak.frequency.is_finite() {
         let zero = |m: &DMatrix<f64>| DMatrix::zeros(m.nrows(), m.ncols());
         let [a, b, c, d] = [&plant.a, &plant.b, &plant.c, &plant.d].map(zero);
         return Ok(PeakDerivatives { value: 1.0, a, b, c, d });
-    };
+    }
+    let mut derivatives = closed.derivatives(peak)?;
     let (n, m) = plant.b.shape();
     derivatives.a = derivatives.a.view((0, 0), (n, n)).into();
     derivatives.b = derivatives.b.rows(0, n).into();
@@ -98,10 +98,7 @@ impl Loop {
         let SensitivityPeak { point, frequency, scaled } = *peak;
         let (plant, controller) = (self.plant(), self.controller());
         let (n, k) = (plant.a.nrows(), controller.a.nrows());
-        let s = match plant.domain {
-            Domain::Continuous => Complex::new(0.0, frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-        };
+        let s = on_limit(frequency, plant.domain);
         let StateSpace { a: dynamics, b: inputs, c: outputs, .. } = self.system();
         let pencil = ComplexMatrix::identity(n + k, n + k) * s - to_complex(&dynamics);
         let (m, p) = controller.d.shape();

@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 
 /// A frequency response on a grid that has the resonances of the system.
 pub(super) struct Sweep<'a> {
-    response: &'a KnownResponse,
+    pub(super) response: &'a KnownResponse,
     /// Ascending, in rad per unit of time.
     pub(super) frequencies: Vec<f64>,
     /// G at each of them.
@@ -20,11 +20,6 @@ impl<'a> Sweep<'a> {
         let frequencies = response.frequencies();
         let values = frequencies.iter().map(|w| response.gain(*w)).collect::<Result<_, _>>()?;
         Ok(Self { response, frequencies, values })
-    }
-
-    /// G at a frequency.
-    pub(super) fn at(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
-        self.response.gain(frequency)
     }
 
     /// The frequencies at which the real function `of` of G changes its sign.
@@ -50,7 +45,8 @@ impl<'a> Sweep<'a> {
             }
             let low = Evaluation { at: self.frequencies[at - 1], value: before };
             let high = Evaluation { at: self.frequencies[at], value: after };
-            let (low, high) = narrowed(low, high, |frequency| of(&self.at(frequency)?))?;
+            let (low, high) =
+                narrowed(low, high, |frequency| of(&self.response.gain(frequency)?))?;
             crossings.push(0.5 * (low + high));
         }
         Ok(crossings)

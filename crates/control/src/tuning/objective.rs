@@ -2,10 +2,9 @@
 
 use super::{Transfer, Tuning};
 use crate::blocks::to_complex;
-use crate::response;
+use crate::response::{self, on_limit};
 use crate::robustness::{Loop, Point};
 use crate::stability::instability;
-use crate::svd::ComplexSvd;
 use crate::weight::bilinear_frequency;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -111,11 +110,7 @@ impl<'a> Grid<'a> {
     ) -> Option<(f64, DVector<f64>)> {
         let Node { frequency, plant, weights } = &self.nodes[place.node];
         let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
-        let s = match controller.domain {
-            Domain::Continuous => Complex::new(0.0, *frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-        };
-        let order = controller.a.nrows();
+        let (order, s) = (controller.a.nrows(), on_limit(*frequency, controller.domain));
         let pencil = ComplexMatrix::identity(order, order) * s - to_complex(&controller.a);
         let (b, c) = (to_complex(&controller.b), to_complex(&controller.c));
         let (forward, backward) = (pencil.clone().lu(), pencil.transpose().lu());
@@ -189,11 +184,10 @@ fn norm(x: &ComplexMatrix) -> Option<f64> {
     if x.ncols() == 1 || x.nrows() == 1 {
         return Some(x.norm()).filter(|value| value.is_finite());
     }
-    let tall = if x.nrows() < x.ncols() { x.transpose() } else { x.clone() };
-    if tall.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
+    if x.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
         return None;
     }
-    ComplexSvd::new(&tall).ok()?.values().first().copied()
+    response::singular_values(x).ok()?.first().copied()
 }
 
 /// The largest singular value with its vectors: X v = sigma u.
