@@ -66,28 +66,21 @@ impl<'a> Barrier<'a> {
         point
     }
 
-    /// The four inequalities as matrices: of the bound, of D and G, of G from the other side, of the size of D.
-    fn matrices(&self, at: &Point, bound: f64) -> [ComplexMatrix; 4] {
-        let Point { d, g, .. } = at;
-        let sized = d.scale(self.largest_g);
-        let identity = ComplexMatrix::identity(d.nrows(), d.nrows());
-        [form(self.m, d, g, bound), &sized + g, sized - g, identity - d]
-    }
-
-    /// The factors of the inequalities; None if one does not hold.
+    /// The factors of the four inequalities: of the bound, of D and G, of G from the other side, of the size of D; None
+    /// if one does not hold.
     fn factors(&self, at: &Point, bound: f64) -> Option<[ComplexMatrix; 4]> {
-        let size: Vec<f64> = at.d.diagonal().iter().map(|x| x.re).collect();
-        if size.iter().any(|size| *size <= 0.0) {
+        let Point { d, g, .. } = at;
+        if d.diagonal().iter().any(|x| x.re <= 0.0) {
             return None;
         }
-        let scale = |by: f64| size.iter().map(|x| x * by).collect::<Vec<_>>();
-        let [form, above, below, rest] = self.matrices(at, bound);
-        let ones = vec![1.0; size.len()];
+        let size: Vec<f64> = d.diagonal().iter().map(|x| x.re * self.largest_g).collect();
+        let sized = d.scale(self.largest_g);
+        let rest = ComplexMatrix::identity(d.nrows(), d.nrows()) - d;
         Some([
-            factor(&form, &form_size(self.m, &at.d, &at.g, bound))?,
-            factor(&above, &scale(self.largest_g))?,
-            factor(&below, &scale(self.largest_g))?,
-            factor(&rest, &ones)?,
+            factor(&form(self.m, d, g, bound), &form_size(self.m, d, g, bound))?,
+            factor(&(&sized + g), &size)?,
+            factor(&(sized - g), &size)?,
+            factor(&rest, &vec![1.0; d.nrows()])?,
         ])
     }
 
