@@ -64,17 +64,10 @@ impl Weight {
         for (name, value) in [("low", low), ("frequency", frequency), ("high", high)] {
             check::positive(name, value)?;
         }
-        let first = |low: f64, high: f64| ([high, (low * high).sqrt()], [1.0, (high / low).sqrt()]);
-        let square = |[b, c]: [f64; 2]| vec![b * b, 2.0 * b * c, c * c];
-        let (numerator, denominator) = match order {
-            1 => {
-                let (numerator, denominator) = first(low, high);
-                (numerator.to_vec(), denominator.to_vec())
-            }
-            2 => {
-                let (numerator, denominator) = first(low.sqrt(), high.sqrt());
-                (square(numerator), square(denominator))
-            }
+        let first = |low: f64, high: f64| [[high, (low * high).sqrt()], [1.0, (high / low).sqrt()]];
+        let [numerator, denominator] = match order {
+            1 => first(low, high).map(Vec::from),
+            2 => first(low.sqrt(), high.sqrt()).map(|[b, c]| vec![b * b, 2.0 * b * c, c * c]),
             _ => {
                 let value = f64::from(u32::try_from(order).unwrap_or(u32::MAX));
                 return Err(Error::OutOfRange { name: "order", value, rule: "1 or 2" });

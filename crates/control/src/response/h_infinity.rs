@@ -186,10 +186,7 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
         let halved = Hamiltonian::balanced(&a, &g, &q);
         let rounding = ROUNDING * halved.norm();
         let possible = |x: &&Complex<f64>| x.re.abs() <= rounding.max(IMAGINARY * x.norm());
-        let all = match halved.eigenvalues() {
-            Some(all) => all,
-            None => eigenvalues(&hamiltonian)?,
-        };
+        let all = halved.eigenvalues().map_or_else(|| eigenvalues(&hamiltonian), Ok)?;
         all.iter().filter(possible).map(|x| x.im.abs()).collect::<Vec<_>>()
     };
     frequencies.push(0.0);

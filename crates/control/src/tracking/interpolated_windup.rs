@@ -88,12 +88,8 @@ pub fn interpolated_windup(
     }
     let mut undecided = None;
     for set in 1_usize..1 << limited.len() {
-        let at_limit: Vec<_> = limited
-            .iter()
-            .enumerate()
-            .filter(|(bit, _)| set >> bit & 1 == 1)
-            .map(|(_, j)| *j)
-            .collect();
+        let bits = (0..limited.len()).filter(|bit| set >> bit & 1 == 1);
+        let at_limit: Vec<_> = bits.map(|bit| limited[bit]).collect();
         let units: Vec<_> = at_limit.iter().filter_map(|&j| ranges[j]).collect();
         let k =
             k_i.map(|k| DMatrix::from_fn(at_limit.len(), t, |i, j| k[(at_limit[i], j)] / units[i]));
