@@ -18,7 +18,6 @@
 //! | response of that loop to a reversal of friction | [`reversal`] |
 
 mod between_samples;
-mod bracket;
 mod energy;
 mod fault;
 mod fault_loop;
@@ -32,7 +31,6 @@ mod trace;
 mod transient;
 
 pub use between_samples::{SampledLoop, gains_between_samples};
-pub use bracket::Bracket;
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{error_part, fault_gains, fault_rate_system, fault_system};
@@ -41,6 +39,6 @@ pub(crate) use frequency::{Transfer, grid, on_limit, singular_values};
 pub use h_infinity::{HInfinity, h_infinity};
 pub(crate) use h_infinity::{continuous_equivalent, norm_of, original_frequency};
 pub(crate) use known::{KnownResponse, of_channel};
-pub use peak_gain::peak_gain;
+pub use peak_gain::{Bracket, peak_gain};
 pub use trace::{TimeResponse, ramp_response, settled_output, step_response};
 pub use transient::Transient;

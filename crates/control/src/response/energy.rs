@@ -38,9 +38,8 @@ pub struct Energy {
 /// # Example
 ///
 /// ```
-/// use control::Domain;
-/// use control::StateSpace;
-/// use control::response::{energy};
+/// use control::response::energy;
+/// use control::{Domain, StateSpace};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
 /// let (a, d) = (-&one, DMatrix::zeros(1, 1));

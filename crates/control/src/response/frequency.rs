@@ -33,9 +33,8 @@ pub struct FrequencyPoint {
 /// # Example
 ///
 /// ```
-/// use control::Domain;
-/// use control::StateSpace;
-/// use control::response::{frequency_response};
+/// use control::response::frequency_response;
+/// use control::{Domain, StateSpace};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
 /// let (a, d) = (-&one, DMatrix::zeros(1, 1));

@@ -58,9 +58,8 @@ pub struct HInfinity {
 /// # Example
 ///
 /// ```
-/// use control::Domain;
-/// use control::StateSpace;
-/// use control::response::{h_infinity};
+/// use control::response::h_infinity;
+/// use control::{Domain, StateSpace};
 /// use nalgebra::DMatrix;
 /// // 1 / (s^2 + 2 d s + 1) with d = 0.1: 1 / (2 d sqrt(1 - d^2)) at w^2 = 1 - 2 d^2.
 /// let system = StateSpace {

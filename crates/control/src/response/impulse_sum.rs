@@ -1,6 +1,6 @@
 //! Peak gains of a sampled system by adding every sample of its impulse responses.
 
-use super::bracket::Bracket;
+use super::Bracket;
 use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::check::as_number;
 use crate::{Error, StateSpace};

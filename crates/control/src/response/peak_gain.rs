@@ -1,6 +1,5 @@
 //! The peak-to-peak gain.
 
-use super::bracket::Bracket;
 use super::impulse_sum::impulse_sums;
 use super::interval::{Bounds, Intervals, Length};
 use crate::{Domain, Error, StateSpace, check};
@@ -17,6 +16,16 @@ const MOST_INTERVALS: usize = 1 << 18;
 const OUTPUTS_AT_ONCE: usize = 8;
 /// Largest number of states that are stored for other outputs.
 const MOST_STATES: usize = 1 << 14;
+
+/// Lower and upper bounds of a matrix, entry by entry.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Bracket {
+    /// p x m.
+    pub lower: DMatrix<f64>,
+    /// p x m.
+    pub upper: DMatrix<f64>,
+}
 
 /// Computes the peak-to-peak gain from each input to each output.
 ///
@@ -42,9 +51,8 @@ const MOST_STATES: usize = 1 << 14;
 /// # Example
 ///
 /// ```
-/// use control::Domain;
-/// use control::StateSpace;
-/// use control::response::{peak_gain};
+/// use control::response::peak_gain;
+/// use control::{Domain, StateSpace};
 /// use nalgebra::DMatrix;
 /// // 1 / (s^2 + 0.2 s + 1): the impulse response changes its sign at multiples of pi / w.
 /// let system = StateSpace {
