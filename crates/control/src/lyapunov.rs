@@ -7,7 +7,7 @@ use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, mul
 use crate::blocks::symmetric_part;
 use crate::svd::Svd;
 use crate::{Domain, Error, check, stability};
-use doubling::Doubling;
+use doubling::doubled;
 use nalgebra::DMatrix;
 use triangular::Triangular;
 
@@ -179,7 +179,7 @@ impl Equation {
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Balance { matrix, scale } = Balance::new(a);
         let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
-        let by_doubling = || Doubling::new(&matrix, self.domain)?.solve(&scaled_q, self.remainder);
+        let by_doubling = || doubled(&matrix, &scaled_q, self.domain, self.remainder);
         let by_schur_form = || self.by_schur_form(&matrix, &scaled_q);
         let residual = |p: &DMatrix<f64>| self.residual(&matrix, p, &scaled_q);
         let fast = (matrix.nrows() >= LARGE).then(by_doubling).flatten();
