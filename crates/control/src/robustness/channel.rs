@@ -68,7 +68,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
             limits.push(limit);
         }
     }
-    let gain = Gains::new(&complementary.system).limits(&limits)?;
+    let gain = gain_limits(&complementary.system, &limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
     for frequency in sweep.crossings(|t| transfer(t).norm() - 1.0)? {
         let lag = (-transfer(&complementary.gain(frequency)?)).arg();
@@ -91,49 +91,32 @@ fn open(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
 }
 
-/// The loop with one channel multiplied by a gain.
-struct Gains {
-    /// A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c is the negative of what comes back.
-    family: RankOne,
-    order: usize,
-    domain: Domain,
-}
-
-impl Gains {
-    /// `system`: T of the channel.
-    fn new(system: &StateSpace) -> Self {
-        let StateSpace { a, b, c, domain, .. } = system;
-        Self { family: RankOne::new(a, b, c), order: a.nrows(), domain: *domain }
-    }
-
-    fn instability(&self, gain: f64) -> Result<f64, Error> {
-        Ok(largest_excess(&self.family.eigenvalues(1.0 - gain)?, self.domain))
-    }
-
-    /// The limits on both sides of 1: the nearest of `candidates`, or one that the tests find.
-    fn limits(&self, candidates: &[f64]) -> Result<[f64; 2], Error> {
-        let below = candidates.iter().copied().filter(|gain| *gain < 1.0).fold(0.0, f64::max);
-        let above = candidates.iter().copied().filter(|gain| *gain > 1.0);
-        let above = above.fold(f64::INFINITY, f64::min);
-        Ok([self.confirmed(below)?, self.confirmed(above)?])
-    }
-
-    /// The first unstable gain on the way from 1 to `end`, or `end`.
-    fn confirmed(&self, end: f64) -> Result<f64, Error> {
+/// The gains about 1 between which the loop of the channel with T = `system` is stable: on each side the nearest of
+/// `candidates`, or one that the tests find.
+fn gain_limits(system: &StateSpace, candidates: &[f64]) -> Result<[f64; 2], Error> {
+    let StateSpace { a, b, c, domain, .. } = system;
+    // A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c is the negative of what comes back.
+    let family = RankOne::new(a, b, c);
+    let instability =
+        |gain: f64| Ok::<_, Error>(largest_excess(&family.eigenvalues(1.0 - gain)?, *domain));
+    let count = if a.nrows() > LARGE { TESTED_GAINS_IF_LARGE } else { TESTED_GAINS };
+    // The first unstable gain on the way from 1 to `end`, or `end`.
+    let confirmed = |end: f64| {
         let far = end.clamp(1.0 / LARGEST_GAIN, LARGEST_GAIN);
         let mut good = Evaluation { at: 1.0, value: f64::NAN };
-        let large = self.order > LARGE;
-        let count = if large { TESTED_GAINS_IF_LARGE } else { TESTED_GAINS };
         for step in 1..count {
             let gain = far.powf(f64::from(step) / f64::from(count));
-            let value = self.instability(gain)?;
+            let value = instability(gain)?;
             if value < 0.0 {
                 good = Evaluation { at: gain, value };
                 continue;
             }
             let bad = Evaluation { at: gain, value: value.max(f64::MIN_POSITIVE) };
-            return Ok(narrowed(good, bad, |gain| self.instability(gain))?.0);
+            return Ok(narrowed(good, bad, instability)?.0);
         }
         Ok(end)
-    }
+    };
+    let below = candidates.iter().copied().filter(|gain| *gain < 1.0).fold(0.0, f64::max);
+    let above = candidates.iter().copied().filter(|gain| *gain > 1.0);
+    Ok([confirmed(below)?, confirmed(above.fold(f64::INFINITY, f64::min))?])
 }
