@@ -7,6 +7,7 @@ use crate::faults::ExtendedPlant;
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::hold::zero_order_hold;
+use crate::robustness::beside;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
@@ -168,25 +169,18 @@ impl<'a> Lifted<'a> {
 
     /// The rows of [x; e; `f_hat` or eps; `x_i`] from which x at the start of part i follows.
     fn output(&self, i: usize) -> DMatrix<f64> {
-        let (n, q) = self.plant.f_a.shape();
         let Gains { k_x, k_f, integral, .. } = self.gains;
-        let t = self.gains.integrals();
-        let mut rows = DMatrix::zeros(self.states, 2 * n + q + t);
-        let states = self.states;
-        rows.view_mut((0, 0), (states, states)).copy_from(&self.phi[i]);
-        let command = &self.gamma[i] * k_x;
-        let mut plant = rows.view_mut((0, 0), (states, n));
-        plant += &command;
-        rows.view_mut((0, n), (states, n)).copy_from(&-command);
+        let (of_states, of_faults) = (&self.gamma[i] * k_x, &self.gamma[i] * k_f);
+        let mut of_errors = -&of_states;
         if let Some(direct) = self.gains.direct(self.plant) {
-            let mut of_error = rows.view_mut((0, n), (states, n));
-            of_error += &self.gamma[i] * k_f * direct;
+            of_errors += &of_faults * direct;
         }
-        rows.view_mut((0, 2 * n), (states, q)).copy_from(&(&self.gamma[i] * k_f));
-        if let Some(integral) = integral {
-            rows.columns_mut(2 * n + q, t).copy_from(&(&self.gamma[i] * &integral.gain));
+        let phi = self.phi[i].clone().resize_horizontally(self.plant.a.nrows(), 0.0);
+        let rows = beside(&beside(&(phi + of_states), &of_errors), &of_faults);
+        match integral {
+            Some(integral) => beside(&rows, &(&self.gamma[i] * &integral.gain)),
+            None => rows,
         }
-        rows
     }
 
     /// The effect of part j on the state of the loop.
