@@ -1,6 +1,6 @@
 //! The H-infinity norm.
 
-use super::known::KnownResponse;
+use super::{KnownResponse, singular_values};
 use crate::blocks::block_2x2;
 use crate::eigen::{Hamiltonian, eigenvalues};
 use crate::svd::norm_2;
@@ -133,7 +133,7 @@ impl HInfinity {
 
     /// Raises the lower bound to the value at `frequency` if that is larger.
     fn offer(&mut self, known: &KnownResponse, frequency: f64) -> Result<(), Error> {
-        let size = known.size(frequency)?;
+        let size = singular_values(&known.gain(frequency)?)?[0];
         if size > self.lower {
             (self.lower, self.frequency) = (size, frequency);
         }

@@ -1,6 +1,6 @@
 //! A stable system whose eigenvalues and frequency response are computed once.
 
-use super::frequency::{Transfer, grid, singular_values};
+use super::frequency::{Transfer, grid};
 use crate::balance::{divide_columns, multiply_rows};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -61,11 +61,6 @@ impl KnownResponse {
             Some(response) => self.transfer.with_direct(response.clone()),
             None => self.transfer.gain(frequency),
         }
-    }
-
-    /// The largest singular value of G at a frequency.
-    pub(super) fn size(&self, frequency: f64) -> Result<f64, Error> {
-        Ok(singular_values(&self.gain(frequency)?)?[0])
     }
 
     /// The frequencies of the eigenvalues, where G may have peaks.

@@ -23,7 +23,11 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
         {
             return Err(Error::NotStabilisable { eigenvalue });
         }
-        let limit = on_limit(eigenvalue, domain);
+        // The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
+        let limit = match domain {
+            Domain::Continuous => Complex::new(0.0, eigenvalue.im),
+            Domain::Sampled { .. } => Complex::from_polar(1.0, eigenvalue.arg()),
+        };
         let largest = 2.0 * a.norm() + limit.norm();
         let appears = weighted > tolerance(a) * largest;
         if !appears && deficient(a, &problem.free_q, limit)? {
@@ -31,14 +35,6 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
         }
     }
     Ok(())
-}
-
-/// The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
-fn on_limit(eigenvalue: Complex<f64>, domain: Domain) -> Complex<f64> {
-    match domain {
-        Domain::Continuous => Complex::new(0.0, eigenvalue.im),
-        Domain::Sampled { .. } => Complex::from_polar(1.0, eigenvalue.arg()),
-    }
 }
 
 /// Whether [A - lambda I; C] has less than full column rank, C scaled to the size of A.
