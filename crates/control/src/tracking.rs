@@ -98,14 +98,19 @@ pub fn tracking_rank(
     b: &DMatrix<f64>,
     output: &DMatrix<f64>,
 ) -> Result<TrackingRank, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
-    check::shape("H C", output, (output.nrows(), n))?;
-    let (t, m) = (output.nrows(), b.ncols());
+    let [n, m, t] = sizes(a, b, output)?;
     let whole = block_2x2([a, b], [output, &DMatrix::zeros(t, m)]);
     let rank = |matrix: &DMatrix<f64>| Ok::<_, Error>(Svd::new(&scaled(matrix))?.rank(TOLERANCE));
     let outputs = if output.amax() > 0.0 { rank(&output.transpose())? } else { 0 };
     Ok(TrackingRank { rank: rank(&whole.transpose())?, expected: n + t, outputs })
+}
+
+/// Checks A, B and H C; returns the numbers of states, commands and references.
+fn sizes(a: &DMatrix<f64>, b: &DMatrix<f64>, output: &DMatrix<f64>) -> Result<[usize; 3], Error> {
+    let (n, m, t) = (check::square("A", a)?, b.ncols(), output.nrows());
+    check::shape("B", b, (n, m))?;
+    check::shape("H C", output, (t, n))?;
+    Ok([n, m, t])
 }
 
 /// Scales rows and columns to about length one.
@@ -137,10 +142,7 @@ pub fn extended_pair(
     output: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
-    check::shape("H C", output, (output.nrows(), n))?;
-    let t = output.nrows();
+    let [n, _, t] = sizes(a, b, output)?;
     let (step, last) = integration(domain);
     let last = DMatrix::identity(t, t) * last;
     Ok((
@@ -178,11 +180,8 @@ pub fn feedforward(
     k_x: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<DMatrix<f64>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
-    check::shape("H C", output, (output.nrows(), n))?;
-    check::shape("K_x", k_x, (b.ncols(), n))?;
-    let (t, m) = (output.nrows(), b.ncols());
+    let [n, m, t] = sizes(a, b, output)?;
+    check::shape("K_x", k_x, (m, n))?;
     let controlled = StateSpace {
         a: a + b * k_x,
         b: b.clone(),
