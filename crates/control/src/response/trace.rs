@@ -307,13 +307,9 @@ impl<'a> GridSimulation<'a> {
                 };
             let mut next = DVector::zeros(self.state.len());
             for k in 1..=segment.count {
-                let (state, input, slope) = (&self.state, &self.input, &self.slope);
-                hold.step_into(
-                    state.as_slice(),
-                    input.as_slice(),
-                    slope.as_slice(),
-                    next.as_mut_slice(),
-                )?;
+                let signals = [&self.state, &self.input, &self.slope];
+                let [state, input, slope] = signals.map(DVector::as_slice);
+                hold.step_into(state, input, slope, next.as_mut_slice())?;
                 self.state.copy_from(&next);
                 self.input.axpy(segment.step, &self.slope, 1.0);
                 #[expect(clippy::cast_precision_loss, reason = "about 200000 at most")]

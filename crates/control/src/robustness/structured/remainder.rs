@@ -16,11 +16,10 @@ const ROUNDING: f64 = 1e-6;
 /// series does not converge: the poles of the approximations have moduli of 2, 3.46 and 4.64.
 pub(super) fn remainder(x: &DMatrix<f64>, y: &DMatrix<f64>, stages: usize) -> Option<DMatrix<f64>> {
     let n = x.nrows();
-    let coefficients = coefficients(stages);
     let both = x + y;
     let (mut power, mut difference) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
     let mut sum: DMatrix<f64> = DMatrix::zeros(n, n);
-    for (k, coefficient) in coefficients.iter().enumerate() {
+    for (k, coefficient) in coefficients(stages).into_iter().enumerate() {
         if k > 0 {
             difference = &difference * &both + &power * y;
             power = &power * x;
