@@ -219,12 +219,10 @@ impl Loop {
 
     /// S - I = -T.
     fn response(&self, at: Point) -> StateSpace {
-        let ([from_commands, from_measurements], [commands, measurements]) =
-            (self.entries(), self.signals());
-        let (b, c) = match at {
-            Point::Input => (from_commands, commands),
-            Point::Output => (from_measurements, measurements),
-        };
+        let [b, c] = [self.entries(), self.signals()].map(|[input, output]| match at {
+            Point::Input => input,
+            Point::Output => output,
+        });
         let d = DMatrix::zeros(c.nrows(), b.ncols());
         StateSpace { a: self.dynamics(), b, c, d, domain: self.plant.domain }
     }
@@ -239,11 +237,9 @@ impl Loop {
         let controller = &self.controller;
         check::shape("C of the output", &output.c, (output.c.nrows(), controller.a.nrows()))?;
         check::shape("D of the output", &output.d, (output.c.nrows(), controller.b.ncols()))?;
-        let StateSpace { a, b, domain, .. } = self.response(Point::Output);
         let mut c = &output.d * &self.signals()[1];
-        let n = self.plant.a.nrows();
-        let states = c.columns(n, controller.a.nrows()) + &output.c;
-        c.columns_mut(n, controller.a.nrows()).copy_from(&states);
-        Ok(StateSpace { a, b, c, d: output.d.clone(), domain })
+        let mut of_states = c.columns_mut(self.plant.a.nrows(), controller.a.nrows());
+        of_states += &output.c;
+        Ok(StateSpace { c, d: output.d.clone(), ..self.response(Point::Output) })
     }
 }

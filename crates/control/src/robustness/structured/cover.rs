@@ -90,8 +90,7 @@ impl<'a> Cover<'a> {
                 return Some(frequency);
             }
         }
-        let Interval { from, to } = gap;
-        Some(match (from, to) {
+        Some(match (gap.from, gap.to) {
             // At zero M is real, and a part of it often zero, so that scales that are made for it hold nowhere else.
             (0.0, to) if to > NEAR_ZERO * self.slowest => (0.1 * to).min(self.slowest),
             (0.0, _) => 0.0,
