@@ -5,16 +5,16 @@ use crate::hold;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// From this order on the hold is computed by [`Mean`].
+/// From this order on the hold is computed by [`mean`].
 const LARGE: usize = 48;
 /// Degree of the Taylor polynomial, exact to rounding up to a norm of `REACH`.
 const DEGREE: u32 = 14;
 const REACH: f64 = 0.5;
 
-/// The mean of e^(A s) over s from 0 to h, for several h.
+/// J(h), the mean of e^(A s) over s from 0 to h; `a`: A and its balance.
 ///
 /// J(h) = (e^(A h) - I) (A h)^-1, also for a singular A: e^(A h) = I + h A J and the response to a held
-/// input is h J B. Method: balancing, the Taylor polynomial of a part of h, then doublings
+/// input is h J B. Method: the Taylor polynomial of a part of h, then doublings
 ///
 /// ```text
 /// J(2 h) = J(h) + (h / 2) A J(h)^2
@@ -22,44 +22,30 @@ const REACH: f64 = 0.5;
 ///
 /// It consists of (14 + 2 s) products of nalgebra's fast kernels, whose last bits depend on the
 /// processor, s = log2(norm of A h) + 1; [`hold::zero_order_hold`] has the same bits everywhere.
-pub(super) struct Mean {
-    balance: Balance,
-    norm: f64,
+pub(super) fn mean(a: &Balance, h: f64) -> Result<DMatrix<f64>, Error> {
+    let (n, norm) = (a.matrix.nrows(), a.matrix.norm());
+    let mut doublings = 0;
+    let mut part = h;
+    while part * norm > REACH {
+        part *= 0.5;
+        doublings += 1;
+    }
+    let scaled = &a.matrix * part;
+    let identity = DMatrix::identity(n, n);
+    let mut mean = identity.clone();
+    // 1 + x / 2 (1 + x / 3 (1 + ...)).
+    for k in (2..=DEGREE + 1).rev() {
+        mean = &identity + &scaled * mean / f64::from(k);
+    }
+    for _ in 0..doublings {
+        let growth = &a.matrix * (&mean * &mean) * (0.5 * part);
+        mean += growth;
+        part *= 2.0;
+    }
+    check::in_range("e^(A h)", a.restore(&mean))
 }
 
-impl Mean {
-    pub(super) fn new(a: &DMatrix<f64>) -> Self {
-        let balance = Balance::new(a);
-        let norm = balance.matrix.norm();
-        Self { balance, norm }
-    }
-
-    /// J(h).
-    pub(super) fn at(&self, h: f64) -> Result<DMatrix<f64>, Error> {
-        let n = self.balance.matrix.nrows();
-        let mut doublings = 0;
-        let mut part = h;
-        while part * self.norm > REACH {
-            part *= 0.5;
-            doublings += 1;
-        }
-        let scaled = &self.balance.matrix * part;
-        let identity = DMatrix::identity(n, n);
-        let mut mean = identity.clone();
-        // 1 + x / 2 (1 + x / 3 (1 + ...)).
-        for k in (2..=DEGREE + 1).rev() {
-            mean = &identity + &scaled * mean / f64::from(k);
-        }
-        for _ in 0..doublings {
-            let growth = &self.balance.matrix * (&mean * &mean) * (0.5 * part);
-            mean += growth;
-            part *= 2.0;
-        }
-        check::in_range("e^(A h)", self.balance.restore(&mean))
-    }
-}
-
-/// [`hold::zero_order_hold`], by [`Mean`] from 48 states on.
+/// [`hold::zero_order_hold`], by [`mean`] from 48 states on.
 pub(super) fn hold_inputs(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -70,7 +56,7 @@ pub(super) fn hold_inputs(
         return hold::zero_order_hold(a, b, h);
     }
     check::positive("h", h)?;
-    let mean = Mean::new(a).at(h)? * h;
+    let mean = mean(&Balance::new(a), h)? * h;
     Ok((DMatrix::identity(n, n) + a * &mean, mean * b))
 }
 

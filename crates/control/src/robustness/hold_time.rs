@@ -2,9 +2,10 @@
 
 use super::crossing::{Evaluation, narrowed};
 use super::delay::period_of;
-use super::held::Mean;
-use super::{Loop, held_plant};
-use crate::blocks::block_2x2;
+use super::held::mean;
+use super::{Loop, beside, held_plant};
+use crate::balance::Balance;
+use crate::blocks::{block_2x2, stacked};
 use crate::eigen::eigenvalues;
 use crate::stability::instability;
 use crate::{Error, StateSpace};
@@ -33,17 +34,23 @@ const SHORT: f64 = 1e-2;
 /// [`Error::NotHurwitz`] for a loop that is not stable, or sampled; same as [`crate::hold::zero_order_hold`].
 pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
     let (plant, controller) = (closed.plant(), closed.controller());
-    let (of_plant, of_controller) = (Mean::new(&plant.a), Mean::new(&controller.a));
+    let balanced = [&plant.a, &controller.a].map(Balance::new);
     let value = |h: f64| {
-        let (mean, controller_mean) = (of_plant.at(h)?, of_controller.at(h)?);
-        let (a, b) = (&plant.a * &mean, mean * &plant.b);
-        let (a_k, b_k) = (&controller.a * &controller_mean, controller_mean * &controller.b);
+        let (of_plant, of_controller) = (mean(&balanced[0], h)?, mean(&balanced[1], h)?);
+        let (a, b) = (&plant.a * &of_plant, of_plant * &plant.b);
+        let (a_k, b_k) = (&controller.a * &of_controller, of_controller * &controller.b);
         let mut rate = block_2x2(
             [&(a + &b * &controller.d * &plant.c), &(b * &controller.c)],
             [&(&b_k * &plant.c), &a_k],
         );
         if plant.d.amax() > 0.0 {
-            rate = with_held_commands(&rate, closed, &b_k, h);
+            // The commands before are further states v: a measurement C x + D v contains the command that was held
+            // until then.
+            let (n, m) = plant.b.shape();
+            let of_held = stacked(&DMatrix::zeros(n, m), &(b_k * &plant.d));
+            let of_states = beside(&DMatrix::zeros(m, n), &(&controller.c / h));
+            let decay = DMatrix::from_diagonal_element(m, m, -h.recip());
+            rate = block_2x2([&rate, &of_held], [&of_states, &decay]);
         }
         // |1 + h r| < 1 for the eigenvalues r.
         let excess = |r: &nalgebra::Complex<f64>| 2.0 * r.re + h * r.norm_sqr();
@@ -53,23 +60,6 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
     let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
     let slowest = modes.iter().map(|mode| mode.norm()).fold(f64::INFINITY, f64::min);
     search(value, [SHORTEST / fastest, SHORT / fastest, LONGEST / slowest])
-}
-
-/// `rate`, that of [x; z], with the commands before as further states v: a measurement C x + D v contains the
-/// command that was held until then.
-fn with_held_commands(
-    rate: &DMatrix<f64>,
-    closed: &Loop,
-    b_k: &DMatrix<f64>,
-    h: f64,
-) -> DMatrix<f64> {
-    let (plant, controller) = (closed.plant(), closed.controller());
-    let (n, k, m) = (plant.a.nrows(), controller.a.nrows(), controller.c.nrows());
-    let mut all = rate.clone().resize(n + k + m, n + k + m, 0.0);
-    all.view_mut((n, n + k), (k, m)).copy_from(&(b_k * &plant.d));
-    all.view_mut((n + k, n), (m, k)).copy_from(&(&controller.c / h));
-    all.view_mut((n + k, n + k), (m, m)).fill_diagonal(-h.recip());
-    all
 }
 
 /// Computes the longest sample time at which the loop of the continuous `plant` and the sampled
