@@ -147,12 +147,6 @@ impl Perturbed<'_> {
         ending: &dyn Fn() -> bool,
     ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
         Loop::new(self.plant.clone(), self.controller.clone())?;
-        let (system, blocks) = self.system();
-        self.bounded(&system, &blocks, most, ending)
-    }
-
-    /// M and its blocks for a plant in the time domain of the controller.
-    fn system(&self) -> (StateSpace, Vec<Block>) {
         let StateSpace { a, b, c, d, domain } = self.plant;
         let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
         let Channels { left, right, ranks } = Channels::of(&self.changes, (n + p, n + m));
@@ -167,8 +161,9 @@ impl Perturbed<'_> {
             ],
             domain: *domain,
         };
-        let blocks = ranks.into_iter().filter(|rank| *rank > 0).map(Block::Real).collect();
-        (opened.closed(self.controller), blocks)
+        let ranks = ranks.into_iter().filter(|rank| *rank > 0);
+        let blocks: Vec<_> = ranks.map(Block::Real).collect();
+        self.bounded(&opened.closed(self.controller), &blocks, most, ending)
     }
 
     /// The largest fraction for which the error of the Gauss method is as small as assumed.
