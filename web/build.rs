@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .find(|file| Path::new(file).exists())
         .ok_or("design.toml: no such file")?;
     println!("cargo:rerun-if-changed={file}");
-    let design = Design::parse(&fs::read_to_string(file)?, file.to_owned())?;
+    let design = Design::parse(&fs::read_to_string(file)?, file)?;
     fs::write(Path::new(&env::var("OUT_DIR")?).join("design.rs"), expression(&design))?;
     if env::var("CARGO_CFG_TARGET_FAMILY")? == "wasm" {
         // Indices of functions and addresses in as few bytes as each needs.

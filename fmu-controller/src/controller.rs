@@ -170,7 +170,7 @@ impl Model for AsoController {
         let path = file.display().to_string();
         let text = std::fs::read_to_string(&file);
         let text = text.map_err(|error| Failure::Error(format!("{path}: {error}")))?;
-        let design = Design::parse(&text, path);
+        let design = Design::parse(&text, &path);
         Ok(Self::of_design(design.map_err(|error| Failure::Error(error.to_string()))?))
     }
 

@@ -11,7 +11,7 @@ use controller::AsoController;
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
-    let design = Design::parse(&fs::read_to_string(file)?, file.to_owned())?;
+    let design = Design::parse(&fs::read_to_string(file)?, file)?;
     let [a, b, c, f_a] = AsoController::of_design(design).plant();
     let plant = FaultyPlant::with_constant_faults(a, b, c, f_a);
     // Here, so that the module needs no code for a plant without an observer.

@@ -5,15 +5,17 @@ use nalgebra::{Complex, ComplexField, DMatrix};
 /// A matrix of complex numbers.
 pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// [above; below].
-pub(crate) fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
+/// The matrix [above; below] of two matrices with the same number of columns.
+#[must_use]
+pub fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
     let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), T::zero());
     both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
     both
 }
 
-/// [left, right].
-pub(crate) fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix<T> {
+/// The matrix [left, right] of two matrices with the same number of rows.
+#[must_use]
+pub fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix<T> {
     let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), T::zero());
     both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
     both

@@ -48,7 +48,7 @@ pub mod aso;
 mod balance;
 #[cfg(feature = "design")]
 pub mod bandwidth;
-mod blocks;
+pub mod blocks;
 mod check;
 #[cfg(feature = "design")]
 pub mod controller;

@@ -35,7 +35,7 @@ pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{error_part, fault_gains, fault_rate_system, fault_system};
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
-pub(crate) use frequency::{Transfer, grid, on_limit, singular_values};
+pub(crate) use frequency::{Transfer, grid, singular_values};
 pub use h_infinity::{HInfinity, h_infinity};
 pub(crate) use h_infinity::{continuous_equivalent, norm_of, original_frequency};
 pub(crate) use known::{KnownResponse, of_channel};

@@ -59,7 +59,7 @@ pub use tolerance::{
     tolerance_test,
 };
 
-use crate::blocks::{block_2x2, stacked};
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
@@ -102,11 +102,6 @@ pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> 
         d: DMatrix::zeros(plant.c.nrows(), m),
         domain,
     })
-}
-
-/// [left, right].
-pub(crate) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    stacked(&left.transpose(), &right.transpose()).transpose()
 }
 
 /// The loop y = G u, u = K y of a plant G and a controller K, of which one is strictly proper.

@@ -32,8 +32,7 @@ pub use integral_feedforward::{IntegralFeedforward, integral_feedforward};
 pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
 pub use windup::windup_gain;
 
-use crate::blocks::{block_2x2, stacked};
-use crate::robustness::beside;
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

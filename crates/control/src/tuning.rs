@@ -18,9 +18,9 @@ mod structured;
 
 pub use structured::Structure;
 
-use crate::blocks::{block_2x2, stacked};
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::response::h_infinity;
-use crate::robustness::{Loop, Point, beside};
+use crate::robustness::{Loop, Point};
 use crate::weight::Weight;
 use crate::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};

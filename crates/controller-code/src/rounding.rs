@@ -230,7 +230,7 @@ mod tests {
              K_x = [[0.0]]\nK_f = [[-1.0]]\nL_x = [[0.0]]\nL_f = [[1.0]]\n\
              sliding_mode = {{ rho = [1.0], delta = [{delta:?}] }}\nexperiment = {{ stop_time = 2.0 }}\n"
         );
-        let file = aso_controller::Design::parse(&text, "design.toml".to_owned()).unwrap();
+        let file = aso_controller::Design::parse(&text, "design.toml").unwrap();
         let controller = Controller::of(file).unwrap();
         let rounding = RoundingBound::of(&controller);
         rounding.bound.map(|bound| bound[(1, 1)])

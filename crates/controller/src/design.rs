@@ -183,14 +183,14 @@ impl Design {
     /// # Errors
     ///
     /// [`DesignError`] for the first entry that is missing, unknown, out of its range, or does not fit the others.
-    pub fn parse(text: &str, path: String) -> Result<Self, DesignError> {
+    pub fn parse(text: &str, path: &str) -> Result<Self, DesignError> {
         let malformed = |error: toml::de::Error| {
             let message = error.to_string().trim_end().to_owned();
-            DesignError::Malformed { path: path.clone(), message }
+            DesignError::Malformed { path: path.to_owned(), message }
         };
         let mut design: Self = toml::from_str(text).map_err(malformed)?;
         design.complete_the_operating_point();
-        design.check(&path)?;
+        design.check(path)?;
         design.locate_reconfigurations();
         Ok(design)
     }

@@ -17,7 +17,7 @@ impl Design {
     /// number beyond the range of the precision.
     pub fn code(&self, language: Language, precision: Precision) -> Result<Code, Error> {
         let invalid = |error: &dyn std::error::Error| Error::Invalid(error.to_string());
-        let design = aso_controller::Design::parse(&self.file, "design.toml".to_owned());
+        let design = aso_controller::Design::parse(&self.file, "design.toml");
         let stem = Path::new(&self.report.plant_file).file_stem().unwrap_or_default();
         let request = Request {
             prefix: controller_code::prefix(&stem.to_string_lossy()),

@@ -19,18 +19,3 @@ pub(crate) fn matrix(dense: &DMatrix<f64>) -> Matrix {
         dense.row_iter().flat_map(|row| row.iter().map(|entry| entry + 0.0).collect::<Vec<_>>());
     Matrix { rows: dense.nrows(), columns: dense.ncols(), values: values.collect() }
 }
-
-/// The columns of `left`, then those of `right`.
-pub(crate) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    let (n, t) = (left.ncols(), right.ncols());
-    let mut all = left.clone().resize_horizontally(n + t, 0.0);
-    all.columns_mut(n, t).copy_from(right);
-    all
-}
-
-/// The rows of `above`, then those of `below`.
-pub(crate) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut all = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
-    all.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    all
-}

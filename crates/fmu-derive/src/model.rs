@@ -72,13 +72,10 @@ fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
     let experiment: Vec<_> =
         arguments.0.iter().filter(|argument| !is_indicators(argument)).collect();
     let fields = experiment.iter().map(|(name, value)| quote!(#name: #value));
-    let interface = match indicators {
-        Some((_, count)) => quote! {
-            ::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count })
-        },
-        None => quote! {
-            <Self as ::fmu::Variables>::HAS_STATES.then(::core::default::Default::default)
-        },
+    let interface = if let Some((_, count)) = indicators {
+        quote!(::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count }))
+    } else {
+        quote!(<Self as ::fmu::Variables>::HAS_STATES.then(::core::default::Default::default))
     };
     let exchange = parse_quote! {
         fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {

@@ -114,13 +114,14 @@ pub struct LoggedSlave<S: Slave + ?Sized = dyn Slave> {
 }
 
 /// Functions of FMI 3.0 and 1.0 whose name is not that of FMI 2.0 with another prefix.
-const NAMES: [(&str, &str, &str); 9] = [
+const NAMES: [(&str, &str, &str); 10] = [
     ("fmi2GetReal", "fmi3GetFloat64", "fmiGetReal"),
     ("fmi2SetReal", "fmi3SetFloat64", "fmiSetReal"),
     ("fmi2GetInteger", "fmi3GetInt64", "fmiGetInteger"),
     ("fmi2SetInteger", "fmi3SetInt64", "fmiSetInteger"),
     ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
     ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
+    ("fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates", "fmi2NewDiscreteStates"),
     ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
     ("fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives", "fmiGetRealOutputDerivatives"),
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),

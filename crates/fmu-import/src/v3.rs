@@ -140,7 +140,7 @@ impl Instance {
         &self.view.description
     }
 
-    /// Sets structural parameters in Configuration Mode; arrays of `own` change their sizes.
+    /// Sets structural parameters in Configuration Mode; arrays whose dimensions they are change their sizes.
     pub(crate) fn configure(
         &mut self,
         description: &ModelDescription,

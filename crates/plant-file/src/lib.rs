@@ -155,34 +155,6 @@ const KEYS: [&str; 36] = [
     "family",
     "schedule",
 ];
-/// Entries that errors of later steps point at.
-const PLACES: [&str; 25] = [
-    "matrices",
-    "A",
-    "B",
-    "C",
-    "D",
-    "F_a",
-    "actuator_faults",
-    "plant",
-    "operating_point",
-    "preload",
-    "linearisation_step",
-    "states",
-    "actuators",
-    "measurements",
-    "faults",
-    "sample_time",
-    "filter",
-    "delay_order",
-    "feedback",
-    "observer",
-    "reference",
-    "family",
-    "schedule",
-    "reconfiguration",
-    "fallback",
-];
 
 impl<'a> PlantFile<'a> {
     /// Reads and checks the file.
@@ -230,7 +202,7 @@ impl<'a> PlantFile<'a> {
         let time = |key| experiment.as_ref().map_or(Ok(None), |table| positive(table, key));
         let plant_file = Self {
             source,
-            places: PLACES.iter().filter_map(place).collect(),
+            places: KEYS.iter().filter_map(place).collect(),
             description: Some(description(file)?).filter(|text| !text.is_empty()),
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,

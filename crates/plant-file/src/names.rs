@@ -92,8 +92,9 @@ fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result
     let signals = file.measurements.iter().chain(references).map(Some).chain([None]);
     let signals = signals.chain(schedule_input(file).map(Some));
     let signals: Vec<_> = signals.chain(file.actuators.iter().map(Some)).collect();
-    let name = |signal: &Option<&'a Signal>| signal.map_or("compensate", |signal| &signal.name);
-    let Some((at, text)) = misplaced_elements(signals.iter().map(name)).into_iter().next() else {
+    let name = |signal: Option<&'a Signal>| signal.map_or("compensate", |signal| &signal.name);
+    let Some((at, text)) = misplaced_elements(signals.iter().copied().map(name)).into_iter().next()
+    else {
         return Ok(());
     };
     let Some(signal) = signals[at] else {

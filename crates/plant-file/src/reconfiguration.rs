@@ -90,7 +90,7 @@ impl ReconfigurationRequest {
     }
 }
 
-/// Reads `together`; 1 if missing. `own`: the number of actuators that may be gone, of `all`.
+/// Reads `together`; 1 if missing. `used`: the number of actuators that may be gone, of `all`.
 fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceError> {
     let Some(entry) = table.get("together") else {
         return Ok(1);

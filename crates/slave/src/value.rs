@@ -146,7 +146,7 @@ impl Value {
         }
     }
 
-    /// Whether `found`, read from an FMU, equals this value; for Reals within a relative difference of
+    /// Whether `other`, read from an FMU, equals this value; for Reals within a relative difference of
     /// 1e-9.
     #[must_use]
     pub fn is_near(&self, other: &Self) -> bool {

@@ -122,8 +122,9 @@ fn unreadable(path: &Path, bytes: &[u8]) -> String {
         return format!("{shown}: expected a checkpoint of this version of aso-ftc");
     };
     format!(
-        "{shown}: found a checkpoint of format {}, expected format 3: another version of aso-ftc \
+        "{shown}: found a checkpoint of format {}, expected format {}: another version of aso-ftc \
          wrote it. Resume it with that version, or repeat the run from its start with --checkpoint",
-        char::from(*version)
+        char::from(*version),
+        char::from(MAGIC[KIND.len()])
     )
 }

@@ -35,7 +35,7 @@ pub struct Learning {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a `kept` outside of its range,
+/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a `K_1` outside of its range,
 /// a continuous plant or a prediction estimator; [`Error::NotSchur`] if `K_1` is at most p^2.
 pub fn learning(
     plant: &FaultyPlant,

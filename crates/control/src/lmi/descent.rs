@@ -7,7 +7,7 @@ use crate::Domain;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::response::h_infinity;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 const ITERATIONS: usize = 80;
 /// Iterations in which the norm must decrease by `PROGRESS`.
@@ -51,10 +51,7 @@ impl GainNorm<'_> {
             return None;
         }
         let norm = h_infinity(&system, WIDTH).ok()?;
-        let point = match self.domain {
-            Domain::Continuous => Complex::new(0.0, norm.frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, norm.frequency * period),
-        };
+        let point = self.domain.point(norm.frequency);
         let shifted = DMatrix::identity(order, order) * point - to_complex(&system.a);
         let states = shifted.clone().lu().solve(&to_complex(&system.b))?;
         let transfer = to_complex(self.e) * &states;

@@ -2,12 +2,11 @@
 
 use super::fault_loop::{error_part, loop_dynamics, outputs, require_rows, with_integrals};
 use super::peak_gain;
-use crate::blocks::stacked;
+use crate::blocks::{beside, stacked};
 use crate::faults::ExtendedPlant;
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::hold::zero_order_hold;
-use crate::robustness::beside;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 

@@ -1,10 +1,9 @@
 //! Plant and controller of [`crate::aso`] as one system with the fault as its input.
 
 use super::peak_gain;
-use crate::blocks::stacked;
+use crate::blocks::{beside, stacked};
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
-use crate::robustness::beside;
 use crate::tracking::{IntegralAction, integration};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

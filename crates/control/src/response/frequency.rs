@@ -108,14 +108,6 @@ pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32
     (0..=steps).map(|k| point(k).min(to)).collect()
 }
 
-/// The point s = j w of a frequency w on the limit of stability; z = e^(j w h) in sampled time.
-pub(crate) fn on_limit(frequency: f64, domain: Domain) -> Complex<f64> {
-    match domain {
-        Domain::Continuous => Complex::new(0.0, frequency),
-        Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
-    }
-}
-
 /// A system in coordinates in which A is balanced and in Hessenberg form, so that each frequency needs
 /// n^2 multiplications only.
 ///
@@ -167,7 +159,7 @@ impl Transfer {
             let rule = "a finite number, not negative";
             return Err(Error::OutOfRange { name: "frequency", value: frequency, rule });
         }
-        Ok(&self.c * self.states(on_limit(frequency, self.domain)))
+        Ok(&self.c * self.states(self.domain.point(frequency)))
     }
 
     /// G from C (s I - A)^-1 B.

@@ -1,15 +1,12 @@
 //! The effect of single entries of the plant's matrices on a peak of S.
 
 use super::scaling::scaled_norm;
-use super::{Loop, Point, beside, held_plant};
-use crate::blocks::{block_2x2, to_complex};
+use super::{Loop, Point, held_plant};
+use crate::blocks::{ComplexMatrix, beside, block_2x2, to_complex};
 use crate::exponential::exponential;
-use crate::response::on_limit;
 use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
-
-type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// The largest singular value of S at a frequency, and its derivatives with respect to the entries
 /// of A, B, C and D of the plant.
@@ -98,7 +95,7 @@ impl Loop {
         let SensitivityPeak { point, frequency, scaled } = *peak;
         let (plant, controller) = (self.plant(), self.controller());
         let (n, k) = (plant.a.nrows(), controller.a.nrows());
-        let s = on_limit(frequency, plant.domain);
+        let s = plant.domain.point(frequency);
         let StateSpace { a: dynamics, b: inputs, c: outputs, .. } = self.system();
         let pencil = ComplexMatrix::identity(n + k, n + k) * s - to_complex(&dynamics);
         let (m, p) = controller.d.shape();

@@ -1,16 +1,14 @@
 //! The weighted singular values of a loop on a grid of frequencies, and their derivatives.
 
 use super::{Transfer, Tuning};
-use crate::blocks::to_complex;
-use crate::response::{self, on_limit};
+use crate::blocks::{ComplexMatrix, to_complex};
+use crate::response;
 use crate::robustness::{Loop, Point};
 use crate::stability::instability;
 use crate::weight::bilinear_frequency;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
-
-type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// Frequencies of the grid in a decade, and its decades on both sides of the bandwidth.
 const PER_DECADE: i32 = 30;
@@ -110,7 +108,7 @@ impl<'a> Grid<'a> {
     ) -> Option<(f64, DVector<f64>)> {
         let Node { frequency, plant, weights } = &self.nodes[place.node];
         let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
-        let (order, s) = (controller.a.nrows(), on_limit(*frequency, controller.domain));
+        let (order, s) = (controller.a.nrows(), controller.domain.point(*frequency));
         let pencil = ComplexMatrix::identity(order, order) * s - to_complex(&controller.a);
         let (b, c) = (to_complex(&controller.b), to_complex(&controller.c));
         let (forward, backward) = (pencil.clone().lu(), pencil.transpose().lu());

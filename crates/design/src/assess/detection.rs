@@ -198,7 +198,7 @@ impl Planner<'_> {
     }
 }
 
-/// Whether the test for `own` reacts to each fault.
+/// Whether the test for the fault `tested` reacts to each fault.
 fn reacting(
     problem: &Problem,
     decoupling: &Decoupling,

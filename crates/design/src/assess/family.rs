@@ -104,8 +104,14 @@ pub(crate) fn reported(certificate: &RegionCertificate) -> CommonCertificate {
     CommonCertificate { p: rows(&certificate.p), margin: certificate.margin }
 }
 
-/// Judges what is proven of plants that are no member.
-pub(crate) fn judge_proof(verdict: &mut Verdict, report: &FamilyReport) {
+/// Judges the plants of a family, and whether stability between them is proven.
+pub(crate) fn judge_family(
+    verdict: &mut Verdict,
+    report: &FamilyReport,
+    limits: &RobustnessLimits,
+) {
+    let members: Vec<_> = report.members.iter().skip(1).collect();
+    judge(verdict, "member", &members, limits);
     if report.whole.is_err() {
         let text = "stability of plants between the members of the family, and while the plant moves between \
                     them, is not proven; only the members themselves were checked";

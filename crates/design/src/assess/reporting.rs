@@ -17,7 +17,7 @@ use crate::assess::checks::checks;
 use crate::assess::detection::Detection;
 use crate::assess::estimation;
 use crate::assess::fallback;
-use crate::assess::family::{self as family_report, judge, judge_proof};
+use crate::assess::family::{self as family_report, judge_family};
 use crate::assess::losses::{self, losses};
 use crate::assess::matrices::Names;
 use crate::assess::pid;
@@ -136,9 +136,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let remedies = steps.run(Step::Remedies, || remedies(file, robustness.as_ref(), &budget));
     let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further, remedies);
     if let Some(family) = &family_report {
-        let members: Vec<_> = family.members.iter().skip(1).collect();
-        judge(&mut verdict, "member", &members, &file.robustness);
-        judge_proof(&mut verdict, family);
+        judge_family(&mut verdict, family, &file.robustness);
     }
     if let Some(report) = &schedule {
         judge_schedule(&mut verdict, designed, report, &file.robustness);

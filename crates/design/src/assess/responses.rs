@@ -6,10 +6,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::analysis::Outputs;
-use crate::matrix::{beside, stacked};
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
 use crate::solve::solution::Solution;
+use control::blocks::{beside, stacked};
 use plant_file::faults::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of

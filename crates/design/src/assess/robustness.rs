@@ -107,7 +107,7 @@ pub(crate) struct Margins {
     pub(crate) noise_together: Vec<Number>,
 }
 
-/// Returns the margins of `own`, the loop of the controller and `physical`, which is stable.
+/// Returns the margins of `closed_loop`, the stable loop of the controller and `physical`.
 pub(crate) fn margins(
     designed: &Solution,
     physical: &Physical,

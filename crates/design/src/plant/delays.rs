@@ -7,9 +7,9 @@ use control::robustness::Tolerances;
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use crate::matrix::beside;
 use crate::plant::filters::{self, with_filters};
 use crate::report::number::rounded;
+use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
 

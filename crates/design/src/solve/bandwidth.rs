@@ -5,10 +5,10 @@ use control::bandwidth::{ByBandwidth, NaturalUnits, filter, regulator};
 use control::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::matrix::stacked;
 use crate::report::number::rounded;
 use crate::solve::gain::{FeedbackProblem, GainResult, Noise, Refusal, unique};
 use crate::solve::norm_gains::ObserverProblem;
+use control::blocks::stacked;
 use plant_file::requirements::Bandwidth;
 
 /// Integral action and the estimates of faults are slower than the loop by this factor.

@@ -298,7 +298,7 @@ impl Slopes {
         }
     }
 
-    /// `own`, the controller with its filter, scheduled by its measurement `j`. Its states are the
+    /// `system`, the controller with its filter, scheduled by its measurement `j`. Its states are the
     /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat,
     /// and the integrals, which have no operating point.
     fn act_on(&self, system: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {

@@ -13,9 +13,9 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use crate::matrix::beside;
 use crate::plant::linear::LinearPlant;
 use crate::solve::names::signal_names;
+use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::references::References;
 use plant_file::requirements::Requirement;

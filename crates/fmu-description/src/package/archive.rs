@@ -145,7 +145,7 @@ impl Archive {
         self.renamed.iter().map(sentence).chain(repeated).collect()
     }
 
-    /// Unpacks the entries that `wanted` accepts into `folder`.
+    /// Unpacks the entries for which `is_needed` is true into `folder`.
     pub(super) fn unpack(
         &mut self,
         folder: &Path,

@@ -21,12 +21,8 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        let function = match self.version {
-            Version::V3 => "fmi3UpdateDiscreteStates",
-            _ => "fmi2NewDiscreteStates",
-        };
         let call = |slave: &mut S| events(slave)?.update_discrete_states();
-        self.call(function, "", call, |info| format!(" {info:?}"))
+        self.call("fmi2NewDiscreteStates", "", call, |info| format!(" {info:?}"))
     }
 
     fn leave_event_mode(&mut self) -> Result<(), CallError> {

@@ -134,7 +134,8 @@ pub(crate) struct ChannelState<T> {
 
 impl<T: Clone> ChannelState<T> {
     pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
-        self.latest.len() == other.latest.len() && self.inputs.len() == other.inputs.len()
+        [&self.latest, &self.start, &self.inputs].map(Vec::len)
+            == [&other.latest, &other.start, &other.inputs].map(Vec::len)
     }
 
     fn copy(&mut self, other: &Self) {

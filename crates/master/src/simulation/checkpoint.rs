@@ -109,7 +109,7 @@ impl Simulation {
         Ok(KeptState { master, slot })
     }
 
-    /// Returns to a kept state of this simulation. `kept` is the last result of [`Simulation::keep`] with its
+    /// Returns to a kept state of this simulation. `state` is the last result of [`Simulation::keep`] with its
     /// slot: an older one has lost its FMU states.
     ///
     /// # Errors

@@ -2,7 +2,8 @@
 
 use super::blocks::{Block, Direction, SparseEntry, directions};
 use super::form::{form, form_size};
-use super::hermitian::{ComplexMatrix, factor, forward, times};
+use super::hermitian::{factor, forward, times};
+use crate::blocks::ComplexMatrix;
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 use std::iter::successors;
 

@@ -1,6 +1,6 @@
 //! The structure of a perturbation, and the matrices that commute with it.
 
-use super::hermitian::ComplexMatrix;
+use crate::blocks::ComplexMatrix;
 use nalgebra::{Complex, DMatrix};
 
 /// A block of the diagonal of a structured perturbation.

@@ -1,6 +1,7 @@
 //! The Hermitian form by which scales D and G prove a bound.
 
-use super::hermitian::{ComplexMatrix, times};
+use super::hermitian::times;
+use crate::blocks::ComplexMatrix;
 use nalgebra::Complex;
 
 /// F = beta^2 D - M* D M - j (G M - M* G).

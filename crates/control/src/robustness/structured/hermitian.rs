@@ -1,9 +1,8 @@
 //! Products and factors of complex Hermitian matrices.
 
 use crate::Error;
-use nalgebra::{Complex, DMatrix, SymmetricEigen};
-
-pub(super) type ComplexMatrix = DMatrix<Complex<f64>>;
+use crate::blocks::ComplexMatrix;
+use nalgebra::{Complex, SymmetricEigen};
 
 /// A pivot below this part of its size in `scale` counts as not positive.
 const POSITIVE: f64 = 1e-13;

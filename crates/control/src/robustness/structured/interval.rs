@@ -1,8 +1,9 @@
 //! The interval of frequencies in which given scales bound the structured singular value.
 
-use super::hermitian::{ComplexMatrix, times};
+use super::hermitian::times;
 use super::scales::Scales;
 use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::blocks::ComplexMatrix;
 use crate::blocks::to_complex;
 use crate::eigen::complex_eigenvalues;
 use crate::response::Transfer;

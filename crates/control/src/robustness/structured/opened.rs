@@ -1,7 +1,6 @@
 //! A plant with the channels of its perturbations, and the loop of a controller around it.
 
-use crate::blocks::{block_2x2, stacked};
-use crate::robustness::beside;
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::{Domain, StateSpace};
 use nalgebra::DMatrix;
 

@@ -3,8 +3,9 @@
 use super::barrier::{Barrier, Point};
 use super::blocks::{Block, balanced, scaled};
 use super::form::{form, form_size};
-use super::hermitian::{ComplexMatrix, factor, forward, largest_eigenvalue, times};
+use super::hermitian::{factor, forward, largest_eigenvalue, times};
 use crate::Error;
+use crate::blocks::ComplexMatrix;
 
 /// Part of the distance to the bound of the present scales that a step keeps, so that they stay inside.
 const KEPT: f64 = 0.1;

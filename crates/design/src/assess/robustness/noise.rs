@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 use crate::assess::analysis::largest_gain;
 use crate::assess::matrices::{matrix, names};
 use crate::assess::robustness::Physical;
-use crate::matrix::stacked;
 use crate::report::Matrix;
 use crate::report::robustness::Number;
 use crate::solve::solution::Solution;
+use control::blocks::stacked;
 use plant_file::robustness::RobustnessLimits;
 
 /// Returns the effect of each measurement noise on commands and estimated faults, and of all

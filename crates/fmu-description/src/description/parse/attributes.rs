@@ -34,7 +34,7 @@ impl<'a> Node<'a> {
         ParseError::Element { at, element, expected: expected.into(), actual }
     }
 
-    /// Returns the error for the value `found` of an attribute.
+    /// Returns the error for the value `actual` of an attribute.
     pub(super) fn wrong(
         &self,
         attribute: &'static str,
@@ -49,13 +49,13 @@ impl<'a> Node<'a> {
         ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), actual }
     }
 
-    /// Warns about the value `found` of an attribute that the schema does not allow.
+    /// Warns about the value `actual` of an attribute that the schema does not allow.
     pub(super) fn warn(&self, attribute: &str, expected: &str, actual: &str, assumed: &str) {
         let place = self.place(attribute);
         self.warn_of(true, place, expected, format!("{actual:?}"), assumed);
     }
 
-    /// Warns about the value `found` of an attribute that only the text of the standard does not
+    /// Warns about the value `actual` of an attribute that only the text of the standard does not
     /// allow.
     pub(super) fn warn_text(&self, attribute: &str, expected: &str, actual: &str, assumed: &str) {
         let place = self.place(attribute);
