@@ -287,7 +287,7 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
     findings.add(Error, path, what, why, "2.1.1");
 }
 
-/// Start of the names, in lower case, of libraries that belong to the operating system.
+/// Starts of the names, in lower case, of libraries that belong to the operating system, with white space between them.
 const SYSTEM: &str = "libc.so libm.so libpthread.so libdl.so librt.so libutil.so libgcc_s.so ld-linux \
     linux-vdso libstdc++.so /usr/lib/ /system/ kernel32 kernelbase ntdll user32 advapi32 \
     ws2_32 ole32 oleaut32 shell32 shlwapi gdi32 comdlg32 comctl32 msvcrt.dll bcrypt crypt32 \
@@ -301,7 +301,7 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
     for library in file.import_libraries().into_iter().flatten().flatten() {
         let name = String::from_utf8_lossy(library.name()).into_owned();
         let lower = name.to_ascii_lowercase();
-        if SYSTEM.split(' ').any(|prefix| lower.starts_with(prefix)) {
+        if SYSTEM.split_ascii_whitespace().any(|prefix| lower.starts_with(prefix)) {
             continue;
         }
         let last = name.rsplit('/').next().unwrap_or(&name);

@@ -60,7 +60,9 @@ pub(crate) fn summarise(report: &Report) {
     }
     report.schedule.iter().for_each(print_schedule);
     report.detection.iter().for_each(print_detection);
-    report.losses.iter().flat_map(|losses| &losses.loops).for_each(print_losses);
+    if let Some(losses) = &report.losses {
+        losses.loops.iter().for_each(print_losses);
+    }
     report.reconfiguration.iter().for_each(print_reconfigurations);
     report.fallback.iter().for_each(print_fallback);
     for check in report.checks.iter().filter(|check| !check.holds) {

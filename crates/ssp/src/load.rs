@@ -66,12 +66,15 @@ struct Loader {
 impl Loader {
     fn count(&mut self, parts: usize) -> Result<(), SspError> {
         self.parts = self.parts.saturating_add(parts).saturating_add(1);
-        let elements = (self.tree.nodes.len(), ELEMENTS, "elements");
-        let parts = (self.parts, PARTS, "connectors and parameters");
-        match [elements, parts].into_iter().find(|(count, limit, _)| exceeds(*count, *limit)) {
-            Some((_, limit, what)) => Err(SspError::Limit { limit, what, help: HELP }),
-            None => Ok(()),
+        for (count, limit, what) in [
+            (self.tree.nodes.len(), ELEMENTS, "elements"),
+            (self.parts, PARTS, "connectors and parameters"),
+        ] {
+            if exceeds(count, limit) {
+                return Err(SspError::Limit { limit, what, help: HELP });
+            }
         }
+        Ok(())
     }
 
     fn add(

@@ -88,8 +88,8 @@ impl DetectionDesign {
     /// Describes the first entry with a wrong shape, or without its counterpart.
     pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
         for (name, matrix, (rows, columns)) in self.shapes(design) {
-            let Matrix { rows: actual_rows, columns: actual_columns, .. } = matrix;
-            if (*actual_rows, *actual_columns) != (rows, columns) {
+            let (actual_rows, actual_columns) = (matrix.rows, matrix.columns);
+            if (actual_rows, actual_columns) != (rows, columns) {
                 return Some(format!(
                     "{name} is {actual_rows} x {actual_columns}, expected {rows} x {columns}"
                 ));

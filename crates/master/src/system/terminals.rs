@@ -191,8 +191,10 @@ impl System {
         let (Kind::Clock(first), Kind::Clock(second)) = (&source.kind, &target.kind) else {
             return false;
         };
-        let variabilities = [first, second].map(|clock| clock.interval_variability);
-        inputs && variabilities.map(|one| one == IntervalVariability::Triggered) == [false, true]
+        let triggered = IntervalVariability::Triggered;
+        inputs
+            && first.interval_variability != triggered
+            && second.interval_variability == triggered
     }
 }
 

@@ -79,8 +79,8 @@ impl Files {
             return self.ssd(target, base.below(target));
         }
         let folder = self.unpacked(target)?;
-        let (base, shown) =
-            (Base::archive(&folder, &target.shown), target.shown.display().to_string());
+        let base = Base::archive(&folder, &target.shown);
+        let shown = target.shown.display().to_string();
         let name = target.fragment.as_deref().unwrap_or(DEFAULT);
         if name.contains('/') {
             return Err(missing(shown, "the name of an SSD at the root of the SSP", name));
