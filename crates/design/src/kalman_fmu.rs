@@ -12,11 +12,11 @@ use crate::matrix::matrix;
 use crate::plant::linear::request;
 use crate::solve::designed::Designed;
 use crate::solve::gain::Noise;
-use crate::solve::names::joined;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::faults::EntryPoint;
 use plant_file::signals::Signal as PlantSignal;
+use plant_file::signals::joined;
 
 /// Largest modulus of an eigenvalue of A times the integration step: Runge-Kutta's method of order 4 has then an error of
 /// some 1e-6 a step.

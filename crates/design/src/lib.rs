@@ -50,9 +50,9 @@ use assess::{bandwidths, detection, reporting, worst_case};
 use designed_fmu::Content;
 use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
+use plant_file::signals::joined;
 use progress::{Step, Steps};
 use report::identity;
-use solve::names::joined;
 use solve::solution::Solution;
 use solve::{designed, fallback, reconfiguration};
 

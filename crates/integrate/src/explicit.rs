@@ -4,7 +4,7 @@
 //! extension and measure of stiffness: E. Hairer, S. P. Norsett and G. Wanner, "Solving Ordinary
 //! Differential Equations I" (2nd ed.), section II.6, and part II (2nd ed.), section IV.2.
 
-use crate::stepper::StepStart;
+use crate::start::StepStart;
 
 /// Nodes of the stages 2 to 7.
 const NODES: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];

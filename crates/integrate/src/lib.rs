@@ -19,6 +19,7 @@ mod inputs;
 mod integrated;
 mod method;
 mod rosenbrock;
+mod start;
 mod stepper;
 
 pub use integrated::{Integrated, Options, description_of};

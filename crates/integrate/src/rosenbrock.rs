@@ -7,7 +7,7 @@
 
 use solve::Factors;
 
-use crate::stepper::StepStart;
+use crate::start::StepStart;
 
 const GAMMA: f64 = 0.25;
 

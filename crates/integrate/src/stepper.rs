@@ -7,6 +7,7 @@ use solve::Scale;
 use crate::explicit::Explicit;
 use crate::method::Method;
 use crate::rosenbrock::Rosenbrock;
+use crate::start::StepStart;
 
 /// Ratio of the chosen step to the largest step that meets the tolerance, and the bounds of the ratio of
 /// two steps.
@@ -42,16 +43,6 @@ pub(crate) struct Memory {
     suspicious: u32,
     others: u32,
     stable: u32,
-}
-
-/// The point from which a method steps.
-#[derive(Clone, Copy)]
-pub(crate) struct StepStart<'a> {
-    /// The time in s.
-    pub(crate) time: f64,
-    pub(crate) states: &'a [f64],
-    /// The derivative of the states.
-    pub(crate) slope: &'a [f64],
 }
 
 /// Why no step was made.

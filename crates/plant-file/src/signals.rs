@@ -228,3 +228,14 @@ pub(crate) fn positions(
 pub fn same_unit(signals: &[Signal]) -> bool {
     signals.iter().all(|signal| signal.unit == signals[0].unit)
 }
+
+/// The names of signals, separated by commas.
+#[must_use]
+pub fn signal_names(signals: &[Signal]) -> String {
+    joined(signals.iter().map(|signal| signal.name.as_str()))
+}
+
+/// Names, separated by commas.
+pub fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}

@@ -5,10 +5,10 @@ use control::{Domain, Error};
 use nalgebra::Complex;
 
 use crate::report::number::rounded;
-use crate::solve::names::joined;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::requirements::Requirement;
+use plant_file::signals::joined;
 
 /// An estimate that decays slower than this part of the slowest mode of the feedback is too slow for it.
 const SLOW: f64 = 0.05;

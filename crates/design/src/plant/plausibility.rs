@@ -5,9 +5,9 @@ use files::PlaceError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::plant::linear::LinearPlant;
-use crate::solve::names::{joined, signal_names};
 use control::faults::ExtendedPlant;
 use plant_file::signals::Signal;
+use plant_file::signals::{joined, signal_names};
 use plant_file::{FAULTS, PlantFile};
 
 /// A column counts as a combination of others if they leave less than this of its length; rows and

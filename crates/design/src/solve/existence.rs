@@ -12,7 +12,8 @@ use plant_file::{FAULTS, PlantFile};
 
 use crate::plant::fixed_mode::described_in;
 use crate::plant::linear::LinearPlant;
-use crate::solve::names::{fault_names, signal_names, state_name};
+use crate::solve::names::{fault_names, state_name};
+use plant_file::signals::signal_names;
 
 /// Checks that the commands reach every mode that is not stable; the error names the mode.
 pub(crate) fn check_controllable(

@@ -7,11 +7,11 @@ use files::PlaceError;
 
 use crate::plant::linear::{AT_REST, LinearPlant};
 use crate::solve::gain::{GainResult, Refusal, unique};
-use crate::solve::names::signal_names;
 use crate::solve::tracking::{check_member, feedback_pair};
 use plant_file::PlantFile;
 use plant_file::references::References;
 use plant_file::requirements::Region;
+use plant_file::signals::signal_names;
 use plant_file::variants::Variant;
 
 /// The name of the plant of the file among the members.

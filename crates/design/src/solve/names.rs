@@ -2,7 +2,6 @@
 
 use control::faults::ExtendedPlant;
 use plant_file::PlantFile;
-use plant_file::signals::Signal;
 
 use crate::plant::linear::LinearPlant;
 
@@ -23,15 +22,6 @@ pub(crate) fn state_name(linear: &LinearPlant, state: usize) -> &str {
     let n = linear.states.len();
     let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
     signal.map_or("", |signal| signal.name.as_str())
-}
-
-/// The names of signals, separated by commas.
-pub(crate) fn signal_names(signals: &[Signal]) -> String {
-    joined(signals.iter().map(|signal| signal.name.as_str()))
-}
-
-pub(crate) fn joined<'a>(list: impl Iterator<Item = &'a str>) -> String {
-    list.collect::<Vec<_>>().join(", ")
 }
 
 /// Returns the names of the states of the feedback: states, with integral action the integrals.
