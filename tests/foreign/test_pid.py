@@ -1,4 +1,4 @@
-"""PI and PID controllers of `[loop]`, beside their textbook form by numpy and scipy."""
+"""PI, PID and other controllers of low order of `[loop]`, beside their textbook form by numpy and scipy."""
 
 import json
 import re
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from scipy.optimize import minimize
-from scipy.signal import cont2discrete
+from scipy.signal import butter, cont2discrete, tf2ss
 
 PEAK, FLOOR, ROLL_OFF, SET_POINT = 1.5, 0.01, 10.0, 0.3
 PLANTS = {
@@ -25,7 +25,7 @@ def plant_text(plant, structure, more="", of_loop=""):
     names = [f"y{at + 1}" for at in range(len(c))]
     return (
         f'A = {a}\nB = {b}\nC = {c}\nactuator_faults = "all"\nmeasurements = {names}\n{more}\n'
-        f'[reference]\ntrack = {names}\n[loop]\nbandwidth = {bandwidth}\nstructure = "{structure}"\n{of_loop}\n'
+        f'[reference]\ntrack = {names}\n[loop]\nbandwidth = {bandwidth}\nstructure = {json.dumps(structure)}\n{of_loop}\n'
     )
 
 
@@ -42,8 +42,14 @@ def designed(aso_ftc, folder, text, *options):
     return tomllib.loads((folder / "design.toml").read_text(encoding="utf-8")), report, float(gamma[1])
 
 
+def derivatives(pid):
+    """The gains of the filtered measurement's derivatives."""
+    first = [] if pid["derivative"] is None else [pid["derivative"]]
+    return [*first, *pid["higher_derivatives"]]
+
+
 class Textbook:
-    """The loop of a plant, its PI or PID controllers and an observer of plant and faults, frequency by frequency."""
+    """The loop of a plant, its controllers of low order and an observer of plant and faults, frequency by frequency."""
 
     def __init__(self, plant, design, report):
         self.a, self.b, self.c = (np.array(one, float) for one in plant[:3])
@@ -51,16 +57,16 @@ class Textbook:
         # The rows after those of the plant are those of the filters.
         self.l_x, self.l_f = np.array(design["L_x"], float)[: self.n], np.array(design["L_f"], float)
         self.pid = report["pid"]
-        self.gains = [(one["proportional"], one["integral"], one["derivative"]) for one in self.pid]
+        self.gains = [(one["integral"], one["proportional"], *derivatives(one)) for one in self.pid]
 
     def controller(self, s, gains, l_x, l_f):
         """From measurements and from references to commands: u = C(s) (y, r) - f_hat, f_hat by the observer from u and y."""
         from_y, from_r = np.zeros((self.m, len(self.c)), complex), np.zeros((self.m, len(self.c)), complex)
-        for one, (k, k_i, k_d) in zip(self.pid, gains, strict=True):
-            w = s / one["corner"]
-            filtered = 1 / (1 + w) if k_d is None else 1 / (1 + np.sqrt(2) * w + w * w)
+        for one, (k_i, *of_derivatives) in zip(self.pid, gains, strict=True):
+            numerator, denominator = butter(len(of_derivatives), one["corner"], analog=True)
+            filtered = np.polyval(numerator, s) / np.polyval(denominator, s)
             at = int(one["command"][1:]) - 1, int(one["measurement"][1:]) - 1
-            from_y[at] = -(k + s * (k_d or 0.0)) * filtered - k_i / s
+            from_y[at] = -np.polyval(of_derivatives[::-1], s) * filtered - k_i / s
             from_r[at] = k_i / s
         q = self.m
         dynamics = np.block([[self.a, self.b], [np.zeros((q, self.n + q))]])
@@ -96,12 +102,12 @@ class Textbook:
         return largest, peaks
 
 
-@pytest.mark.parametrize("structure", ["PI", "PID"])
+@pytest.mark.parametrize("structure", ["PI", "PID", 3, 5])
 @pytest.mark.parametrize("name", PLANTS)
 def test_gamma_and_the_peaks_are_those_of_the_textbook_controllers(aso_ftc, tmp_path, name, structure):
     plant = PLANTS[name]
     design, report, gamma = designed(aso_ftc, tmp_path, plant_text(plant, structure))
-    assert (report["pid"][0]["derivative"] is None) == (structure == "PI")
+    assert len(derivatives(report["pid"][0])) == {"PI": 1, "PID": 2}.get(structure, structure) - 1
     largest, peaks = Textbook(plant, design, report).largest(plant[3] * np.logspace(-4, 4, 3000))
     assert gamma == pytest.approx(largest, rel=3e-3)
     stated = [point["s_peak"] for point in report["robustness"]["points"]]
@@ -130,18 +136,21 @@ def simplex(count):
     return np.vstack([np.ones(count), np.ones((count, count)) + 0.05 * np.eye(count)])
 
 
-@pytest.mark.parametrize("structure", ["PI", "PID"])
+@pytest.mark.parametrize("structure", ["PI", "PID", 4])
 def test_the_sampled_fmu_without_compensation_is_the_recursion_of_a_plc(aso_ftc, tmp_path, structure):
     period = 0.1
     text = plant_text(PLANTS["cart"], structure, f"sample_time = {period}\n")
     design, report, _ = designed(aso_ftc, tmp_path, text, "--fmu", tmp_path / "Pid.fmu")
     assert design["estimator"] == "prediction"
     (pid,) = report["pid"]
-    w = pid["corner"]
-    lag = ([[-w]], [[w]]) if structure == "PI" else ([[0, 1], [-w * w, -np.sqrt(2) * w]], [[0], [w * w]])
-    f, g = (np.array(one, float) for one in lag)
-    phi, gamma, *_ = cont2discrete((f, g, np.eye(len(f)), np.zeros((len(f), 1))), period)
-    gains = np.array([pid["proportional"], *([pid["derivative"]] if structure == "PID" else [])])
+    gains = np.array([pid["proportional"], *derivatives(pid)])
+    # The rows of C give the filtered measurement and its derivatives from the states of the controller form.
+    f, g, c, _ = tf2ss(*butter(len(gains), pid["corner"], analog=True))
+    rows = [c[0]]
+    while len(rows) < len(gains):
+        rows.append(rows[-1] @ f)
+    phi, gamma, *_ = cont2discrete((f, g, c, [[0.0]]), period)
+    gains = gains @ np.array(rows)
     times = period * np.arange(200)
     y, r = np.sin(0.7 * times) + 0.2 * np.sign(np.sin(3 * times)), np.where(times > 5, 1.0, 0.0)
     # The first sample finds a filter at rest at the operating point.
@@ -195,6 +204,15 @@ def test_what_a_refusal_names_is_designed(aso_ftc, tmp_path):
     assert '`structure = "PID"`' in refused.stderr
     assert designed(aso_ftc, tmp_path, plant_text(integrator, "PID"))[1]["verdict"]["level"] == "green"
 
+    # s^4 + (K_d s^2 + K s + K_i) has no term s^3: no gains make it stable, by the necessary condition of Routh.
+    triple = (np.eye(3, k=1).tolist(), [[0], [0], [1]], [[1, 0, 0]], 1.0)
+    refused = attempt(aso_ftc, tmp_path, plant_text(triple, "PID"))
+    assert refused.returncode == 2 and "no stable loop with PID controllers was found" in refused.stderr
+    assert "`structure = 3`" in refused.stderr
+    design, report, gamma = designed(aso_ftc, tmp_path, plant_text(triple, 3))
+    largest, _ = Textbook(triple, design, report).largest(np.logspace(-4, 4, 3000))
+    assert gamma == pytest.approx(largest, rel=3e-3)
+
     text = plant_text(PLANTS["cart"], "PID")
     no_reference = text.replace('[reference]\ntrack = [\'y1\']\n', "")
     refused = attempt(aso_ftc, tmp_path, no_reference).stderr
@@ -215,10 +233,14 @@ def test_what_a_refusal_names_is_designed(aso_ftc, tmp_path):
     [
         ('sample_time = 0.1\nestimator = "current"', "", "uses the measurements of the sample before"),
         ("filter = 3", "", "not possible together with `filter`"),
+        ("", "structure = 7", "expected a whole number from 1 to 6, found 7"),
+        ("", 'structure = "P"', 'expected "PI", "PID" or an order from 1 to 6, found "P"'),
         ("", 'pairs = { u2 = "y1" }', 'no actuator is named "u2"; there are u1'),
         ("", 'pairs = { u1 = "y2" }', 'no measurement is named "y2"; there are y1'),
     ],
 )
 def test_entries_that_contradict_the_structure_are_refused_with_their_place(aso_ftc, tmp_path, more, of_loop, message):
-    refused = attempt(aso_ftc, tmp_path, plant_text(PLANTS["cart"], "PID", more, of_loop))
+    text = plant_text(PLANTS["cart"], "PID", more, of_loop)
+    text = text.replace('structure = "PID"\n', "") if "structure" in of_loop else text
+    refused = attempt(aso_ftc, tmp_path, text)
     assert refused.returncode == 2 and message in refused.stderr, refused.stderr

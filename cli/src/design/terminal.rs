@@ -92,14 +92,20 @@ pub(crate) fn summarise(report: &Report) {
     }
 }
 
-/// Prints the gains of a PI or PID controller; times, where all gains act in the same direction.
+/// Prints the gains of a controller of low order; times, where all gains act in the same direction.
 fn print_pid(controller: &PidController) {
     let PidController { command, measurement, proportional, integral, .. } = controller;
     let mut gains =
         vec![format!("K = {}", number(*proportional)), format!("K_i = {} 1/s", number(*integral))];
     gains.extend(controller.derivative.map(|gain| format!("K_d = {} s", number(gain))));
+    let higher = controller.higher_derivatives.iter().zip(2..);
+    gains.extend(higher.map(|(gain, k)| format!("K_{k} = {} s^{k}", number(*gain))));
     gains.extend(controller.set_point.map(|gain| format!("N_r = {}", number(gain))));
-    let name = if controller.derivative.is_some() { "PID" } else { "PI" };
+    let name = match (controller.derivative, controller.higher_derivatives.len()) {
+        (None, _) => "PI".to_owned(),
+        (_, 0) => "PID".to_owned(),
+        (_, higher) => format!("controller of order {}", higher + 2),
+    };
     println!(
         "{name} from {measurement} to {command}: {}, filter at {} rad/s",
         gains.join(", "),

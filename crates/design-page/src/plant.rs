@@ -48,27 +48,31 @@ pub(super) fn gains(report: &Report) -> Markup {
     }
 }
 
-/// Shows PI and PID controllers; nothing without them.
+/// Shows controllers of low order; nothing without them.
 fn pid(controllers: &[PidController]) -> Markup {
     if controllers.is_empty() {
         return Markup::default();
     }
-    let columns: Columns<'_, PidController, 7> = [
+    let columns: Columns<'_, PidController, 11> = [
         ("command", |one| (&one.command).into()),
         ("measurement", |one| (&one.measurement).into()),
         ("K", |one| one.proportional.into()),
         ("K_i (1/s)", |one| one.integral.into()),
         ("K_d (s)", |one| one.derivative.into()),
+        ("K_2 (s²)", |one| one.higher_derivatives.first().copied().into()),
+        ("K_3 (s³)", |one| one.higher_derivatives.get(1).copied().into()),
+        ("K_4 (s⁴)", |one| one.higher_derivatives.get(2).copied().into()),
+        ("K_5 (s⁵)", |one| one.higher_derivatives.get(3).copied().into()),
         ("N_r", |one| one.set_point.into()),
         ("ω (rad/s)", |one| one.corner.into()),
     ];
     html! {
         p {
-            "u = N_r r − K y_f + K_i ∫ (r − y) dt − K_d y_f′ + K_f f_hat, in deviations from the operating point. \
-             y_f is y behind the filter 1 / (1 + s/ω) of a PI controller, 1 / (1 + √2 s/ω + s²/ω²) of a PID controller. \
+            "u = N_r r − K y_f + K_i ∫ (r − y) dt − K_d y_f′ − K_2 y_f″ − … + K_f f_hat, in deviations from the operating point. \
+             y_f is y behind the filter 1 / (1 + s/ω) of a PI controller, 1 / (1 + √2 s/ω + s²/ω²) of a PID controller, a Butterworth filter of order n of a controller of order n. \
              K has the unit of the command per unit of the measurement."
         }
-        (table_of("PI and PID controllers", controllers, &columns))
+        (table_of("Controllers of low order", controllers, &columns))
     }
 }
 

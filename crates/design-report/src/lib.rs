@@ -41,7 +41,7 @@ pub struct Report {
     pub checks: Vec<Check>,
     /// K_x, K_f, L_x, L_f and the other matrices of the controller.
     pub gains: Vec<Matrix>,
-    /// PI and PID controllers, in place of a state feedback; empty otherwise.
+    /// PI, PID and other controllers of low order, in place of a state feedback; empty otherwise.
     pub pid: Vec<PidController>,
     /// The loop of the state feedback.
     pub feedback: Loop,
@@ -142,11 +142,12 @@ pub struct Matrix {
 /// A PI or PID controller from one measurement y, with its reference r, to one command.
 ///
 /// ```text
-/// u = N_r r - K y_f + K_i integral of (r - y) dt - K_d y_f'
+/// u = N_r r - K y_f + K_i integral of (r - y) dt - K_d y_f' - K_2 y_f'' - ...
 /// ```
 ///
 /// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate: 1 / (1 + s / w) of a PI
-/// controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller.
+/// controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, a Butterworth filter of order n of a controller of
+/// order n.
 #[derive(Clone, Serialize, JsonSchema)]
 pub struct PidController {
     /// The name of the command.
@@ -159,6 +160,8 @@ pub struct PidController {
     pub integral: f64,
     /// `K_d`, s times the unit of K; none of a PI controller.
     pub derivative: Option<f64>,
+    /// `K_2`, `K_3`, ..., s^k times the unit of K; empty for PI and PID controllers.
+    pub higher_derivatives: Vec<f64>,
     /// The entry of `N_r`; none without a feedforward.
     pub set_point: Option<f64>,
     /// w of the filter, rad/s.

@@ -1,6 +1,7 @@
-//! The entries `structure` and `pairs` of `[loop]`: PI or PID controllers in place of a state feedback.
+//! The entries `structure` and `pairs` of `[loop]`: PI, PID or other controllers of low order in place of a state
+//! feedback.
 
-use crate::read::{alone, is_first, refuse};
+use crate::read::{alone, refuse, whole};
 use crate::references::References;
 use crate::signals::{Signal, position, position_of};
 use files::{Place, PlaceError, Table};
@@ -9,20 +10,23 @@ use nalgebra::RowDVector;
 /// Entries of the file that need a state feedback, or have a filter beside that of the controllers.
 const OTHERS: [&str; 3] = ["filter", "reconfiguration", "fallback"];
 
-/// PI or PID controllers, each from one measurement to one command.
+/// The largest order of a controller's filter.
+const MOST_ORDER: u32 = 6;
+
+/// Controllers of low order, each from one measurement to one command.
 ///
 /// ```text
-/// u = K (b r - y_f + 1 / T_i integral of (r - y) dt - T_d y_f')
+/// u = K (b r - y_f + 1 / T_i integral of (r - y) dt - T_d y_f') - K_2 y_f'' - ... - K_(n-1) y_f^(n-1)
 /// ```
 ///
-/// for each command, with the measurement y, its reference r, and the filtered measurement `y_f`: 1 / (1 + s / w) y
-/// of a PI controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) y of a PID controller.
+/// for each command, with the measurement y, its reference r, and the measurement `y_f` behind a Butterworth filter of
+/// order n: 1 / (1 + s / w) of a PI controller, n = 1, and 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, n = 2.
 ///
 /// Source: K. J. Astrom and T. Hagglund, Advanced PID control (2006), sections 3.3 and 3.4.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pid {
-    /// Whether the derivative is used.
-    pub derivative: bool,
+    /// n, the number of states of each filter; derivatives up to that of order n - 1 are used.
+    pub order: usize,
     /// The controllers.
     pub pairs: Vec<Pair>,
     /// w, in rad/s.
@@ -49,15 +53,25 @@ impl Pid {
         corner: f64,
     ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = table.get("structure") else {
-            let message = "it belongs to `structure`, \"PI\" or \"PID\"";
+            let message = "it belongs to `structure`, \"PI\" for example";
             return refuse(table, &["pairs"], message).map(|()| None);
         };
-        let derivative = !is_first(&entry, ["PI", "PID"])?;
+        let order = match entry.text() {
+            Ok("PI") => 1,
+            Ok("PID") => 2,
+            Ok(other) => {
+                let message = format!(
+                    "expected \"PI\", \"PID\" or an order from 1 to {MOST_ORDER}, found {other:?}"
+                );
+                return Err(entry.error(message));
+            }
+            Err(_) => whole(&entry, 1..=MOST_ORDER)? as usize,
+        };
         alone(&entry, file, &OTHERS)?;
         if let Some(estimator) = file.get("estimator")
             && estimator.text()? == "current"
         {
-            let message = "a sampled PI or PID controller uses the measurements of the sample before: \
+            let message = "a sampled controller of this kind uses the measurements of the sample before: \
                            expected \"prediction\", or no entry";
             return Err(estimator.error(message));
         }
@@ -90,7 +104,7 @@ impl Pid {
                 return Err(entry.error(message));
             }
         }
-        Ok(Some(Self { derivative, pairs, corner, place: entry.place }))
+        Ok(Some(Self { order, pairs, corner, place: entry.place }))
     }
 
     /// Checks that the references are those of the measurements that commands follow, and integrated.
@@ -105,9 +119,8 @@ impl Pid {
         let names: Vec<_> = names.collect();
         let expected = format!("expected `reference.track = [{}]`", names.join(", "));
         let Some(references) = references.filter(|references| references.integral) else {
-            let message = format!(
-                "the integrals of PI and PID controllers are those of references: {expected}"
-            );
+            let message =
+                format!("the integrals of the controllers are those of references: {expected}");
             return Err(file.source.error(&self.place, message));
         };
         let followed = |row: RowDVector<f64>| {
@@ -148,12 +161,6 @@ impl Pid {
     /// Number of states of all filters.
     #[must_use]
     pub fn states(&self) -> usize {
-        self.order() * self.measurements().len()
-    }
-
-    /// Number of states of each filter.
-    #[must_use]
-    pub const fn order(&self) -> usize {
-        if self.derivative { 2 } else { 1 }
+        self.order * self.measurements().len()
     }
 }

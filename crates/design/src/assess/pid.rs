@@ -1,4 +1,4 @@
-//! The PI and PID controllers of the report.
+//! The PI, PID and other controllers of low order of the report.
 
 use crate::report::PidController;
 use crate::solve::pid::{columns, reference};
@@ -7,7 +7,7 @@ use crate::solve::tracking::Tracking;
 use plant_file::PlantFile;
 use plant_file::pid::Pair;
 
-/// The PI and PID controllers of a solution; none of a state feedback.
+/// The controllers of low order of a solution; none of a state feedback.
 pub(crate) fn controllers(file: &PlantFile<'_>, designed: &Solution) -> Vec<PidController> {
     let (Some(pid), Some(references)) = (file.pid(), &file.references) else { return Vec::new() };
     let Solution { linear, feedback, tracking, .. } = designed;
@@ -16,12 +16,14 @@ pub(crate) fn controllers(file: &PlantFile<'_>, designed: &Solution) -> Vec<PidC
         let Pair { actuator, measurement } = *pair;
         let at = columns(pid, references, linear.states.len(), measurement);
         let gain = |column: usize| feedback.gain[(actuator, column)];
+        let mut derivatives = at.derivatives.map(|column| -gain(column));
         PidController {
             command: linear.actuators[actuator].name.clone(),
             measurement: linear.measurements[measurement].name.clone(),
             proportional: -gain(at.proportional),
             integral: gain(at.integral),
-            derivative: at.derivative.map(|column| -gain(column)),
+            derivative: derivatives.next(),
+            higher_derivatives: derivatives.collect(),
             set_point: n_r.map(|n_r| n_r[(actuator, reference(references, measurement))]),
             corner: pid.corner,
         }

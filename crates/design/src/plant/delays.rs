@@ -63,7 +63,7 @@ pub(crate) struct Delayed {
     pub(crate) g: DMatrix<f64>,
 }
 
-/// The plant with the states of its delays that the observer has, and those of the filters of PI and PID controllers.
+/// The plant with the states of its delays that the observer has, and those of the filters of controllers of low order.
 pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,
@@ -114,7 +114,7 @@ pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> T
 }
 
 /// The states of the plant, then those of its delays with their values at the operating point, then those of the filters
-/// of PI and PID controllers.
+/// of controllers of low order.
 ///
 /// A constant command u leads to z = [u, 0, ...], a constant measurement y to z = -d A'^-1 `e_1` y, see
 /// [`Delays::approximated`].

@@ -29,7 +29,7 @@ const NOTHING: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' where the plant is
 /// known in its samples only. The states of its delays, each approximated,
-/// follow those that the plant file states, then those of the filters of PI and PID controllers.
+/// follow those that the plant file states, then those of the filters of controllers of low order.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
@@ -115,7 +115,7 @@ impl LinearPlant {
         self.undelayed.a.nrows()..self.states.len()
     }
 
-    /// The positions of the states of the filters of PI and PID controllers, the last ones.
+    /// The positions of the states of the filters of controllers of low order, the last ones.
     pub(crate) fn filter_states(&self, file: &PlantFile<'_>) -> Range<usize> {
         let count = file.pid().map_or(0, Pid::states);
         self.states.len() - count..self.states.len()

@@ -46,7 +46,7 @@ impl GainProblem<'_> {
         common: Option<GainResult>,
     ) -> Result<(GainResult, GainResult), PlaceError> {
         let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
-        // No command and no state of the plant depends on the filters of PI and PID controllers before those are in the
+        // No command and no state of the plant depends on the filters of controllers of low order before those are in the
         // loop.
         let filters = linear.filter_states(file);
         let (first, count) = (filters.start, filters.len());

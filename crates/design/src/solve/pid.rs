@@ -1,4 +1,4 @@
-//! PI and PID controllers in place of a state feedback.
+//! PI, PID and other controllers of low order in place of a state feedback.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use plant_file::references::References;
 /// A start decays at this part of the rate of the state feedback beside it, if that can be had.
 const DECAY: f64 = 0.5;
 
-/// The structure of the feedback: which of its entries a PI or PID controller has.
+/// The structure of the feedback: which of its entries the controllers have.
 pub(crate) struct PidProblem<'a> {
     pub(crate) pid: &'a Pid,
     pub(crate) shape: &'a LoopShape,
@@ -33,7 +33,8 @@ pub(crate) struct PidProblem<'a> {
 /// Where the gains of a controller stand in its row of the feedback, [`K_x`, `K_i`].
 pub(crate) struct Columns {
     pub(crate) proportional: usize,
-    pub(crate) derivative: Option<usize>,
+    /// Of the rate of the filtered measurement, then of its higher derivatives.
+    pub(crate) derivatives: Range<usize>,
     pub(crate) integral: usize,
 }
 
@@ -46,8 +47,8 @@ impl PidProblem<'_> {
     pub(crate) fn free(&self) -> Vec<(usize, usize)> {
         let of = |pair: &Pair| {
             let (pair, columns) = (*pair, self.columns(*pair));
-            let all = [Some(columns.proportional), columns.derivative, Some(columns.integral)];
-            all.into_iter().flatten().map(move |column| (pair.actuator, column))
+            let all = std::iter::once(columns.proportional).chain(columns.derivatives);
+            all.chain([columns.integral]).map(move |column| (pair.actuator, column))
         };
         self.pid.pairs.iter().flat_map(of).collect()
     }
@@ -95,18 +96,18 @@ impl PidProblem<'_> {
     }
 
     fn not_found(&self, file: &PlantFile<'_>, instability: f64) -> PlaceError {
-        let name = if self.pid.derivative { "PID" } else { "PI" };
+        let (name, further) = match self.pid.order {
+            1 => ("PI controllers".to_owned(), "`structure = \"PID\"`, "),
+            2 => ("PID controllers".to_owned(), "a higher order, `structure = 3`, "),
+            order => (format!("controllers of order {order}"), ""),
+        };
         let measure = match self.domain {
             Domain::Continuous => format!("largest real part {}", rounded(instability)),
             Domain::Sampled { .. } => format!("largest modulus {}", rounded(1.0 + instability)),
         };
-        let help = if self.pid.derivative {
-            "other `pairs`, another `bandwidth` or a state feedback, which is without `structure`, may help"
-        } else {
-            "`structure = \"PID\"`, other `pairs` or a state feedback, which is without `structure`, may help"
-        };
         let message = format!(
-            "no stable loop with {name} controllers was found, from {} starts; the best loop has the {measure}: {help}",
+            "no stable loop with {name} was found, from {} starts; the best loop has the {measure}: {further}other \
+             `pairs`, another `bandwidth` or a state feedback, which is without `structure`, may help",
             self.shape.starts(self.domain).len()
         );
         file.error_at(&self.shape.place, message)
@@ -122,11 +123,11 @@ pub(crate) fn columns(
 ) -> Columns {
     let measurements = pid.measurements();
     let position = measurements.iter().position(|at| *at == measurement).unwrap_or_default();
-    let first = states - pid.order() * (measurements.len() - position);
+    let first = states - pid.order * (measurements.len() - position);
     let reference = reference(references, measurement);
     Columns {
         proportional: first,
-        derivative: pid.derivative.then_some(first + 1),
+        derivatives: first + 1..first + pid.order,
         integral: states + reference,
     }
 }
