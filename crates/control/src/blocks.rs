@@ -6,6 +6,10 @@ use nalgebra::{Complex, ComplexField, DMatrix};
 pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// The matrix [above; below] of two matrices with the same number of columns.
+///
+/// # Panics
+///
+/// If the numbers of columns differ.
 #[must_use]
 pub fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatrix<T> {
     let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), T::zero());
@@ -14,6 +18,10 @@ pub fn stacked<T: ComplexField>(above: &DMatrix<T>, below: &DMatrix<T>) -> DMatr
 }
 
 /// The matrix [left, right] of two matrices with the same number of rows.
+///
+/// # Panics
+///
+/// If the numbers of rows differ.
 #[must_use]
 pub fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix<T> {
     let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), T::zero());

@@ -51,7 +51,10 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
         k -= direct * &output;
         g -= enters * &output;
     }
-    let plus = |m: DMatrix<f64>, part: Option<_>| part.into_iter().fold(m, |m, part| m + part);
+    let plus = |m: DMatrix<f64>, part: Option<DMatrix<f64>>| match part {
+        Some(part) => m + part,
+        None => m,
+    };
     Ok(match gains.estimator {
         Estimator::Prediction => {
             let d = direct.unwrap_or_else(|| DMatrix::zeros(k.nrows(), m.ncols()));

@@ -59,7 +59,7 @@ pub fn exponential(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
 
 /// e^A of a matrix that needs no balancing.
 pub(crate) fn scaling_and_squaring(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-    let mut scaled = a.clone();
+    let mut scaled = check::in_range("e^A", a.clone())?;
     let mut squarings = 0;
     while one_norm(&scaled) > REACH {
         scaled *= 0.5;

@@ -27,6 +27,7 @@
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
 //! | discretisation and back, matrix exponential and logarithm | [`hold`], [`exponential`], [`logarithm`] |
+//! | matrices below and beside each other | [`blocks`] |
 //! | eigenvalues, Lyapunov equations, reproducible products | [`eigen`], [`lyapunov`], [`product`] |
 //!
 //! # Conventions
@@ -34,7 +35,7 @@
 //! Feedback is u = K x, so that the closed loop is A + B K; an observer has the error dynamics A - L C.
 //! ' is the transpose in formulas, [A, B; C, D] a matrix of blocks, eps the machine epsilon. Systems are
 //! [`StateSpace`]; [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Bad
-//! arguments and unsolvable problems are an [`Error`], never a panic.
+//! arguments and unsolvable problems are an [`Error`], never a panic; only [`blocks`] panics, for shapes that do not fit.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(feature = "design"),

@@ -116,7 +116,7 @@ struct Terms {
 }
 
 impl Terms {
-    /// Raises no degrees of freedom, or one where `degrees` is odd.
+    /// The probability of `degrees` degrees of freedom, raised from none, or from one where `degrees` is odd.
     fn new(degrees: u32, half: f64) -> Self {
         let mut terms = match degrees % 2 {
             0 => Self { half, survival: 0.0, shape: 0.0 },

@@ -46,10 +46,10 @@ impl WindowTest {
         bias: f64,
     ) -> Result<Self, Error> {
         let length = as_number(window);
-        let (holds, name) = (residuals > 0 && window > 0, "the number of residuals or of samples");
-        check::that(holds, name, 0.0, "at least 1")?;
-        let (holds, name) = (bias >= 0.0 && bias.is_finite(), "the mean of the residuals");
-        check::that(holds, name, bias, "a finite number from 0")?;
+        let name = "the number of residuals or of samples";
+        check::that(residuals > 0 && window > 0, name, 0.0, "at least 1")?;
+        let is_bound = bias >= 0.0 && bias.is_finite();
+        check::that(is_bound, "the mean of the residuals", bias, "a finite number from 0")?;
         let threshold = noncentral_quantile(residuals, length * bias * bias, length / samples);
         let name = "the number of samples between false alarms";
         check::that(!threshold.is_nan(), name, samples, "more than a window")?;

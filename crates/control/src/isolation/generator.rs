@@ -76,9 +76,11 @@ impl Requirements {
         }
         check::positive("tolerance", self.tolerance)?;
         check::positive("quality", self.quality)?;
-        let noise = self.noise.iter().flatten();
-        noise.clone().try_for_each(|&size| check::positive("noise", size))?;
-        self.noise.iter().try_for_each(|noise| check::length("noise", noise, measurements))
+        if let Some(noise) = &self.noise {
+            noise.iter().try_for_each(|&size| check::positive("noise", size))?;
+            check::length("noise", noise, measurements)?;
+        }
+        Ok(())
     }
 }
 

@@ -165,7 +165,8 @@ impl<'a> Search<'a> {
     ) -> Result<(), Error> {
         let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weigh);
         let end = descend(self.feedback.problem, start.clone(), &slope, TOLERANCE)?;
-        self.offer(&[end]).map(drop)
+        self.offer(&[end])?;
+        Ok(())
     }
 }
 
