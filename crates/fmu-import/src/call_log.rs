@@ -121,22 +121,22 @@ const NAMES: [(&str, &str, &str); 10] = [
     ("fmi2SetInteger", "fmi3SetInt64", "fmiSetInteger"),
     ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
     ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
-    ("fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates", "fmi2NewDiscreteStates"),
+    ("fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates", "fmiEventUpdate"),
     ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
     ("fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives", "fmiGetRealOutputDerivatives"),
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
 /// Functions of FMI 1.0 for model exchange with other names than in FMI 2.0.
-const MODELS: [(&str, &str); 4] = [
+const MODELS: [(&str, &str); 3] = [
     ("fmi2Terminate", "fmiTerminate"),
     ("fmi2EnterInitializationMode", "fmiInitialize"),
-    ("fmi2NewDiscreteStates", "fmiEventUpdate"),
     ("fmi2GetNominalsOfContinuousStates", "fmiGetNominalContinuousStates"),
 ];
 
 impl<S: Slave + ?Sized> LoggedSlave<S> {
-    /// Logs that a function has created the instance of a kind: both for FMI 1.0, 2.0 and 3.0.
+    /// Logs that the instance was created, by which function and with which argument for its kind; `functions` has
+    /// both for FMI 1.0, 2.0 and 3.0.
     fn created(&self, functions: [(&str, &str); 3]) {
         let (function, kind) = self.of_version(functions);
         let (instance, guid) = (&self.instance, &self.slave.description().guid);

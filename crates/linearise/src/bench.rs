@@ -69,7 +69,7 @@ impl<'p> Bench<'p> {
 
     /// Returns a bench for the same instance with another step.
     pub(super) fn with_step(&self, step: f64) -> Self {
-        Self { step, ..self.clone() }
+        Self { step, rest: DMatrix::zeros(0, 0), ..self.clone() }
     }
 
     /// Returns the typical size of reading `k`: states first, then outputs.

@@ -15,11 +15,11 @@ const REQUEST: u8 = 2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// The run steps.
-    Running,
+    Running = 0,
     /// The run waits at a communication point until it is resumed.
-    Paused,
+    Paused = 1,
     /// The run has ended.
-    Ended,
+    Ended = 2,
 }
 
 impl Phase {

@@ -102,7 +102,8 @@ pub fn on_ending_signal(react: impl Fn(c_int) + Send + 'static) -> io::Result<()
     }
     let is_handled = |signal: &&c_int| **signal != libc::SIGHUP || !ignores_hangup();
     for signal in ENDING_SIGNALS.iter().filter(is_handled) {
-        handle(*signal, on_arrival, libc::SA_RESTART)?;
+        // SAFETY: the handler uses atomics and wakes a thread.
+        unsafe { handle(*signal, on_arrival, libc::SA_RESTART) }?;
     }
     Ok(())
 }
@@ -170,15 +171,20 @@ pub(super) fn install() -> io::Result<()> {
     // SAFETY: the memory is never freed.
     check(unsafe { libc::sigaltstack(&raw const stack, null_mut()) })?;
     for (signal, _) in FATAL {
-        handle(signal, on_signal, 0)?;
+        // SAFETY: the handler calls async-signal-safe functions only.
+        unsafe { handle(signal, on_signal, 0) }?;
     }
     // SAFETY: no handler is installed.
     unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
     on_end_of_process()
 }
 
-/// Installs a handler, which is async-signal-safe and runs on the alternate stack if there is one.
-pub(crate) fn handle(
+/// Installs a handler, which runs on the alternate stack if there is one.
+///
+/// # Safety
+///
+/// `handler` is async-signal-safe.
+pub(crate) unsafe fn handle(
     signal: c_int,
     handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void),
     flags: c_int,
@@ -187,7 +193,7 @@ pub(crate) fn handle(
     let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     action.sa_sigaction = handler as usize;
     action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | flags;
-    // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
+    // SAFETY: the handler has the signature of SA_SIGINFO; the caller says that it is async-signal-safe.
     check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })
 }
 
@@ -255,7 +261,8 @@ pub fn leave_file(folder: &Path) -> io::Result<()> {
     }
     for (signal, _) in FATAL {
         if handler_of(signal)? == libc::SIG_DFL {
-            handle(signal, write_file, 0)?;
+            // SAFETY: the handler calls async-signal-safe functions only.
+            unsafe { handle(signal, write_file, 0) }?;
         }
     }
     Ok(())

@@ -19,7 +19,8 @@ pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
     if SHARED.set(shared.clone()).is_ok() {
         for signal in [libc::SIGSEGV, libc::SIGBUS, libc::SIGABRT] {
             // RESETHAND restores the default action, which ends the process as the crash would have.
-            handle(signal, on_signal, libc::SA_RESETHAND)?;
+            // SAFETY: the handler uses atomics, `errno` and `raise` only.
+            unsafe { handle(signal, on_signal, libc::SA_RESETHAND) }?;
         }
     }
     let limit = Rlimit { current: Some(bytes), maximum: Some(bytes) };

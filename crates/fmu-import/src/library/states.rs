@@ -72,7 +72,10 @@ macro_rules! states {
                 }
             }
 
-            #[doc = concat!("Serializes the current state (`", $get, "`, `", $serialize, "`).", $crate::library::calls::errors!())]
+            #[doc = concat!(
+                "Serializes the current state (`", $get, "`, `", $serialize, "`).",
+                $crate::library::calls::errors!()
+            )]
             $visibility fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
                 let function = function!(self.get_state, $get);
                 self.base.log_call($get, String::new);
@@ -104,7 +107,10 @@ macro_rules! states {
                 Ok(bytes)
             }
 
-            #[doc = concat!("Restores a serialized state (`", $deserialize, "`, `", $set, "`).", $crate::library::calls::errors!())]
+            #[doc = concat!(
+                "Restores a serialized state (`", $deserialize, "`, `", $set, "`).",
+                $crate::library::calls::errors!()
+            )]
             $visibility fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
                 let mut state = null_mut();
                 let function = function!(self.deserialize_state, $deserialize);
