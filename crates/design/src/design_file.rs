@@ -40,7 +40,7 @@ impl Designed {
         let at_origin = nominal.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
         let operating = |signal: &PlantSignal| signal.operating.filter(|_| !at_origin);
         let signal =
-            |stated: &PlantSignal| Signal { operating: operating(stated), ..signal(stated) };
+            |stated: &PlantSignal| Signal { operating: operating(stated), ..as_stated(stated) };
         let actuator = |stated: &PlantSignal| {
             let Signal { name, unit, description, operating } = signal(stated);
             Actuator { name, unit, description, operating, limits: stated.limits }
@@ -113,7 +113,7 @@ impl Designed {
 }
 
 /// A signal as the design file has it.
-pub(crate) fn signal(signal: &PlantSignal) -> Signal {
+pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
     Signal {
         name: signal.name.clone(),
         unit: signal.unit.clone(),

@@ -7,7 +7,7 @@ use files::PlaceError;
 use linearise::PlantEquations;
 use nalgebra::DMatrix;
 
-use crate::design_file::signal;
+use crate::design_file::as_stated;
 use crate::matrix::matrix;
 use crate::plant::linear::request;
 use crate::solve::designed::Designed;
@@ -97,7 +97,7 @@ pub(crate) fn kalman_design(
         },
         rate: channel.rate,
     });
-    let signals = |signals: &[PlantSignal]| signals.iter().map(signal).collect::<Vec<_>>();
+    let signals = |signals: &[PlantSignal]| signals.iter().map(as_stated).collect::<Vec<_>>();
     let states = signals(&linear.states);
     let is_state = |name: &String| states.iter().any(|state| state.name == *name);
     let settings = fmu.operating_point.iter().filter(|(name, _)| !is_state(name));

@@ -1,6 +1,6 @@
 //! The table `[estimation]` of a plant file: the law that estimates the faults.
 
-use crate::read::{each, not_negative, positive, within};
+use crate::read::{each, not_negative, positive, positive_within};
 use files::{Entry, Place, PlaceError, Table};
 
 /// A law with the parameters that the file states; the others follow from plant and observer.
@@ -187,9 +187,8 @@ impl EstimationRequest {
                 Law::SlidingMode { rho: numbers("rho")?, delta: numbers("delta")? }
             }
             Law::Learning { .. } => {
-                let share = |entry: Entry<'_>| {
-                    entry.positive().and_then(|_| within(&entry, ..=1.0, "expected at most 1"))
-                };
+                let share =
+                    |entry: Entry<'_>| positive_within(&entry, ..=1.0, "expected at most 1");
                 Law::Learning { kept: table.get("K_1").map(share).transpose()? }
             }
         };

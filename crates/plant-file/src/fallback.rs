@@ -1,6 +1,6 @@
 //! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
 
-use crate::read::{alone, within};
+use crate::read::{alone, positive_within};
 use crate::requirements::{Region, stated_region};
 use crate::signals::{Signal, positions};
 use files::{Entry, Place, PlaceError, Table};
@@ -36,8 +36,7 @@ impl FallbackRequest {
         let meaning = "the names of the actuators that may fail, or \"all\"";
         let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
         let loss = |entry: Entry<'_>| {
-            entry.positive()?;
-            within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")
+            positive_within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")
         };
         let loss = table.get("loss").map_or(Ok(1.0), loss)?;
         if actuators.len() < 2 && loss >= 1.0 {

@@ -3,7 +3,7 @@
 use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::matrix;
-use crate::read::{is_first, positive, refuse, within};
+use crate::read::{is_first, positive, positive_within, refuse};
 use crate::signals::{Signal, description, name, position, positions, unit};
 
 /// The assumed dynamics of a fault.
@@ -215,10 +215,9 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
     if table.get("loss_of").is_none() {
         return Err(entry.error("this belongs to a fault with `loss_of`"));
     }
-    entry.positive()?;
     let rule = "expected a fraction above 0 and at most 1, the largest part of its effect that the \
                 actuator may lose";
-    within(&entry, ..=1.0, rule).map(Some)
+    positive_within(&entry, ..=1.0, rule).map(Some)
 }
 
 /// Returns one additive fault for each actuator at `positions`.

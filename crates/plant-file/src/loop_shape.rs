@@ -1,7 +1,7 @@
 //! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
 
 use crate::pid::Pid;
-use crate::read::{alone, positive, within};
+use crate::read::{alone, positive, positive_within};
 use crate::requirements::{Bandwidth, Request, Requirement};
 use crate::signals::Signal;
 use control::Domain;
@@ -70,10 +70,11 @@ impl LoopShape {
         }
         let peak = match table.get("peak") {
             None => PEAK,
-            Some(entry) => {
-                entry.positive()?;
-                within(&entry, 1.0.., "expected at least 1, as S is I at high frequencies")?
-            }
+            Some(entry) => positive_within(
+                &entry,
+                1.0..,
+                "expected at least 1, as S is I at high frequencies",
+            )?,
         };
         let roll_off = positive(&table, "roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
         let effort = positive(&table, "effort")?;

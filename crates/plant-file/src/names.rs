@@ -134,7 +134,7 @@ fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError
 
 /// The number of elements of a scalar.
 const SCALAR: Option<usize> = Some(1);
-/// That of a matrix, of which only matters that it is no scalar.
+/// Stands for the number of elements of a matrix: any number above 1 makes it an array.
 const MATRIX: Option<usize> = Some(2);
 
 /// The variables that the controller FMU has besides actuators and measurements, with the number of their elements, if

@@ -21,6 +21,16 @@ pub(crate) fn within(
     }
 }
 
+/// Reads a number above 0 in `range`; `rule` is the text for other positive numbers.
+pub(crate) fn positive_within(
+    entry: &Entry<'_>,
+    range: impl RangeBounds<f64>,
+    rule: &str,
+) -> Result<f64, PlaceError> {
+    entry.positive()?;
+    within(entry, range, rule)
+}
+
 /// Reads a number of at least 0.
 pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     within(entry, 0.0.., "expected no less than 0")

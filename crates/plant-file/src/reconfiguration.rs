@@ -1,7 +1,7 @@
 //! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
 
 use crate::faults::{EntryPoint, Fault};
-use crate::read::{alone, within};
+use crate::read::{alone, positive_within};
 use crate::signals::{Signal, positions};
 use files::{Place, PlaceError, Table};
 
@@ -154,8 +154,7 @@ fn decision(
             return Err(entry.error("expected `loss` beside it: the fraction that is exceeded"));
         }
     };
-    loss.positive()?;
-    let fraction = within(&loss, ..1.0, "expected a fraction above 0 and below 1")?;
+    let fraction = positive_within(&loss, ..1.0, "expected a fraction above 0 and below 1")?;
     let estimated = |fault: &Fault| match fault.entry_point {
         EntryPoint::Loss { actuator, .. } => used.contains(&actuator),
         _ => false,

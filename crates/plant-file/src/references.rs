@@ -133,9 +133,10 @@ fn reference(
             named_after(&measurements[at], entry)
         }
         (None, Some(combination)) => {
-            for (measurement, factor) in combination.table()?.entries() {
-                let at = position_of(measurement, &factor, measurements, "measurement")?;
-                weights[at] = factor.number()?;
+            for (measurement, entry) in combination.table()?.entries() {
+                let factor = entry.number()?;
+                let at = position_of(measurement, &entry, measurements, "measurement")?;
+                weights[at] = factor;
             }
             if weights.iter().all(|weight| *weight == 0.0) {
                 return Err(combination.error("expected a factor other than 0"));

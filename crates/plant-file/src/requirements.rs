@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::matrix::matrix;
-use crate::read::{not_negative, positive, refuse, within};
+use crate::read::{not_negative, positive, positive_within, refuse};
 use nalgebra::{Complex, DMatrix};
 
 use crate::channel::{CHANNEL, Channel, ChannelSignals};
@@ -266,8 +266,7 @@ fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
 
 /// Reads an angle between 0 and 90 degrees.
 fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    entry.positive()?;
-    within(entry, ..90.0, "expected less than 90 degrees")
+    positive_within(entry, ..90.0, "expected less than 90 degrees")
 }
 
 fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {

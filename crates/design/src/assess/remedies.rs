@@ -185,12 +185,11 @@ impl Variant {
     fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
         let Self { observer, feedback, factor } = self;
         let mut other = file.clone();
-        for (request, scaled) in
-            [(&mut other.observer, &observer), (&mut other.feedback, &feedback)]
-        {
-            if let Some(scaled) = scaled {
-                request.requirement = scaled.requirement.clone();
-            }
+        if let Some(observer) = &observer {
+            other.observer.requirement = observer.requirement.clone();
+        }
+        if let Some(feedback) = &feedback {
+            other.feedback.requirement = feedback.requirement.clone();
         }
         let nominal = design(&other).ok()?.nominal;
         let judged = Judged::of(&nominal, varies.then_some(&file.robustness)).ok().flatten()?;

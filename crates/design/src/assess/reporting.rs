@@ -171,10 +171,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
             Some(&file.observer.requirement).filter(|_| nominal.law.keeps_error_dynamics()),
         )?,
         estimation: estimation::estimation(nominal, errors),
-        sampling: file.sampling.map(|sampling| Sampled {
-            sample_time: sampling.period,
-            estimator: estimator(gains.estimator).to_owned(),
-        }),
+        sampling: sampling(file, nominal),
         family: family_report,
         schedule,
         detection,
@@ -189,6 +186,14 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         fallback,
         assumptions: assumptions(file, designed),
         interface: Vec::new(),
+    })
+}
+
+/// Returns the sampling of the controller; none in continuous time.
+fn sampling(file: &PlantFile<'_>, solution: &Solution) -> Option<Sampled> {
+    file.sampling.map(|sampling| Sampled {
+        sample_time: sampling.period,
+        estimator: estimator(solution.gains.estimator).to_owned(),
     })
 }
 
@@ -365,11 +370,15 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     let is_constant = |fault: &Fault| fault.dynamics == FaultDynamics::Constant;
     let lagging = "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
                    causes the errors.";
-    all.extend(nominal.linear.faults.iter().any(is_constant).then(|| lagging.to_owned()));
+    if nominal.linear.faults.iter().any(is_constant) {
+        all.push(lagging.to_owned());
+    }
     let linearised = "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
                       those of its linearisation within the boundary layer, for faults and noise small against \
                       rho; larger faults leave rho / (rho - |f|) times the lasting error.";
-    all.extend(nominal.law.injection.as_ref().map(|_| linearised.to_owned()));
+    if nominal.law.injection.is_some() {
+        all.push(linearised.to_owned());
+    }
     if let Domain::Sampled { period } = nominal.domain {
         all.push(if file.model.only_samples().is_some() {
             format!(
@@ -386,16 +395,22 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     }
     let of_nominal = "Responses, bounds and certificates of the estimation errors are those of the nominal \
                       plant; the estimation error of another member also depends on its states.";
-    all.extend(family.as_ref().map(|_| of_nominal.to_owned()));
+    if family.is_some() {
+        all.push(of_nominal.to_owned());
+    }
     let of_file = "Gains, responses and bounds are those of the plant of the file; between the points of the \
                    schedule, plant and controller are interpolated linearly. A change of the operating point \
                    acts like a disturbance.";
-    all.extend(schedule.as_ref().map(|_| of_file.to_owned()));
+    if schedule.is_some() {
+        all.push(of_file.to_owned());
+    }
     let loses =
         |model: &control::faults::Fault| matches!(model.entry, FaultEntry::LossOfEffectiveness(_));
     let lost = "The loss of effectiveness is constant; it is estimated only while the command is well \
                 above its threshold.";
-    all.extend(nominal.linear.models.iter().any(loses).then(|| lost.to_owned()));
+    if nominal.linear.models.iter().any(loses) {
+        all.push(lost.to_owned());
+    }
     all
 }
 

@@ -116,7 +116,7 @@ fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -
     StateSpace { a, b: b.clone(), c: c.clone(), d, domain }
 }
 
-/// The time of one step of an integral: 1 in continuous time.
+/// The time of one step of the domain: the sample time in s; 1 in continuous time, where rates are per second.
 pub(crate) fn step(domain: Domain) -> f64 {
     match domain {
         Domain::Continuous => 1.0,
