@@ -74,8 +74,8 @@ pub fn observer_norm_lower_bound(
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
     checked(a, c, performance)?;
-    let hidden = HiddenDisturbance::new(a, c, performance, domain)?;
-    hidden.map_or(Ok(None), |hidden| hidden.largest_ratio())
+    let Some(hidden) = HiddenDisturbance::new(a, c, performance, domain)? else { return Ok(None) };
+    hidden.largest_ratio()
 }
 
 /// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of

@@ -215,7 +215,10 @@ impl Problem {
         &self,
         requirements: impl IntoIterator<Item = &'a Requirement>,
     ) -> Option<(f64, DVector<f64>)> {
-        let slack = Self { unknowns: self.unknowns, ..Self::new() }.scalar();
+        // The unknown after all others.
+        let mut beside = Self::new();
+        beside.unknowns = self.unknowns;
+        let slack = beside.scalar();
         let mut matrices: Vec<_> =
             requirements.into_iter().map(|each| each.semidefinite(Some(&slack))).collect();
         matrices.push(&Affine::identity(1, 1.0) - &slack);

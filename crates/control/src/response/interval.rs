@@ -1,16 +1,16 @@
 //! Bounds of the integral of |h| over intervals of dyadic length, for an impulse response h.
 
-use crate::balance::{Balance, divide_rows, multiply_columns, power_of_two};
+use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, power_of_two};
 use crate::blocks::stacked;
 use crate::exponential::exponential;
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::rc::Rc;
 
 /// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
-/// Relative rounding error of a product of a row and a state.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Relative rounding error of a product of a row and a state, with that of the doublings before.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Largest number of doublings of the length.
 const LENGTHS: usize = 120;
 
@@ -49,7 +49,7 @@ impl Length {
         let rank = later.nrows() - 1;
         let root = stacked(&self.rows.rows(0, rank).into(), &later.rows(0, rank).into());
         let sum = self.rows.rows(rank, 1) + later.rows(rank, 1);
-        Self::new(2.0 * self.time, phi, &without_negligible_rows(root), &sum)
+        Self::new(2.0 * self.time, phi, &without_negligible_rows(&root), &sum)
     }
 
     /// The absolute integral of h from a state on.
@@ -64,7 +64,10 @@ impl Length {
         let rank = products.nrows() - 1;
         let length = self.time.sqrt();
         let one = |(state, product): (DVectorView<'_, f64>, DVectorView<'_, f64>)| {
-            let (lower, upper) = (product[rank].abs(), length * product.rows(0, rank).norm());
+            // The squares of small numbers would be 0.
+            let (of_root, most) = (product.rows(0, rank), product.rows(0, rank).amax());
+            let norm = if most > 0.0 { most * (of_root / most).norm() } else { 0.0 };
+            let (lower, upper) = (product[rank].abs(), length * norm);
             let sizes = self.scales.iter().zip(state.iter());
             let size: f64 = sizes.map(|(scale, entry)| scale * entry.abs()).sum();
             Bounds { lower, upper: upper.max(lower), rounding: length * ROUNDING * size }
@@ -149,6 +152,7 @@ impl Shortest {
             return Ok((a, Self { time: 1.0, continuous: None }));
         }
         let time = power_of_two(SHORTEST / a.norm());
+        check::positive("h", time)?;
         let a = a * time;
         Ok((exponential(&a)?, Self { time, continuous: Some(a) }))
     }
@@ -194,10 +198,16 @@ fn later(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     sum
 }
 
-/// A matrix with the same length of M x for every x, up to rounding, and as many rows as M has rank: the triangle of a QR
-/// decomposition with pivots.
-fn without_negligible_rows(m: DMatrix<f64>) -> DMatrix<f64> {
-    let decomposition = m.col_piv_qr();
+/// A matrix with the same length of M x for every x, up to the rounding of its columns, and as many rows as M has rank:
+/// the triangle of a QR decomposition with pivots, of columns of length about one, because an output may see one state
+/// far more weakly than another.
+fn without_negligible_rows(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let unit = |column: usize| match power_of_two(m.column(column).norm()) {
+        unit if unit.is_normal() => unit,
+        _ => 1.0,
+    };
+    let units = DVector::from_fn(m.ncols(), |column, _| unit(column));
+    let decomposition = divide_columns(m, &units).col_piv_qr();
     let mut root = decomposition.r();
     decomposition.p().inv_permute_columns(&mut root);
     let least = (f64::EPSILON * root.norm()).powi(2);
@@ -210,5 +220,5 @@ fn without_negligible_rows(m: DMatrix<f64>) -> DMatrix<f64> {
         }
         rank -= 1;
     }
-    root.rows(0, rank).into()
+    multiply_columns(&root.rows(0, rank).into(), &units)
 }

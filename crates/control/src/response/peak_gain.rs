@@ -38,12 +38,13 @@ pub struct Bracket {
 /// several inputs, |`z_i`| <= sum over j of `gain[i,j]` times the bound of |`w_j`|. `width`:
 /// relative width of the bracket, 1e-3 for example. The gain is finite when A is stable. Method:
 /// over an interval the integral of |h| lies between |integral of h| and the root of its length
-/// times the integral of h^2, both exact from matrix exponentials; intervals of dyadic length are
+/// times the integral of h^2, both exact up to rounding; intervals of dyadic length are
 /// halved where the two differ most, so that fast and slow modes get the steps they need; the
 /// contraction of the state bounds the integral after the last interval. In sampled time all samples are
 /// added where that needs fewer operations. The bracket is proven up to rounding; it is not narrowed below
-/// the rounding error of the integral of h^2. Cost: for each output, or each input if there are fewer, about 100 n^3, and for
-/// each pair and each time constant or oscillation some 50 intervals of 3 n^2 multiplications.
+/// the rounding error of the root of the integral of h^2. Cost: for each output, or each input if there are fewer, about
+/// 100 n^3, and for each pair and each time constant or oscillation some 50 intervals of (r + 1) n multiplications, r <= n
+/// the rank of the Gramian of the interval, and n^2 for the states, which up to 8 outputs share.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
 /// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.
@@ -126,7 +127,7 @@ impl Trajectory {
     /// The starts of the second halves of intervals that begin at `firsts`; `half`: their length, of 2^`level` of the
     /// shortest.
     fn middles(&mut self, half: &Length, level: usize, firsts: &[Start]) -> Vec<Start> {
-        let time = |first: &Start| first.time + (1 << level);
+        let time = |first: &Start| first.time + (1_u128 << level);
         let is_missing = |first: &&Start| !self.states.contains_key(&time(first));
         let missing: Vec<_> = firsts.iter().filter(is_missing).map(|first| &first.state).collect();
         let products = &*half.phi * columns(&missing);
@@ -142,7 +143,9 @@ impl Trajectory {
             })?;
             Some(Start { time, state })
         };
-        firsts.iter().filter_map(middle).collect()
+        let middles: Vec<_> = firsts.iter().filter_map(middle).collect();
+        debug_assert_eq!(middles.len(), firsts.len());
+        middles
     }
 }
 

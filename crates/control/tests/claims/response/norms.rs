@@ -39,6 +39,29 @@ fn the_peak_gain_of_an_oscillator_is_a_hyperbolic_cotangent() {
     }
 }
 
+/// The first output sees a lag as it is, and the oscillator, on which the second input acts, 1e16 times more weakly.
+#[test]
+fn an_output_keeps_the_peak_gain_of_what_it_sees_far_more_weakly() {
+    for part in [1e-14, 1e-16, 1e-18] {
+        let coth = 1.0 / (0.05 * PI / 0.99_f64.sqrt()).tanh();
+        let weak = StateSpace {
+            a: matrix(3, 3, &[-1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, -0.2]),
+            b: matrix(3, 2, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            c: matrix(2, 3, &[1.0, part, 0.0, 0.0, 1.0, 0.0]),
+            d: DMatrix::zeros(2, 2),
+            domain: CONTINUOUS,
+        };
+        assert_bracketed(&weak, &matrix(2, 2, &[1.0, part * coth, 0.0, coth]), 1e-9);
+    }
+}
+
+#[test]
+fn the_peak_gain_of_signals_whose_squares_underflow_is_in_proportion() {
+    let (oscillator, coth) = (oscillator(1.0, 0.1), 1.0 / (0.05 * PI / 0.99_f64.sqrt()).tanh());
+    let tiny = StateSpace { b: oscillator.b * 1e-100, c: oscillator.c * 1e-100, ..oscillator };
+    assert_bracketed(&tiny, &matrix(1, 1, &[1e-200 * coth]), 1e-9);
+}
+
 /// h = 5 e^-t - 3e7 e^(-1e6 t) changes its sign once.
 #[test]
 fn the_peak_gain_of_a_stiff_system_is_the_closed_form() {
