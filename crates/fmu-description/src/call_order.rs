@@ -88,7 +88,7 @@ macro_rules! functions {
         }
 
         impl Function {
-            /// Every function, in the order of the table.
+            /// Every function, in the order of the table; in FMI 3.0 that is the order of `fmi3Functions.h`.
             pub const EVERY: &[Function] = &[$($(Function::$name,)+)*];
 
             /// Returns the name in the C ABI.
@@ -108,7 +108,8 @@ macro_rules! functions {
 
         /// Whether `function` may be called in `state` of an instance for `interface`.
         ///
-        /// Conditions on single variables are covered by [`settable`].
+        /// Conditions on single variables (in FMI 2.0 the numbers in the cells of the tables) are covered by
+        /// [`settable`].
         #[must_use]
         pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
             function.states(interface) & state.bit() != 0

@@ -182,7 +182,7 @@ fn list(elements: &Elements) -> String {
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
-    let only = |start: Option<String>| (none(), [start.unwrap_or_default(), none(), none()]);
+    let only = |start: Option<String>| [start.unwrap_or_default(), none(), none()];
     match kind {
         Kind::Real(real) | Kind::Float32(real) => {
             let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
@@ -201,12 +201,12 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
             };
             (none(), [item(integer.start), item(integer.min), item(integer.max)])
         }
-        Kind::Boolean(start) => only(start.map(|start| start.to_string())),
-        Kind::String(start) => only(start.as_ref().map(|start| format!("\"{start}\""))),
-        Kind::Binary(binary) => only(binary.start.as_deref().map(hexadecimal)),
+        Kind::Boolean(start) => (none(), only(start.map(|start| start.to_string()))),
+        Kind::String(start) => (none(), only(start.as_ref().map(|start| format!("\"{start}\"")))),
+        Kind::Binary(binary) => (none(), only(binary.start.as_deref().map(hexadecimal))),
         Kind::Clock(clock) => {
-            let (_, interval) = only(clock.interval_decimal.map(|value| format!("{value:?}")));
-            ("s".to_owned(), interval)
+            let interval = clock.interval_decimal.map(|value| format!("{value:?}"));
+            ("s".to_owned(), only(interval))
         }
         other => {
             let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());

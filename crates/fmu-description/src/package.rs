@@ -112,7 +112,7 @@ pub fn platforms_of(version: Version) -> &'static [&'static str] {
     platforms()
 }
 
-/// The folder whose name is a platform tuple. FMI 2.0 has no libraries for 32-bit ARM.
+/// The folder of FMI 3.0: the platform tuple among `folders`, which does not list 32-bit ARM.
 fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
     if (system, processor) == ("linux", "arm") {
         return &["aarch32-linux"];

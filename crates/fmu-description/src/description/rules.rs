@@ -173,9 +173,10 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     });
     problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
     date(description, problems);
-    let interfaces: Vec<_> =
-        interfaces(description).filter(|interface| !interface.section.is_empty()).collect();
-    for Interface { section, identifier, .. } in &interfaces {
+    let interfaces: Vec<_> = interfaces(description)
+        .filter_map(|interface| Some((interface.section?, interface)))
+        .collect();
+    for (section, Interface { identifier, .. }) in &interfaces {
         problems.demand(is_c_identifier(identifier), section, || {
             format!("modelIdentifier {identifier:?} is no C identifier")
         });
@@ -183,7 +184,7 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(!interfaces.is_empty(), "2.2.1", || {
         "neither ModelExchange nor CoSimulation is there".to_owned()
     });
-    for Interface { section, keeps, serializes, .. } in interfaces {
+    for (section, Interface { keeps, serializes, .. }) in interfaces {
         problems.demand(keeps || !serializes, section, || {
             "canSerializeFMUstate is true without canGetAndSetFMUstate".to_owned()
         });
@@ -193,8 +194,8 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
 /// What the rules on each interface need.
 struct Interface<'a> {
     name: &'static str,
-    /// Section of FMI 2.0.5; empty for an interface that only FMI 3.0 has.
-    section: &'static str,
+    /// Section of FMI 2.0.5, which has no scheduled execution.
+    section: Option<&'static str>,
     identifier: &'a str,
     keeps: bool,
     serializes: bool,
@@ -203,7 +204,7 @@ struct Interface<'a> {
 /// The interfaces of an FMU.
 fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<'_>> {
     macro_rules! interface {
-        ($field:ident, $name:literal, $section:literal) => {
+        ($field:ident, $name:literal, $section:expr) => {
             description.$field.as_ref().map(|flags| Interface {
                 name: $name,
                 section: $section,
@@ -214,9 +215,9 @@ fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<
         };
     }
     let interfaces = [
-        interface!(model_exchange, "ModelExchange", "3.3.1"),
-        interface!(co_simulation, "CoSimulation", "4.3.1"),
-        interface!(scheduled_execution, "ScheduledExecution", ""),
+        interface!(model_exchange, "ModelExchange", Some("3.3.1")),
+        interface!(co_simulation, "CoSimulation", Some("4.3.1")),
+        interface!(scheduled_execution, "ScheduledExecution", None),
     ];
     interfaces.into_iter().flatten()
 }

@@ -97,13 +97,12 @@ macro_rules! plain {
     };
 }
 
-/// Serialises the start of collections.
+/// Serialises the start of collections: the words that it adds.
 macro_rules! collections {
-    ($($function:ident($($argument:ident: $type:ty),*), $walk:ident => $start:expr;)*) => {
+    ($($function:ident($($argument:ident: $type:ty),*) => $start:ident($($word:expr),*);)*) => {
         $(fn $function(self, $($argument: $type),*) -> Result<Self, Refusal> {
-            let $walk = self;
-            $start;
-            Ok($walk)
+            self.$start($($word),*);
+            Ok(self)
         })*
     };
 }
@@ -184,18 +183,17 @@ impl ser::Serializer for &mut LayoutHasher {
     }
 
     collections! {
-        serialize_seq(_length: Option<usize>), walk => walk.word("sequence");
-        serialize_tuple(_length: usize), walk => walk.word("tuple");
-        serialize_tuple_struct(name: &'static str, _length: usize),
-            walk => walk.words(["tuple struct", name]);
+        serialize_seq(_length: Option<usize>) => word("sequence");
+        serialize_tuple(_length: usize) => word("tuple");
+        serialize_tuple_struct(name: &'static str, _length: usize) => words(["tuple struct", name]);
         serialize_tuple_variant(
             name: &'static str, k: u32, variant: &'static str, _length: usize
-        ), walk => walk.variant("tuple variant", name, k, variant);
-        serialize_map(_length: Option<usize>), walk => walk.word("map");
-        serialize_struct(name: &'static str, _length: usize), walk => walk.words(["struct", name]);
+        ) => variant("tuple variant", name, k, variant);
+        serialize_map(_length: Option<usize>) => word("map");
+        serialize_struct(name: &'static str, _length: usize) => words(["struct", name]);
         serialize_struct_variant(
             name: &'static str, k: u32, variant: &'static str, _length: usize
-        ), walk => walk.variant("struct variant", name, k, variant);
+        ) => variant("struct variant", name, k, variant);
     }
 
     fn collect_str<T: ?Sized + Display>(self, _: &T) -> Hashed {

@@ -29,13 +29,15 @@ pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
 
 /// Reads what the root elements of FMI 2.0 and 3.0 have in common.
 pub(super) fn common(root: Node<'_>, model_name: String) -> Result<ModelDescription> {
+    // Before the lists: of many warnings only the first ones are kept.
+    let general = general(root, model_name);
     Ok(ModelDescription {
         copyright: root.text("copyright"),
         license: root.text("license"),
         units: root.list("UnitDefinitions", "Unit", unit)?,
         log_categories: root.list("LogCategories", "Category", category)?,
         default_experiment: root.optional("DefaultExperiment", experiment)?,
-        ..general(root, model_name)
+        ..general
     })
 }
 

@@ -24,6 +24,8 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
             .unwrap_or(0),
         ..ModelExchange::default()
     });
+    // Before the lists: of many warnings only the first ones are kept.
+    let general = general(root, identifier);
     Ok(ModelDescription {
         guid: root.required("guid")?.to_owned(),
         model_exchange,
@@ -33,7 +35,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
         default_experiment: root.optional("DefaultExperiment", experiment)?,
         variables,
         structure,
-        ..general(root, identifier)
+        ..general
     })
 }
 

@@ -155,11 +155,14 @@ impl Builder {
             is_calculated,
         });
         let start_elements = starts(elements).filter(|_| block.count > 1);
-        let kind = match &first.kind {
-            kind if start_elements.is_none() => kind.clone(),
-            Kind::Real(real) => Kind::Real(RealType { start: None, ..real.clone() }),
-            kind => without_start(kind),
-        };
+        let mut kind = first.kind.clone();
+        if start_elements.is_some() {
+            match &mut kind {
+                // An array of states keeps `reinit`.
+                Kind::Real(real) => real.start = None,
+                other => other.clear_start(),
+            }
+        }
         self.variables.push(ScalarVariable {
             name: block.name.clone(),
             value_reference: reference,
