@@ -235,6 +235,7 @@ def test_what_a_refusal_names_is_designed(aso_ftc, tmp_path):
         ("filter = 3", "", "not possible together with `filter`"),
         ("", "structure = 7", "expected a whole number from 1 to 6, found 7"),
         ("", 'structure = "P"', 'expected "PI", "PID" or an order from 1 to 6, found "P"'),
+        ("", "structure = [3]", 'expected "PI", "PID" or an order from 1 to 6'),
         ("", 'pairs = { u2 = "y1" }', 'no actuator is named "u2"; there are u1'),
         ("", 'pairs = { u1 = "y2" }', 'no measurement is named "y2"; there are y1'),
     ],

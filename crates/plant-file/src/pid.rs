@@ -56,16 +56,13 @@ impl Pid {
             let message = "it belongs to `structure`, \"PI\" for example";
             return refuse(table, &["pairs"], message).map(|()| None);
         };
-        let order = match entry.text() {
-            Ok("PI") => 1,
-            Ok("PID") => 2,
-            Ok(other) => {
-                let message = format!(
-                    "expected \"PI\", \"PID\" or an order from 1 to {MOST_ORDER}, found {other:?}"
-                );
-                return Err(entry.error(message));
-            }
-            Err(_) => whole(&entry, 1..=MOST_ORDER)? as usize,
+        let expected = format!("expected \"PI\", \"PID\" or an order from 1 to {MOST_ORDER}");
+        let order = match (entry.text(), entry.number()) {
+            (Ok("PI"), _) => 1,
+            (Ok("PID"), _) => 2,
+            (Ok(other), _) => return Err(entry.error(format!("{expected}, found {other:?}"))),
+            (_, Ok(_)) => whole(&entry, 1..=MOST_ORDER)? as usize,
+            _ => return Err(entry.error(expected)),
         };
         alone(&entry, file, &OTHERS)?;
         if let Some(estimator) = file.get("estimator")
