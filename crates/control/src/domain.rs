@@ -35,6 +35,15 @@ impl Domain {
         }
     }
 
+    /// The time of one step: the sample time in s; 1 in continuous time, where rates are per second.
+    #[must_use]
+    pub fn step(self) -> f64 {
+        match self {
+            Self::Continuous => 1.0,
+            Self::Sampled { period } => period,
+        }
+    }
+
     /// s = j w, or z = e^(j w T), at the frequency w in rad per unit of time.
     pub(crate) fn point(self, frequency: f64) -> Complex<f64> {
         match self {

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use crate::budget::Budget;
 use crate::report::{Bound, Frequency, Norm};
-use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::faults::Fault;
 
@@ -90,7 +89,7 @@ impl<'a> Loops<'a> {
         let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
         // The change of a fault per sample is its rate times the sample time.
-        of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(step(*domain));
+        of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(domain.step());
         let of_faults = fault_system(plant, gains, *domain)?;
         Ok(Self { designed, outputs: Outputs::of(designed), of_faults, of_rates })
     }

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use crate::assess::robustness::noise_peaks;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
-use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
@@ -66,7 +65,7 @@ impl<'a> Errors<'a> {
     fn of(designed: &'a Solution) -> Result<Self, Error> {
         let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
-        of_rates.b.scale_mut(step(*domain));
+        of_rates.b.scale_mut(domain.step());
         Ok(Self {
             of_faults: error_part(plant, &fault_system(plant, gains, *domain)?),
             of_rates: error_part(plant, &of_rates),

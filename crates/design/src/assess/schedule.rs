@@ -11,7 +11,6 @@ use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
-use crate::solve::bandwidth::step;
 use crate::solve::designed::Designed;
 use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
 use crate::solve::solution::Solution;
@@ -93,7 +92,7 @@ fn bounded(
     }
     let shortest = intervals.iter().map(|interval| interval.length).fold(f64::INFINITY, f64::min);
     // The time in which the variable changes once: a sample, or a second.
-    let time = step(domain);
+    let time = domain.step();
     let certificate = match scheduled.rate_bound {
         Some(rate) if domain != Domain::Continuous && rate * time > shortest => {
             return Ok(Err(format!(

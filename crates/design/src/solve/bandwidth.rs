@@ -32,7 +32,7 @@ impl FeedbackProblem<'_> {
         let weighted = DMatrix::from_diagonal(&units.outputs.rows(0, p).into_owned()) * c;
         let mut q = weighted.tr_mul(&weighted);
         for (at, unit) in units.outputs.iter().skip(p).enumerate() {
-            q[(states + at, states + at)] += (rate * step(domain) / SLOWER * unit).powi(2);
+            q[(states + at, states + at)] += (rate * domain.step() / SLOWER * unit).powi(2);
         }
         let ByBandwidth { result, loop_gain, .. } =
             regulator(a, b, &q, &units.inputs, rate, domain)?;
@@ -53,7 +53,7 @@ impl ObserverProblem<'_> {
         let (order, m) = (a_0.nrows(), b.ncols());
         let n = order - faults;
         let mut inputs = b.clone().resize(order, m + channels.len(), 0.0);
-        let walk = rate * step(domain) / SLOWER;
+        let walk = rate * domain.step() / SLOWER;
         for (at, channel) in channels.iter().enumerate() {
             let mut column = inputs.column_mut(m + at);
             column.rows_mut(0, n).copy_from(&a_0.view((0, n + channel.estimate), (n, 1)));
@@ -114,12 +114,4 @@ fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -
     let n = b.nrows();
     let (d, a) = (DMatrix::zeros(c.nrows(), b.ncols()), a.view((0, 0), (n, n)).into_owned());
     StateSpace { a, b: b.clone(), c: c.clone(), d, domain }
-}
-
-/// The time of one step of the domain: the sample time in s; 1 in continuous time, where rates are per second.
-pub(crate) fn step(domain: Domain) -> f64 {
-    match domain {
-        Domain::Continuous => 1.0,
-        Domain::Sampled { period } => period,
-    }
 }

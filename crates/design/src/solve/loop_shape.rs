@@ -14,7 +14,6 @@ use rayon::prelude::*;
 
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
-use crate::solve::bandwidth::step;
 use crate::solve::gain::{GainResult, unique};
 use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
@@ -188,7 +187,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         // The integrals are the last states: T r enters them.
         let mut b = (&controller.b * &from).resize_horizontally(p + t, 0.0);
         let first = b.nrows() - t;
-        b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * step(self.domain)));
+        b.view_mut((first, p), (t, t))
+            .copy_from(&(inverse(&units.references) * self.domain.step()));
         Ok(StateSpace {
             b,
             c: &to * &controller.c,

@@ -15,7 +15,6 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::report::LowerBoundFor;
-use crate::solve::bandwidth::step;
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal};
 use crate::solve::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH};
 use plant_file::channel::{Channel, ChannelWeight};
@@ -72,7 +71,7 @@ impl ObserverProblem<'_> {
         let (order, p, q) = (self.a_0.nrows(), self.c_0.nrows(), self.faults);
         let noises = required.channel.noise.len();
         let mut disturbance = DMatrix::zeros(order, q + noises);
-        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(step(domain));
+        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(domain.step());
         let mut feedthrough = DMatrix::zeros(p, q + noises);
         for (at, noise) in required.channel.noise.iter().enumerate() {
             match self.filter {

@@ -13,7 +13,6 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::plant::linear::LinearPlant;
-use crate::solve::bandwidth::step;
 use crate::solve::family::check_states;
 use crate::solve::solution::{Solution, solve};
 use plant_file::PlantFile;
@@ -283,7 +282,7 @@ impl Slopes {
         let t = design.gains.integrals();
         let first = controller.b.nrows() - t;
         for k in 0..t {
-            controller.b[(first + k, j)] -= step(design.domain) * moved[k];
+            controller.b[(first + k, j)] -= design.domain.step() * moved[k];
         }
         if let Some(n_r) = tracking.feedforward() {
             let command = n_r * moved;

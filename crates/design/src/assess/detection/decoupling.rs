@@ -8,7 +8,6 @@ use crate::assess::detection::largest;
 use crate::assess::detection::prediction::whole;
 use crate::assess::detection::problem::Problem;
 use crate::plant::fixed_mode::shown;
-use crate::solve::bandwidth::step;
 use plant_file::PlantFile;
 
 /// Time constants of the slowest mode after which a mean has settled.
@@ -61,7 +60,7 @@ fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decou
     for &(input, _) in inputs.iter().filter(|(_, exact)| !exact) {
         // It moves by its size within a time constant of the loop.
         let size = problem.sizes[input].unwrap_or(1.0);
-        let intensity = size * size * problem.rate * step(plant.domain);
+        let intensity = size * size * problem.rate * plant.domain.step();
         let entry = problem.inputs[input].extended(plant.a.nrows());
         plant = plant.with_random_walk(&entry, intensity)?;
     }

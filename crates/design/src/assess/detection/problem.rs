@@ -7,7 +7,6 @@ use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
 use crate::report::number::round;
-use crate::solve::bandwidth::step;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
@@ -180,7 +179,7 @@ impl Problem {
         #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
         let mean = commands.trace() / n as f64;
         let states = &commands + DMatrix::from_diagonal_element(n, n, mean);
-        let time = self.rate * step(self.plant.domain);
+        let time = self.rate * self.plant.domain.step();
         [
             ("Faults", faults / time),
             ("Faults, and commands by one,", commands / time),
