@@ -22,6 +22,7 @@ mod summary;
 mod symbols;
 mod tables;
 mod text;
+mod values;
 
 use std::path::PathBuf;
 

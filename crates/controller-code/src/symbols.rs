@@ -1,9 +1,5 @@
 //! The vectors and matrices of a sample.
 
-use nalgebra::DMatrix;
-
-use super::controller::Controller;
-
 macro_rules! vectors {
     ($($(#[$text:meta])* $vector:ident $name:literal $kind:ident,)*) => {
         /// A vector of a sample.
@@ -84,7 +80,7 @@ vectors! {
 }
 
 macro_rules! matrices {
-    ($controller:ident: $($(#[$text:meta])* $matrix:ident $name:literal [$($kind:ident),*] $value:expr,)*) => {
+    ($($(#[$text:meta])* $matrix:ident $name:literal [$($kind:ident),*],)*) => {
         /// A matrix of the controller.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Matrix {
@@ -107,47 +103,39 @@ macro_rules! matrices {
                     $(Self::$matrix => [$(Kind::$kind),*],)*
                 }
             }
-
-            /// The matrix of a controller, if it has it.
-            pub(super) fn of(self, $controller: &Controller) -> Option<&DMatrix<f64>> {
-                match self {
-                    $(Self::$matrix => $value,)*
-                }
-            }
         }
     };
 }
 
-// Each matrix with its name, what its rows and columns belong to, and its value.
+// Each matrix with its name and what its rows and columns belong to.
 matrices! {
-    controller:
-    A "A" [State, State] Some(&controller.a),
-    B "B" [State, Actuator] Some(&controller.b),
-    C "C" [Measurement, State] Some(&controller.c),
-    D "D" [Measurement, Actuator] controller.d.as_ref(),
-    FA "F_a" [State, Fault] Some(&controller.f_a),
-    AF "A_f" [Fault, Fault] Some(&controller.a_f),
-    KX "K_x" [Actuator, State] Some(&controller.k_x),
-    KF "K_f" [Actuator, Fault] Some(&controller.k_f),
-    LX "L_x" [State, Measurement] Some(&controller.l_x),
-    LF "L_f" [Fault, Measurement] Some(&controller.l_f),
-    PF "P_f" [Fault, Measurement] controller.p_f.as_ref(),
-    H "H" [Integral, Measurement] controller.h.as_ref(),
-    KI "K_i" [Actuator, Integral] controller.k_i.as_ref(),
-    FI "F_i" [Integral, Fault] controller.f_i.as_ref(),
-    LW "L_w" [Integral, Actuator] controller.l_w.as_ref(),
-    NR "N_r" [Actuator, Reference] controller.n_r.as_ref(),
+    A "A" [State, State],
+    B "B" [State, Actuator],
+    C "C" [Measurement, State],
+    D "D" [Measurement, Actuator],
+    FA "F_a" [State, Fault],
+    AF "A_f" [Fault, Fault],
+    KX "K_x" [Actuator, State],
+    KF "K_f" [Actuator, Fault],
+    LX "L_x" [State, Measurement],
+    LF "L_f" [Fault, Measurement],
+    PF "P_f" [Fault, Measurement],
+    H "H" [Integral, Measurement],
+    KI "K_i" [Actuator, Integral],
+    FI "F_i" [Integral, Fault],
+    LW "L_w" [Integral, Actuator],
+    NR "N_r" [Actuator, Reference],
     /// A, `B_u`, `B_y`, C, `D_u`, `D_y` of the detection.
-    ResidualA "A_r" [ResidualState, ResidualState] Some(&controller.detection.as_ref()?.a),
-    ResidualBu "B_ru" [ResidualState, Actuator] Some(&controller.detection.as_ref()?.b_u),
-    ResidualBy "B_ry" [ResidualState, Measurement] Some(&controller.detection.as_ref()?.b_y),
-    ResidualC "C_r" [Residual, ResidualState] Some(&controller.detection.as_ref()?.c),
-    ResidualDu "D_ru" [Residual, Actuator] Some(&controller.detection.as_ref()?.d_u),
-    ResidualDy "D_ry" [Residual, Measurement] Some(&controller.detection.as_ref()?.d_y),
+    ResidualA "A_r" [ResidualState, ResidualState],
+    ResidualBu "B_ru" [ResidualState, Actuator],
+    ResidualBy "B_ry" [ResidualState, Measurement],
+    ResidualC "C_r" [Residual, ResidualState],
+    ResidualDu "D_ru" [Residual, Actuator],
+    ResidualDy "D_ry" [Residual, Measurement],
 }
 
 macro_rules! kinds {
-    ($controller:ident: $($(#[$text:meta])* $kind:ident $plural:literal $count:expr,)*) => {
+    ($($(#[$text:meta])* $kind:ident $plural:literal,)*) => {
         /// The signals of a controller.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Kind {
@@ -161,37 +149,29 @@ macro_rules! kinds {
                     $(Self::$kind => $plural,)*
                 }
             }
-
-            /// The number of these of a controller.
-            pub(super) fn count(self, $controller: &Controller) -> usize {
-                match self {
-                    $(Self::$kind => $count,)*
-                }
-            }
         }
     };
 }
 
-// Each kind with the name of its number and this number.
+// Each kind with the name of its number.
 kinds! {
-    controller:
-    State "STATES" controller.states.len(),
-    Fault "FAULTS" controller.faults.len(),
-    Actuator "ACTUATORS" controller.actuators.len(),
-    Measurement "MEASUREMENTS" controller.measurements.len(),
-    Reference "REFERENCES" controller.references.len(),
+    State "STATES",
+    Fault "FAULTS",
+    Actuator "ACTUATORS",
+    Measurement "MEASUREMENTS",
+    Reference "REFERENCES",
     /// The integral of the distance from a reference.
-    Integral "REFERENCES" controller.h.as_ref().map_or(0, DMatrix::nrows),
+    Integral "REFERENCES",
     /// No signals: a point of the schedule; of the detection a state of its filter, a residual, a test, a fault
     /// that it can isolate.
-    Point "POINTS" controller.schedule.as_ref().map_or(0, |schedule| schedule.points.len()),
-    ResidualState "RESIDUAL_STATES" controller.detection.as_ref().map_or(0, |all| all.a.nrows()),
-    Residual "RESIDUALS" controller.detection.as_ref().map_or(0, |all| all.c.nrows()),
-    Test "TESTS" controller.detection.as_ref().map_or(0, |all| all.tests.len()),
-    Suspect "SUSPECTS" controller.detection.as_ref().map_or(0, |all| all.faults.len()),
+    Point "POINTS",
+    ResidualState "RESIDUAL_STATES",
+    Residual "RESIDUALS",
+    Test "TESTS",
+    Suspect "SUSPECTS",
     /// Of a reconfiguration: a set of gains, an actuator that may be gone.
-    GainSet "GAIN_SETS" controller.reconfiguration.as_ref().map_or(0, |all| all.sets.len()),
-    Case "CASES" controller.reconfiguration.as_ref().map_or(0, |all| all.cases.len()),
+    GainSet "GAIN_SETS",
+    Case "CASES",
 }
 
 impl Kind {
