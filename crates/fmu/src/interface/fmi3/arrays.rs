@@ -1,6 +1,5 @@
 //! Arrays: scalars of FMI 2.0 that are one array in FMI 3.0.
 
-use super::describe::without_start;
 use fmu_description::{Elements, Kind, RealType, ScalarVariable};
 
 /// Scalars that are an array, or one scalar.
@@ -116,6 +115,13 @@ fn split(name: &str) -> Option<(String, Vec<u64>)> {
     let indices: Option<Vec<u64>> =
         indices.split(',').map(|index| index.parse().ok().filter(|index| *index > 0)).collect();
     Some((format!("{base}{closing}"), indices?))
+}
+
+/// Returns the type without start value and `reinit`.
+pub(super) fn without_start(kind: &Kind) -> Kind {
+    let mut kind = kind.clone();
+    kind.clear_start();
+    kind
 }
 
 /// Whether `other` can be the element at `position` of the array whose first element is `first`.

@@ -86,13 +86,6 @@ fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
         && without_start(&alias.kind) == without_start(&of.kind)
 }
 
-/// Returns the type without start value and `reinit`.
-pub(super) fn without_start(kind: &Kind) -> Kind {
-    let mut kind = kind.clone();
-    kind.clear_start();
-    kind
-}
-
 /// Returns the place of the first element of a variable.
 fn place(first: &ScalarVariable) -> u32 {
     match first.kind {
