@@ -12,6 +12,7 @@ mod clocks;
 mod derivatives;
 mod elements;
 mod equations;
+mod mode;
 mod modes;
 mod plan;
 mod refusal;

@@ -7,7 +7,7 @@ use fmu_description::NativeType;
 use super::Instance;
 use super::buffer::Buffer;
 use super::clocked::Listed;
-use super::modes::Mode;
+use super::mode::Mode;
 use super::plan::Run;
 use super::refusal::{refused, unknown};
 use slave::CallError;

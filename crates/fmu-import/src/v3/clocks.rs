@@ -7,7 +7,7 @@ use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDesc
 use serde::{Deserialize, Serialize};
 
 use super::Instance;
-use super::modes::Mode;
+use super::mode::Mode;
 use super::plan::Run;
 use super::refusal::refused;
 use crate::library::v3::Component;

@@ -1,7 +1,7 @@
 //! The functions of model exchange (FMI 3.0.2, section 3).
 
 use super::Instance;
-use super::modes::Mode;
+use super::mode::Mode;
 use slave::{CallError, CompletedStep};
 
 impl Instance {

@@ -1,11 +1,11 @@
 //! The modes of an instance: events and steps (FMI 3.0.2, sections 2.3 and 4.2).
 
 use super::Instance;
+use super::mode::Mode;
 use super::refusal::refused;
 use crate::library::v3::Interface;
 use fmu_description::abi::Status;
 use fmu_description::number::seconds;
-use serde::{Deserialize, Serialize};
 use slave::{CallError, EventInfo, Events, Failure, StepResult};
 
 /// Largest number of updates of the discrete states in one event.
@@ -16,23 +16,6 @@ const STANDSTILLS: u32 = 1000;
 const ROUNDING: f64 = 1e-9;
 /// Smallest part of a step that is tried after `fmi3Discard`.
 const SMALLEST: f64 = 1e-6;
-
-/// The mode of the FMU.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Mode {
-    #[default]
-    Instantiated,
-    Initialization,
-    Event,
-    Step,
-}
-
-impl Mode {
-    /// Whether the initialization has ended.
-    pub(super) fn is_initialized(self) -> bool {
-        matches!(self, Mode::Event | Mode::Step)
-    }
-}
 
 /// What an instance knows beside the state of its FMU.
 #[derive(Clone, Debug, Default)]

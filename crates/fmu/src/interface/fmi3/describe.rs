@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::arrays::{Block, blocks, starts};
+use super::arrays::{Block, blocks, starts, without_start};
 use super::{Entry, INDICATOR, INT64, Table};
 use fmu_description::{
     Causality, CoSimulation, DependencyKind, Dimension, Initial, Kind, ModelDescription,

@@ -1,0 +1,20 @@
+//! The mode of an instance.
+
+use serde::{Deserialize, Serialize};
+
+/// The mode of the FMU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Mode {
+    #[default]
+    Instantiated,
+    Initialization,
+    Event,
+    Step,
+}
+
+impl Mode {
+    /// Whether the initialization has ended.
+    pub(super) fn is_initialized(self) -> bool {
+        matches!(self, Mode::Event | Mode::Step)
+    }
+}
