@@ -19,21 +19,6 @@ pub(crate) fn watch() {
     }
 }
 
-/// The number of SIGINT.
-pub(crate) const INTERRUPT: u8 = 2;
-
-/// Calls `react` in a thread with the number of each signal by which a user or a system ends the command.
-#[cfg(unix)]
-pub(crate) fn on_signal(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<()> {
-    Ok(crash::on_ending_signal(move |signal| react(u8::try_from(signal).unwrap_or(0)))?)
-}
-
-/// Calls `react` in a thread at each Ctrl-C.
-#[cfg(not(unix))]
-pub(crate) fn on_signal(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<()> {
-    Ok(ctrlc::set_handler(move || react(INTERRUPT))?)
-}
-
 /// Reports the end, completes the results, removes temporary files; returns the exit status.
 fn end(ending: &Ending) -> u8 {
     let interrupted = matches!(ending.cause, Cause::GivenUp(_));

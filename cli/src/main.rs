@@ -26,6 +26,7 @@ mod report;
 mod reproduce;
 mod run;
 mod scenario;
+mod signals;
 mod summary;
 #[cfg(target_os = "linux")]
 mod supervise;

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use anyhow::Context;
 use fmu_import::crash;
 
-use crate::crash::{INTERRUPT, on_signal};
+use crate::signals::{INTERRUPT, on_signal};
 
 /// Starts to listen; returns the flag that the first Ctrl-C sets.
 pub(super) fn listen() -> anyhow::Result<Arc<AtomicBool>> {

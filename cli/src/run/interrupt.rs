@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use fmu_import::crash;
 
-use crate::crash::on_signal;
+use crate::signals::on_signal;
 
 /// Time limit of a call of an FMU, and of a whole step, after the signal.
 const CALL: Duration = Duration::from_millis(800);

@@ -6,7 +6,8 @@ use slave::CallError;
 use super::Instance;
 use super::clocked::Memory;
 use super::clocks::ClocksState;
-use super::modes::{Mode, State};
+use super::mode::Mode;
+use super::modes::State;
 use super::refusal::refused;
 
 /// The first bytes of a serialised state.
