@@ -66,6 +66,10 @@ impl Visitor<'_> for LiteralVisitor {
     }
 }
 
+/// What is expected in place of a Binary.
+const NO_BINARY: &str =
+    "another variable: a scenario sets no Binary, `--set` with hexadecimal digits does";
+
 impl Literal {
     /// Converts the value to a number for a variable that is not a String: Booleans become 0 or 1,
     /// an Enumeration item its number. On failure returns a description of the expected value.
@@ -98,9 +102,8 @@ impl Literal {
                 Ok(f64::from(u8::from(*flag)))
             }
             (Kind::Boolean(_) | Kind::Clock(_), _) => Err("true or false".to_owned()),
-            (Kind::String(_) | Kind::Binary(_), _) => {
-                Err(format!("no number, as it is a {}", variable.kind.element()))
-            }
+            (Kind::String(_), _) => Err("no number, as it is a String".to_owned()),
+            (Kind::Binary(_), _) => Err(NO_BINARY.to_owned()),
             (kind, _) => Err(integers(kind, description)),
         }
     }
