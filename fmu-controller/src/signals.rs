@@ -49,7 +49,7 @@ pub(crate) struct Signals {
     pub(crate) u: Vec<f64>,
 }
 
-/// Changes x_hat and y_f of z, y and r element by element by the operating point of `design`.
+/// Applies `change_one` to each element of x_hat and y_f in z, of y and of r, with its operating point in `design`.
 fn change([z, y, r]: [&mut [f64]; 3], design: &Design, change_one: impl Fn(&mut f64, f64)) {
     let [x_hat, _, y_f, ..] = design.parts_mut(z);
     let states = design.states.iter().map(|signal| signal.operating);

@@ -36,7 +36,8 @@ pub(crate) struct Element<'a> {
 }
 
 impl Element<'_> {
-    /// Copies an element; the reader limits the depth of the recursion.
+    /// Copies the element and its children out of the text. The reader limits the depth of the elements, and so of this
+    /// recursion.
     pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
         super::Element {

@@ -220,7 +220,7 @@ pub(super) fn require(
     if holds { Ok(number) } else { Err(Reason::Number { what, actual: number, expected }) }
 }
 
-/// The kinds that an entry can have, each with whether it has it.
+/// Lists the kinds that an entry can have: the name of each, and whether the entry states it.
 macro_rules! kinds {
     ($entry:ident: $($kind:ident),*) => { [$((stringify!($kind), $entry.$kind.is_some())),*] };
 }
