@@ -24,7 +24,7 @@ impl std::str::FromStr for RealTimeFactor {
             Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(Self(factor)),
             Ok(_) => Err(expected.to_owned()),
             Err(_) => {
-                Err(format!("{expected}; to state no factor before a file, write --real-time=1"))
+                Err(format!("{expected}; before a file, write --real-time=1 for real time"))
             }
         }
     }
