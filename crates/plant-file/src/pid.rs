@@ -11,7 +11,7 @@ use nalgebra::RowDVector;
 const OTHERS: [&str; 3] = ["filter", "reconfiguration", "fallback"];
 
 /// The largest order of a controller's filter.
-const MOST_ORDER: u32 = 6;
+pub const MOST_ORDER: u32 = 6;
 
 /// Controllers of low order, each from one measurement to one command.
 ///

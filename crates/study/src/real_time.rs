@@ -23,9 +23,7 @@ impl std::str::FromStr for RealTimeFactor {
         match text.parse::<f64>() {
             Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(Self(factor)),
             Ok(_) => Err(expected.to_owned()),
-            Err(_) => {
-                Err(format!("{expected}; before a file, write --real-time=1 for real time"))
-            }
+            Err(_) => Err(format!("{expected}; before a file, write --real-time=1 for real time")),
         }
     }
 }

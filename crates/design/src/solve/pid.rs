@@ -13,7 +13,7 @@ use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use plant_file::PlantFile;
 use plant_file::loop_shape::LoopShape;
-use plant_file::pid::{Pair, Pid};
+use plant_file::pid::{MOST_ORDER, Pair, Pid};
 use plant_file::references::References;
 
 /// A start decays at this part of the rate of the state feedback beside it, if that can be had.
@@ -96,10 +96,15 @@ impl PidProblem<'_> {
     }
 
     fn not_found(&self, file: &PlantFile<'_>, instability: f64) -> PlaceError {
-        let (name, further) = match self.pid.order {
-            1 => ("PI controllers".to_owned(), "`structure = \"PID\"`, "),
-            2 => ("PID controllers".to_owned(), "a higher order, `structure = 3`, "),
-            order => (format!("controllers of order {order}"), ""),
+        let name = match self.pid.order {
+            1 => "PI controllers".to_owned(),
+            2 => "PID controllers".to_owned(),
+            order => format!("controllers of order {order}"),
+        };
+        let further = match self.pid.order {
+            1 => "`structure = \"PID\"`, ".to_owned(),
+            order if order >= MOST_ORDER as usize => String::new(),
+            order => format!("a higher order, `structure = {}`, ", order + 1),
         };
         let measure = match self.domain {
             Domain::Continuous => format!("largest real part {}", rounded(instability)),
