@@ -227,7 +227,7 @@ struct Hot {
 /// An FMU instance and its C functions. Dropping it calls `fmi2FreeInstance`; the library stays
 /// loaded until then.
 ///
-/// Each call returns a [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+/// Each call returns a [`slave::CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
 /// `fmi2Warning`.
 pub struct Component {
     /// The pointers that [`Component::pass`] needs.
