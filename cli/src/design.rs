@@ -21,6 +21,7 @@ use serde::Serialize;
 
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
+#[command(group(clap::ArgGroup::new("controller").multiple(true)))]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
     /// The plant file
@@ -33,7 +34,7 @@ pub(crate) struct Options {
     /// rows and columns, or a log of the plant's signals over time, from which the plant is identified.
     /// Writes --out [default: NAME.toml], with the bandwidths that were chosen for the plant.
     #[arg(long)]
-    #[arg(conflicts_with_all = ["report", "fmu", "kalman_fmu", "worst_case", "json", "code", "compare"])]
+    #[arg(conflicts_with_all = ["report", "fmu", "kalman_fmu", "feedback_fmu", "worst_case", "json", "code", "compare"])]
     init: bool,
     /// Further logs of the same plant, with --init
     #[arg(requires = "init", value_name = "LOG")]
@@ -66,12 +67,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     report: Option<PathBuf>,
     /// Also make the controller FMU
-    #[arg(long, value_name = "FMU", help_heading = "Results")]
+    #[arg(long, value_name = "FMU", group = "controller", help_heading = "Results")]
     fmu: Option<PathBuf>,
     /// The FMU from which --fmu makes it
     ///
-    /// A packed controller FMU [default: dist/AsoController.fmu, or the one beside the command].
-    #[arg(long, value_name = "FMU", requires = "fmu", help_heading = "Results")]
+    /// And --feedback-fmu; a packed controller FMU [default: dist/AsoController.fmu, or the one beside the command].
+    #[arg(long, value_name = "FMU", requires = "controller", help_heading = "Results")]
     from: Option<PathBuf>,
     /// Also make a Kalman filter with the plant inside
     ///
@@ -79,6 +80,17 @@ pub(crate) struct Options {
     /// observer. Made from the packed dist/KalmanFilter.fmu, or the one beside the command.
     #[arg(long, value_name = "FMU", help_heading = "Results")]
     kalman_fmu: Option<PathBuf>,
+    /// Also make the controller for this filter
+    ///
+    /// An FMU that takes the estimates of the Kalman filter in place of measurements. Made as that of --fmu is.
+    #[arg(
+        long,
+        value_name = "FMU",
+        requires = "kalman_fmu",
+        group = "controller",
+        help_heading = "Results"
+    )]
+    feedback_fmu: Option<PathBuf>,
     /// Also write the worst plant within tolerances
     ///
     /// As a plant file.
@@ -108,7 +120,7 @@ pub(crate) struct Options {
     /// Compare all laws that estimate faults
     ///
     /// Writes one page, NAME-comparison.html or --report, and no design.
-    #[arg(long, conflicts_with_all = ["out", "fmu", "kalman_fmu", "worst_case", "c_code", "no_std"])]
+    #[arg(long, conflicts_with_all = ["out", "fmu", "kalman_fmu", "feedback_fmu", "worst_case", "c_code", "no_std"])]
     #[arg(help_heading = "Computation")]
     compare: bool,
     /// Time for proofs in s
@@ -145,6 +157,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
     outputs.extend(options.kalman_fmu.as_deref().map(|path| ("--kalman-fmu", path)));
+    outputs.extend(options.feedback_fmu.as_deref().map(|path| ("--feedback-fmu", path)));
     outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
     let filter = options.kalman_fmu.as_ref().map(|_| models::default_fmu(models::FILTER));
     let filter = filter.transpose()?;
@@ -171,16 +184,21 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
             check_own(path, &design.identity)?;
         }
     }
-    let fmu = from.map(|from| design.fmu(&from)).transpose()?;
-    let filter = filter.map(|base| design.kalman_fmu(&base)).transpose()?;
+    let mut fmus = Vec::new();
+    if let (Some(path), Some(from)) = (&options.fmu, &from) {
+        fmus.push((path, design.fmu(from)?));
+    }
+    if let (Some(path), Some(base)) = (&options.kalman_fmu, &filter) {
+        fmus.push((path, design.kalman_fmu(base)?));
+    }
+    if let (Some(path), Some(from)) = (&options.feedback_fmu, &from) {
+        fmus.push((path, design.feedback_fmu(from)?));
+    }
     let page = design.page();
     let mut staged = Outputs::default();
     staged.stage(&out, |path| fs::write(path, &design.file))?;
     staged.stage(&report, |path| fs::write(path, &page))?;
-    if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
-        staged.stage(path, |path| fmu.write(path, &page))?;
-    }
-    if let (Some(fmu), Some(path)) = (filter, &options.kalman_fmu) {
+    for (path, fmu) in fmus {
         staged.stage(path, |path| fmu.write(path, &page))?;
     }
     for (_, path, text) in &code.files {
@@ -344,10 +362,10 @@ fn inputs<'a>(
 }
 
 impl Options {
-    /// Returns the FMU from which the controller FMU is made, if one is requested.
+    /// Returns the FMU from which the controller FMUs are made, if one is requested.
     fn from(&self) -> anyhow::Result<Option<PathBuf>> {
         let default = || models::default_fmu(models::FMUS[1].1);
         let path = || self.from.clone().map_or_else(default, Ok);
-        self.fmu.is_some().then(path).transpose()
+        self.fmu.as_ref().or(self.feedback_fmu.as_ref()).map(|_| path()).transpose()
     }
 }

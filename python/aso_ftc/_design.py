@@ -306,6 +306,11 @@ def _axes(ax: Any) -> Any:
     return _package("matplotlib.pyplot", "a plot").subplots()[1]
 
 
+def _controller(base: PathLike | None) -> str:
+    """The packed controller from which another one is made."""
+    return os.fspath(fmus()["AsoController"] if base is None else base)
+
+
 class Controller:
     """The controller of a design."""
 
@@ -326,8 +331,7 @@ class Controller:
             path: the file to write.
             base: the packed controller from which it is made; default: that of this package.
         """
-        start = os.fspath(base) if base is not None else os.fspath(fmus()["AsoController"])
-        self._designed.fmu(start, os.fspath(path))
+        self._designed.fmu(_controller(base), os.fspath(path))
         return os.fspath(path)
 
     def kalman_fmu(self, path: PathLike, *, base: PathLike) -> str:
@@ -338,6 +342,16 @@ class Controller:
             base: the packed filter from which it is made, ``KalmanFilter.fmu`` of ``aso-ftc pack fmu-kalman``.
         """
         self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
+        return os.fspath(path)
+
+    def feedback_fmu(self, path: PathLike, *, base: PathLike | None = None) -> str:
+        """Write the controller that takes the estimates of the Kalman filter in place of its own; return its path.
+
+        Args:
+            path: the file to write.
+            base: the packed controller from which it is made; default: that of this package.
+        """
+        self._designed.feedback_fmu(_controller(base), os.fspath(path))
         return os.fspath(path)
 
     def c_code(self, folder: PathLike, *, single: bool = False) -> list[str]:

@@ -151,6 +151,13 @@ impl Designed {
         designing(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
     }
 
+    /// Makes the controller for the estimates of that filter from the packed controller at `base`.
+    fn feedback_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
+        designing(py, || {
+            self.with(|design| design.feedback_fmu(&base)?.write(&path, &design.page()))
+        })
+    }
+
     /// Makes the controller FMU from the packed controller at `base`.
     fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
         designing(py, || self.with(|design| design.fmu(&base)?.write(&path, &design.page())))

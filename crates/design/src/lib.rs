@@ -15,6 +15,7 @@ mod compare;
 mod design_file;
 mod designed_fmu;
 mod error;
+mod feedback_fmu;
 mod init;
 mod kalman_fmu;
 mod matrix;
@@ -179,11 +180,34 @@ impl Design {
     ///
     /// [`Error`]: `base` is no packed ASO controller, or its library refuses the design.
     pub fn fmu(&mut self, base: &Path) -> Result<DesignedFmu, Error> {
-        let resources = [("design.toml", self.file.as_bytes())];
-        let content = Content { model: "AsoController", resources: &resources, plant: &self.plant };
-        let fmu = DesignedFmu::new(base, &content)?;
+        let fmu = self.controller_fmu(base, &self.file)?;
         self.report.interface = reporting::interface(&fmu.description);
         Ok(fmu)
+    }
+
+    /// Makes the FMU of the controller that takes the estimates of [`Design::kalman_fmu`] in place of its own; from the packed
+    /// controller at `base`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: there is no such filter; the controller needs its own observer; `base` is no packed ASO controller.
+    pub fn feedback_fmu(&self, base: &Path) -> Result<DesignedFmu, Error> {
+        self.kalman.as_ref().map_err(|refusal| Error::from(refusal.clone()))?;
+        let invalid = |text: String| Error::Invalid(text);
+        let observed = aso_controller::Design::parse(&self.file, "design.toml")
+            .map_err(|error| invalid(error.to_string()))?;
+        let feedback = feedback_fmu::without_observer(&observed).map_err(|reason| {
+            invalid(format!("no controller for the estimates of the Kalman filter: {reason}"))
+        })?;
+        let text = feedback.to_toml().map_err(|error| invalid(error.to_string()))?;
+        let heading = identity::heading(&self.identity, &self.report.verdict);
+        self.controller_fmu(base, &format!("{heading}\n{text}"))
+    }
+
+    fn controller_fmu(&self, base: &Path, file: &str) -> Result<DesignedFmu, Error> {
+        let resources = [("design.toml", file.as_bytes())];
+        let content = Content { model: "AsoController", resources: &resources, plant: &self.plant };
+        DesignedFmu::new(base, &content)
     }
 
     /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that carries the plant's

@@ -181,7 +181,7 @@ const LAYERS: [&[&str]; 6] = [
     &["plant"],
     &["solve"],
     &["assess"],
-    &["code", "compare", "designed_fmu", "kalman_fmu", "design_file"],
+    &["code", "compare", "designed_fmu", "feedback_fmu", "kalman_fmu", "design_file"],
     &["init"],
 ];
 
