@@ -16,7 +16,7 @@ const EXCEPTIONAL: usize = 10;
 /// outside of this part do not change the eigenvalues and are not updated, so that a matrix of order n
 /// needs about 6 n^3 operations, a quarter of what the Schur form with its vectors needs. A
 /// subdiagonal entry counts as zero by the criterion of M. Ahues and F. Tisseur (LAPACK Working Note
-/// 122, 1997). Entries below the subdiagonal are not read.
+/// 122, 1997). Entries below the subdiagonal must be zero up to rounding: the bulge is added to them.
 ///
 /// Source: J. G. F. Francis, The QR transformation, part 2, Comput. J. 4 (1962); exceptional shifts:
 /// LAPACK's `dlahqr`.

@@ -11,8 +11,8 @@ use nalgebra::{Complex, DMatrix};
 
 /// A gain counts as zero below this times the accuracy of the family.
 const ACCURACIES: f64 = 10.0;
-/// A decoupling error up to this is the rounding of the data; a larger one comes from a coupling that
-/// counted as zero, so that a smaller tolerance is tried, down to this one.
+/// A decoupling error up to the first is the rounding of the data; a larger one comes from a coupling that
+/// counted as zero, so that smaller tolerances are tried while the last one is above the second.
 const DECOUPLED: f64 = 1e-6;
 const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// The largest decoupling error that is accepted.
@@ -23,7 +23,7 @@ const REGULARISATION: f64 = 1e-12;
 /// Requirements of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Requirements {
-    /// Poles of the generator, real and stable: s < 0, or 0 < z < 1 in sampled time. A generator of
+    /// Poles of the generator, real and stable: s < 0, or 1e-3 < z < 1 in sampled time. A generator of
     /// order k has the first k of them; the last one is repeated as often as necessary.
     pub poles: Vec<f64>,
     /// The frequency, in rad per unit of time, at which the residual must respond to each fault of

@@ -38,8 +38,8 @@ impl GainNorm<'_> {
     /// or without stability.
     ///
     /// ```text
-    /// dnorm / dL = -Re(E R [.; 0]' u) (C R B + D) v),  R = (lambda I - A)^-1 of the closed loop,
-    /// at the frequency of the maximum, u and v the singular vectors there
+    /// dnorm / dL = -Re(conj(h) g'),  h the first rows of R* E' u,  g = (C R B + D) v,  R = (lambda I - A)^-1,
+    /// A and B of the closed loop, lambda at the frequency of the maximum, u and v the singular vectors there
     /// ```
     pub(super) fn value(&self, gain: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
         let (n, order) = (gain.nrows(), self.a.nrows());

@@ -146,8 +146,8 @@ fn largest_ratio(
 /// An orthonormal basis U of the invariant subspace of the eigenvalues with positive real parts, and S with
 /// A U = U S; both empty if there are none, None if an eigenvalue is on the imaginary axis or U is not accurate.
 ///
-/// Method: the sign of A by Newton's iteration with determinantal scaling (N. J. Higham, Functions of Matrices
-/// (2008), section 5.6); U is the range of I + sign A.
+/// Method: the sign of A by Newton's iteration with norm scaling (N. J. Higham, Functions of Matrices (2008),
+/// section 5.5); U is the range of I + sign A.
 #[expect(clippy::type_complexity, reason = "a pair that is there or not")]
 fn unstable_part(a: &DMatrix<f64>) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)>, Error> {
     let n = a.nrows();

@@ -19,9 +19,8 @@ const EIGEN_ITERATIONS: usize = 1000;
 
 /// The directions of method 0 of Kautsky, Nichols and Van Dooren, and of the method of Tits and Yang.
 ///
-/// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues. Above 24
-/// states and with one input neither is computed. With as many inputs as states both have the unit
-/// vectors.
+/// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues. Neither is computed
+/// above 24 states or with one input. With as many inputs as states both have the unit vectors.
 ///
 /// Both enlarge the determinant of the eigenvectors of length one, the first by one of them at a time,
 /// the second by two. They end at a local optimum, or before it, which depends on their start; it is
@@ -65,14 +64,17 @@ struct Iteration {
     kernels: Vec<ComplexMatrix>,
     /// Number of real eigenvalues.
     reals: usize,
-    /// The number of the space of each column, real eigenvalues first.
+    /// The spaces in the order of their columns: real eigenvalues first.
     order: Vec<usize>,
 }
 
 impl Iteration {
+    /// The start of scipy: for each eigenvalue p the sum of the basis of the x with N' (A - p I) x = 0, the columns of
+    /// N normal to those of B.
     fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, problem: &AssignableSubspaces) -> Self {
         let (n, r) = b.shape();
         let count = |number: &usize| problem.spaces[*number].poles.count();
+        // The spaces are sorted by descending real part.
         let mut order: Vec<usize> = (0..problem.spaces.len()).rev().collect();
         order.sort_by_key(count);
         let reals = order.iter().filter(|number| count(number) == 1).count();

@@ -17,9 +17,9 @@ const DIFFERENCE: f64 = 1e-3;
 /// Halvings of a step; the part of the predicted decrease that it must reach.
 const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
-/// A search ends when a step decreases gamma by less than this part.
+/// A search ends at the second step that decreases gamma by less than this part.
 const FLAT: f64 = 1e-5;
-/// A round that decreases gamma by less than this part is the last one.
+/// A round that decreases gamma by less than this part is the last one if the peak is on the grid, see `BETWEEN`.
 const PROGRESS: f64 = 1e-3;
 /// A norm that is above the values of the grid by this part adds its frequency.
 const BETWEEN: f64 = 2e-3;
@@ -67,7 +67,7 @@ struct Search<'a> {
     at: DVector<f64>,
 }
 
-/// A controller with the derivatives of its matrices and its values on the grid.
+/// A controller and its values on the grid, term by term.
 struct Iterate {
     controller: StateSpace,
     values: Vec<Vec<f64>>,
@@ -160,9 +160,14 @@ impl Search<'_> {
         None
     }
 
-    /// Values and gradients at `places`, with respect to parameters in their sizes.
-    fn cuts(&self, iterate: &Iterate, at: &DVector<f64>, places: &[Place]) -> Option<Vec<Cut>> {
-        let differences = self.differences(at)?;
+    /// Values and gradients of `iterate` at `places`, with respect to its `parameters` in units of `scales`.
+    fn cuts(
+        &self,
+        iterate: &Iterate,
+        parameters: &DVector<f64>,
+        places: &[Place],
+    ) -> Option<Vec<Cut>> {
+        let differences = self.differences(parameters)?;
         let cut = |place: &Place| self.grid.gradient(&iterate.controller, &differences, *place);
         places.iter().map(cut).collect()
     }
