@@ -100,7 +100,7 @@ pub fn tracking_rank(
     let [n, m, t] = sizes(a, b, output)?;
     let whole = block_2x2([a, b], [output, &DMatrix::zeros(t, m)]);
     let rank = |matrix: &DMatrix<f64>| Ok::<_, Error>(Svd::new(&scaled(matrix))?.rank(TOLERANCE));
-    let outputs = if output.amax() > 0.0 { rank(&output.transpose())? } else { 0 };
+    let outputs = rank(&output.transpose())?;
     Ok(TrackingRank { rank: rank(&whole.transpose())?, expected: n + t, outputs })
 }
 

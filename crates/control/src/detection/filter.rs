@@ -48,9 +48,6 @@ pub struct DetectionFilter {
     /// K: the initial state of the filter is K x, x the initial state of the plant; T of the unknown-input
     /// observer, in the coordinates of the filter, whose state estimates T x.
     pub start: DMatrix<f64>,
-    /// `B_y` - the part of it that does not multiply the innovation, and N of the innovation.
-    injection: DMatrix<f64>,
-    selection: DMatrix<f64>,
 }
 
 impl NoisyPlant {
@@ -218,21 +215,18 @@ impl UnknownInputObserver {
         let whitening = factor
             .solve_lower_triangular(&DMatrix::identity(covariance.nrows(), covariance.nrows()))
             .ok_or(Error::Overflow { what: "the inverse of V" })?;
-        let injection = &through + &gain * selection;
         let rows = selection.nrows();
         Ok(DetectionFilter {
             generator: ResidualGenerator {
                 a: dynamics - &gain * &output,
                 b_u: projection * b,
-                b_y: injection.clone(),
+                b_y: through + gain * selection,
                 c: -(&whitening * output),
                 d_u: DMatrix::zeros(rows, b.ncols()),
-                d_y: &whitening * selection,
+                d_y: whitening * selection,
                 domain: *domain,
             },
             start: projection.clone(),
-            injection,
-            selection: whitening * selection,
         })
     }
 }
@@ -251,10 +245,10 @@ impl DetectionFilter {
     /// [`Error::Shape`] for columns of the wrong length.
     pub fn effect(&self, input: &UnknownInput) -> Result<StateSpace, Error> {
         check::length("e", input.on_states.as_slice(), self.start.ncols())?;
-        check::length("e_s", input.on_measurements.as_slice(), self.selection.ncols())?;
         let generator = &self.generator;
-        let b = &self.start * &input.on_states - &self.injection * &input.on_measurements;
-        let d = &self.selection * &input.on_measurements;
+        check::length("e_s", input.on_measurements.as_slice(), generator.d_y.ncols())?;
+        let b = &self.start * &input.on_states - &generator.b_y * &input.on_measurements;
+        let d = &generator.d_y * &input.on_measurements;
         Ok(StateSpace {
             a: generator.a.clone(),
             b: DMatrix::from_column_slice(b.len(), 1, b.as_slice()),

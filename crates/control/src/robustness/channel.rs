@@ -1,6 +1,6 @@
 //! Margins of one channel, the others closed.
 
-use super::crossing::{Evaluation, narrowed};
+use super::crossing::stability_limit;
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::eigen::RankOne;
@@ -103,18 +103,8 @@ fn gain_limits(system: &StateSpace, candidates: &[f64]) -> Result<[f64; 2], Erro
     // The first unstable gain on the way from 1 to `end`, or `end`.
     let confirmed = |end: f64| {
         let far = end.clamp(1.0 / LARGEST_GAIN, LARGEST_GAIN);
-        let mut good = Evaluation { at: 1.0, value: f64::NAN };
-        for step in 1..count {
-            let gain = far.powf(f64::from(step) / f64::from(count));
-            let value = instability(gain)?;
-            if value < 0.0 {
-                good = Evaluation { at: gain, value };
-                continue;
-            }
-            let bad = Evaluation { at: gain, value: value.max(f64::MIN_POSITIVE) };
-            return Ok(narrowed(good, bad, instability)?.0);
-        }
-        Ok(end)
+        let gains = (1..count).map(|step| far.powf(f64::from(step) / f64::from(count)));
+        Ok::<_, Error>(stability_limit(1.0, gains, instability)?.unwrap_or(end))
     };
     let below = candidates.iter().copied().filter(|gain| *gain < 1.0).fold(0.0, f64::max);
     let above = candidates.iter().copied().filter(|gain| *gain > 1.0);

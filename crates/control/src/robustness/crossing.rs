@@ -14,8 +14,9 @@ pub(super) struct Evaluation {
 /// Narrows an interval in which a function changes its sign; returns its ends, in the order of the
 /// arguments.
 ///
-/// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function need not be continuous. Method: regula falsi in the variant
-/// of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois); every third step bisects.
+/// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function
+/// need not be continuous. Method: regula falsi in the variant of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois);
+/// every third step bisects.
 pub(super) fn narrowed<E>(
     mut low: Evaluation,
     mut high: Evaluation,
@@ -47,6 +48,27 @@ pub(super) fn narrowed<E>(
         before = Some(replaces_low);
     }
     Ok((low.at, high.at))
+}
+
+/// The argument up to which `instability` is negative from `start` on, tested at `points`; None if it is negative at
+/// all of them.
+pub(super) fn stability_limit<E>(
+    start: f64,
+    points: impl IntoIterator<Item = f64>,
+    instability: impl Fn(f64) -> Result<f64, E>,
+) -> Result<Option<f64>, E> {
+    let mut good = Evaluation { at: start, value: f64::NAN };
+    for at in points {
+        let value = instability(at)?;
+        if value < 0.0 {
+            good = Evaluation { at, value };
+            continue;
+        }
+        // Zero and NaN are unstable.
+        let bad = Evaluation { at, value: value.max(f64::MIN_POSITIVE) };
+        return Ok(Some(narrowed(good, bad, instability)?.0));
+    }
+    Ok(None)
 }
 
 #[cfg(test)]

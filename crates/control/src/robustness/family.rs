@@ -1,6 +1,6 @@
 //! The plants that a controller may meet, and their loops.
 
-use super::crossing::{Evaluation, narrowed};
+use super::crossing::stability_limit;
 use super::{Loop, held_plant};
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
@@ -80,20 +80,9 @@ impl<F: PlantFamily> Loops<'_, F> {
     /// The multiple of the deviations below which the loop is stable, if it is unstable at one of
     /// [`PlantFamily::multiples`].
     pub(super) fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
-        let value = |multiple: f64| {
+        stability_limit(0.0, self.family.multiples(), |multiple| {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
             self.instability(&scaled)
-        };
-        let mut good = Evaluation { at: 0.0, value: f64::NAN };
-        for multiple in self.family.multiples() {
-            let there = Evaluation { at: multiple, value: value(multiple)? };
-            if there.value < 0.0 {
-                good = there;
-                continue;
-            }
-            let bad = Evaluation { value: there.value.max(f64::MIN_POSITIVE), ..there };
-            return Ok(Some(narrowed(good, bad, value)?.0));
-        }
-        Ok(None)
+        })
     }
 }
