@@ -197,8 +197,24 @@ fn directions(largest: &[f64]) -> Vec<Vec<f64>> {
     let power = |base: usize| base.pow(u32::try_from(lossy).unwrap_or(u32::MAX));
     let fits = |points: &usize| power(*points) - power(points - 1) <= DIRECTIONS;
     let points = (2..=11).rev().find(fits).unwrap_or(2);
+    let all = grid(largest, points);
+    // The far corner, which may differ from `largest` by rounding.
+    let corner = all.last().cloned().unwrap_or_default();
     let on_a_face = |loss: &Vec<f64>| {
-        loss.iter().zip(largest).any(|(loss, largest)| *largest > 0.0 && loss >= largest)
+        loss.iter().zip(&corner).any(|(loss, farthest)| *farthest > 0.0 && loss >= farthest)
     };
-    grid(largest, points).into_iter().filter(on_a_face).collect()
+    all.into_iter().filter(on_a_face).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::directions;
+
+    /// 0.91 * 10 / 10 is below 0.91.
+    #[test]
+    fn a_grid_that_rounds_the_largest_loss_has_its_faces() {
+        assert_eq!(directions(&[0.91]).len(), 1);
+        assert_eq!(directions(&[0.91, 0.0]).len(), 1);
+        assert_eq!(directions(&[0.91, 0.5]).len(), 21);
+    }
 }
