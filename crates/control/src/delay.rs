@@ -103,7 +103,8 @@ impl Delays {
         order * delayed.count()
     }
 
-    /// For each command, or measurement, the first of its delay's states, counted from the first one of all delays.
+    /// For each command, and each measurement, the first state of its delay, counted from the first one of all delays;
+    /// None without a delay.
     fn first_states(&self, order: usize) -> [Vec<Option<usize>>; 2] {
         let mut next = 0;
         let mut first = |delay: &f64| {

@@ -284,11 +284,11 @@ fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
     }
 }
 
-/// Sets `covariance` to the mean of the products of two lists of centred columns.
-fn covariance_of(rows: &DMatrix<f64>, columns: &DMatrix<f64>, covariance: &mut DMatrix<f64>) {
+/// Sets `covariance` to the mean of x y' over the columns x of `xs` and y of `ys`, which are centred.
+fn covariance_of(xs: &DMatrix<f64>, ys: &DMatrix<f64>, covariance: &mut DMatrix<f64>) {
     covariance.fill(0.0);
-    for (row, column) in rows.column_iter().zip(columns.column_iter()) {
-        covariance.ger(1.0 / as_number(rows.ncols()), &row, &column, 1.0);
+    for (x, y) in xs.column_iter().zip(ys.column_iter()) {
+        covariance.ger(1.0 / as_number(xs.ncols()), &x, &y, 1.0);
     }
 }
 

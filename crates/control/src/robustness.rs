@@ -222,8 +222,9 @@ impl Loop {
         StateSpace { a: self.dynamics(), b, c, d, domain: self.plant.domain }
     }
 
-    /// From noise that is added to the measurements to `output` of the controller, which has the
-    /// controller's A and B and its own C and D.
+    /// The system from noise that is added to the measurements to another output of the controller.
+    ///
+    /// `output`: the controller's A and B, which are not read, with C and D of that output.
     ///
     /// # Errors
     ///

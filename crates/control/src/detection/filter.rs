@@ -271,14 +271,15 @@ fn correlated_filter(
     domain: Domain,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let factor = v.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "V" })?;
-    let part = factor.solve(&s.transpose()).transpose();
-    let process = symmetric_part(&(w - &part * s.transpose()));
-    let filter = kalman(&(a - &part * c), c, &process, v, domain)?;
+    // S V^-1.
+    let correlated = factor.solve(&s.transpose()).transpose();
+    let process = symmetric_part(&(w - &correlated * s.transpose()));
+    let filter = kalman(&(a - &correlated * c), c, &process, v, domain)?;
     let innovation = match domain {
         Domain::Continuous => v.clone(),
         Domain::Sampled { .. } => v + c * filter.covariance * c.transpose(),
     };
-    Ok((filter.gain + part, innovation))
+    Ok((filter.gain + correlated, innovation))
 }
 
 /// The rows N with N M = 0 and N N' = I; None if there are none.

@@ -40,7 +40,7 @@ pub struct DirectForm {
     m_2: DMatrix<f64>,
     /// [`M_1` C; N], n x n.
     to: DMatrix<f64>,
-    /// Its inverse [`F_a`, (I - `F_a` `M_1` C) N'].
+    /// The inverse of `to`: [`F_a`, (I - `F_a` `M_1` C) N'].
     from: DMatrix<f64>,
     /// A in these coordinates.
     a: DMatrix<f64>,

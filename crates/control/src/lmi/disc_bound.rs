@@ -168,7 +168,7 @@ fn slowest_rate(disc: Disc, decay: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::Norm;
-    use super::super::noiseless::tests::{behind, matrix};
+    use super::super::noiseless::tests::{filtered_fault, matrix};
     use super::*;
     use crate::response::h_infinity;
     use crate::robustness::random_deviations;
@@ -212,7 +212,7 @@ mod tests {
         for (numerator, gap) in
             [([1.0, 0.0, 0.0], 1.5), ([6.0, 5.0, 1.0], 5.0), ([1.0, -0.5, 0.0], 1.5)]
         {
-            let (a, c, performance) = behind(numerator);
+            let (a, c, performance) = filtered_fault(numerator);
             let disc = Disc { center, radius };
             let least = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
             let mut nearest = f64::INFINITY;

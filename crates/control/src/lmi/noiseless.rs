@@ -194,8 +194,8 @@ pub(super) mod tests {
         DMatrix::from_row_slice(rows, columns, entries)
     }
 
-    /// A fault f' = w behind the denominator (s + 1)^3, seen through the numerator c0 + c1 s + c2 s^2.
-    pub(crate) fn behind(numerator: [f64; 3]) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
+    /// A, C and the performance for a fault f' = w that is measured as y = (c0 + c1 s + c2 s^2) / (s + 1)^3 f.
+    pub(crate) fn filtered_fault(numerator: [f64; 3]) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
         let [c0, c1, c2] = numerator;
         let a = [0., 1., 0., 0., 0., 0., 1., 0., -1., -3., -3., 1., 0., 0., 0., 0.];
         let fault = |rows, columns| matrix(rows, columns, &[0., 0., 0., 1.]);
@@ -210,7 +210,7 @@ pub(super) mod tests {
     }
 
     fn bound(numerator: [f64; 3]) -> f64 {
-        let (a, c, performance) = behind(numerator);
+        let (a, c, performance) = filtered_fault(numerator);
         noiseless_norm_lower_bound(&a, &c, &performance, Domain::Continuous).unwrap().unwrap()
     }
 
@@ -237,7 +237,7 @@ pub(super) mod tests {
     #[test]
     fn it_is_the_limit_of_the_bound_for_vanishing_noise() {
         let numerator = [1.0, -2.5, 1.0];
-        let (a, c, mut performance) = behind(numerator);
+        let (a, c, mut performance) = filtered_fault(numerator);
         let least = bound(numerator);
         performance.disturbance = performance.disturbance.insert_column(1, 0.0);
         let mut before = f64::INFINITY;

@@ -76,18 +76,18 @@ pub fn loss_tolerance(
         direction[at] = 1.0;
         lossy.along(&direction, largest)
     };
-    let mut worst = (vec![0.0; count], f64::NEG_INFINITY);
+    let (mut worst, mut worst_instability) = (vec![0.0; count], f64::NEG_INFINITY);
     for loss in grid(&vec![largest; count], points(count)) {
-        let value = lossy.instability(&loss)?;
-        if value > worst.1 {
-            worst = (loss, value);
+        let instability = lossy.instability(&loss)?;
+        if instability > worst_instability {
+            (worst, worst_instability) = (loss, instability);
         }
     }
     Ok(LossTolerance {
         common: lossy.along(&vec![1.0; count], largest)?,
         single: (0..count).map(alone).collect::<Result<_, _>>()?,
-        worst: worst.0,
-        worst_instability: worst.1,
+        worst,
+        worst_instability,
     })
 }
 

@@ -171,7 +171,7 @@ pub(crate) fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     Ok(Svd::new(equations)?.right.columns(rank, all - rank).into())
 }
 
-/// The same by reflections, faster, with rounding errors relative to the largest entry.
+/// [`basis`] by reflections: faster, with rounding errors relative to the largest entry.
 fn rough_basis(equations: &DMatrix<f64>) -> DMatrix<f64> {
     let (rank, all) = equations.shape();
     let q = equations.clone().resize_vertically(all, 0.0).transpose().qr().q();

@@ -5,7 +5,7 @@ use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, relative, sizes};
 use nalgebra::DMatrix;
 
-/// Terms below this fraction of the largest ones hold their rounding.
+/// Sums of terms below this fraction of the largest sum are rounding.
 const FLOOR: f64 = 1e-6;
 
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
@@ -54,8 +54,8 @@ impl RiccatiEquation {
         self.relative_residual(p, &p.abs(), 0.0)
     }
 
-    /// The same with the rounding of zeros: |P| as in [`lyapunov::Solution::residual`], and sums of at least
-    /// [`FLOOR`] of the largest one.
+    /// [`Self::entrywise_residual`] without the rounding of entries that are zero in theory: |P| as in
+    /// [`lyapunov::Solution::residual`], each sum at least [`FLOOR`] times the largest one.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &sizes(p), FLOOR)
     }

@@ -61,8 +61,11 @@ pub struct NormFilter {
     /// `A_s`.
     a: DMatrix<f64>,
     c: DMatrix<f64>,
+    /// Q.
     process: DMatrix<f64>,
+    /// R.
     noise: DMatrix<f64>,
+    /// E.
     output: DMatrix<f64>,
     /// C' R^-1 C.
     measured: DMatrix<f64>,

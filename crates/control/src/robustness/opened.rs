@@ -26,6 +26,7 @@ impl OpenedLoop {
     /// Same as [`crate::response::h_infinity`].
     pub fn new(closed: &Loop, at: Point) -> Result<Self, Error> {
         let sensitivity = KnownResponse::new(closed.sensitivity(at))?.swept()?;
+        // T = I - S: C of S with the opposite sign, and no D.
         let complementary = sensitivity.clone().negated();
         let complementary = complementary.with_direct(closed.complementary(at).d);
         let peak = norm_of(&sensitivity, WIDTH)?;

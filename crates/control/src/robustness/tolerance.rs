@@ -71,8 +71,8 @@ impl Tolerances {
     }
 }
 
-/// Whether a row says that its left side is a state other than `excluded`: a 1 for it in `states`, zeros
-/// everywhere else and in `commands`.
+/// Whether the equation of `row` equates its left side to one state, which is not `excluded`: a single 1 in the row of
+/// `states` (A or C), zeros elsewhere and in that of `commands` (B or D).
 fn is_signal(
     states: &DMatrix<f64>,
     commands: &DMatrix<f64>,

@@ -15,7 +15,7 @@ const TOLERANCE: f64 = 1e-9;
 /// An eigenvalue this far beyond the stability limit, relative to the rate in continuous time, is on it, with
 /// rounding errors.
 const NEUTRAL: f64 = 1e-9;
-/// What a norm must stay below 1, or a decay above 0, more than its rounding errors.
+/// Distance of a norm from 1, or of a decay from 0, that exceeds its rounding errors.
 const MARGIN: f64 = 1e-10;
 
 /// What is known of an interpolated back-calculation.
@@ -27,15 +27,15 @@ pub enum InterpolatedWindup {
     Unstable {
         /// The part of the way from the first point to the second.
         part: f64,
-        /// The commands at their limits, from 0.
+        /// The indices, from 0, of the commands at their limits.
         limited: Vec<usize>,
         /// The instability there: the largest modulus of the eigenvalues less 1; in continuous time the largest
         /// real part.
         instability: f64,
     },
-    /// Neither was shown for these commands at their limits, from 0.
+    /// Neither was shown for these commands at their limits.
     Undecided {
-        /// The commands.
+        /// Their indices, from 0.
         limited: Vec<usize>,
     },
 }
@@ -95,7 +95,7 @@ pub fn interpolated_windup(
             k_i.map(|k| DMatrix::from_fn(at_limit.len(), t, |i, j| k[(at_limit[i], j)] / units[i]));
         let l =
             l_w.map(|l| DMatrix::from_fn(t, at_limit.len(), |i, j| l[(i, at_limit[j])] * units[j]));
-        match examine(&follows(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain, &at_limit)? {
+        match examine(&bernstein(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain, &at_limit)? {
             InterpolatedWindup::Stable => {}
             unstable @ InterpolatedWindup::Unstable { .. } => return Ok(unstable),
             open @ InterpolatedWindup::Undecided { .. } => undecided = undecided.or(Some(open)),
@@ -105,7 +105,7 @@ pub fn interpolated_windup(
 }
 
 /// The Bernstein coefficients of M(s).
-fn follows(
+fn bernstein(
     k: &[DMatrix<f64>; 2],
     l: &[DMatrix<f64>; 2],
     domain: Domain,
@@ -113,7 +113,7 @@ fn follows(
     let t = k[0].ncols();
     let both = DMatrix::from_fn(k[0].nrows(), 2 * t, |i, j| k[j / t][(i, j % t)]);
     let svd = Svd::new(&both)?;
-    let rank = if both.amax() > 0.0 { svd.rank(TOLERANCE) } else { 0 };
+    let rank = svd.rank(TOLERANCE);
     let q = svd.left.columns(0, rank);
     let product = |i: usize, j: usize| {
         if rank <= t { q.transpose() * &k[i] * &l[j] * q } else { &l[j] * &k[i] }
@@ -186,7 +186,7 @@ fn examine(
     Ok(outcome)
 }
 
-/// Whether all of `matrices` have a norm below 1 in the coordinates in which `middle` contracts.
+/// Whether all of `matrices` have a P norm below 1 for P with M' P M - P = -I, M = `middle`.
 fn contracts(middle: &DMatrix<f64>, matrices: &[DMatrix<f64>]) -> Result<bool, Error> {
     let identity = DMatrix::identity(middle.nrows(), middle.nrows());
     let p = discrete_lyapunov(middle, &identity)?.p;

@@ -37,7 +37,7 @@ pub(super) fn remainder(x: &DMatrix<f64>, y: &DMatrix<f64>, stages: usize) -> Op
     None
 }
 
-/// The coefficients of e^x - N(x) / N(-x).
+/// The first [`TERMS`] coefficients of the power series of e^x - N(x) / N(-x), N(x) / N(-x) the Padé approximant.
 fn coefficients(stages: usize) -> Vec<f64> {
     let numerator: &[f64] = match stages {
         1 => &[1.0, 0.5],
