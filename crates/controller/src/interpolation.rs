@@ -60,8 +60,9 @@ impl Schedule {
 
     /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for
     /// the derivative `slope` of the scheduling variable; zero outside of the grid. At a point of the
-    /// grid they are those of the interval after it. The matrices that the schedule leaves constant become
-    /// zero.
+    /// grid they are those of the interval after it, at the last point those of the interval before it. The
+    /// matrices that the schedule leaves constant become zero. Returns the derivative of the value that is held
+    /// within the grid.
     pub fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
         let Place { interval, inside, .. } = self.place(value);
         let [from, to] = [0, 1].map(|end| self.points[interval + end].at);

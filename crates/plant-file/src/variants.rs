@@ -59,7 +59,7 @@ pub struct SchedulePoint {
 }
 
 impl Schedule {
-    /// The name of the variable.
+    /// The signal of the variable.
     #[must_use]
     pub fn variable<'a>(&'a self, measurements: &'a [Signal]) -> &'a Signal {
         match &self.variable {

@@ -24,9 +24,9 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 ///
 /// ```text
 /// continuous, one command and one measurement, for a zero z:  max |S| >= M = product over unstable p of |z + p*| / |z - p|
-///     and, if |S| <= e up to w:                               max |S| >= M^t e^(1 - t),  t = pi / (pi - 2 atan(w / z))
-/// with a delay d:                                         max |S| >= max |T| - 1 >= e^(p d) - 1
-/// sampled every h, m commands:                                max |S| >= e^(h sum of p / m)
+///     for a real z and |S| <= s = 1/sqrt(2) up to w:          max |S| >= M^t s^(1 - t),  t = pi / (pi - 2 atan(w / z))
+///     with a delay d:                                         max |S| >= max |T| - 1 >= exp(d Re p) - 1
+/// sampled every h, m commands:                                max |S| >= exp(h sum of Re p / m)
 /// ```
 ///
 /// Sources: J. S. Freudenberg, D. P. Looze, Right half plane poles and zeros and design tradeoffs in feedback systems, IEEE
@@ -35,7 +35,7 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 ///
 /// # Errors
 ///
-/// A sample time with which every controller has a peak of S above 1e6.
+/// A sample time with which every controller has a peak of S above 1e6; eigenvalues or zeros that cannot be computed.
 pub(crate) fn warnings(
     file: &PlantFile<'_>,
     linear: &LinearPlant,

@@ -187,8 +187,8 @@ impl ScheduledLoop {
         (0..self.points.len() - 1).map(interval).collect()
     }
 
-    /// The instability of the loop at `count` values in each interval, its ends included: the worst,
-    /// with the value of the variable.
+    /// The worst instability of the loop at the values that divide each interval into `count` equal parts, with its
+    /// ends, and the value of the variable there.
     pub(crate) fn worst(&self, count: u32, domain: Domain) -> Result<(f64, f64), Error> {
         let mut worst = (f64::NEG_INFINITY, self.at[0]);
         for k in 0..self.points.len() - 1 {

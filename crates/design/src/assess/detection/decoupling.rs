@@ -149,7 +149,8 @@ impl Problem {
         self.faults.clone().map(shift).collect()
     }
 
-    /// The filter for `fault`: of the other faults as many as possible are decoupled, in this order.
+    /// The filter for `fault`: `base` that also decouples each of `others` in turn, exactly or else as a random walk,
+    /// except those whose decoupling leaves no trace of `fault`. `shift`: the steady mean of `fault` in `base`.
     pub(super) fn isolating(
         &self,
         base: &Decoupling,

@@ -32,7 +32,8 @@ fn validation(log: &Log) -> Range<usize> {
     estimation(log).end..log.record.len()
 }
 
-/// The squared errors of predictions over `horizon`, a row for each measurement, relative to the variance of the samples.
+/// The mean squared error of predictions `horizon` samples ahead, relative to the variance of the samples, for each
+/// measurement; on the part of the logs that was not used to estimate.
 pub(super) fn relative_errors(
     logs: &[Log],
     model: &IdentifiedModel,
