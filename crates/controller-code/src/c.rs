@@ -75,14 +75,17 @@ impl Source<'_> {
         }
     }
 
-    /// A number with the suffix of its type.
+    /// A number with the suffix of its type; the largest number for infinity, which stands for no limit.
     fn literal(&self, value: f64) -> String {
-        let suffix = if self.request.precision == Precision::Single { "F" } else { "" };
-        let most = if self.request.precision == Precision::Single { "FLT_MAX" } else { "DBL_MAX" };
-        if value.is_infinite() {
-            return format!("{}{most}", if value < 0.0 { "-" } else { "" });
+        let (suffix, largest) = match self.request.precision {
+            Precision::Double => ("", "DBL_MAX"),
+            Precision::Single => ("F", "FLT_MAX"),
+        };
+        match value {
+            f64::INFINITY => largest.to_owned(),
+            f64::NEG_INFINITY => format!("-{largest}"),
+            value => format!("{}{suffix}", self.request.precision.literal(value)),
         }
-        format!("{}{suffix}", self.request.precision.literal(value))
     }
 
     fn count(&self, kind: Kind) -> String {
@@ -190,10 +193,4 @@ pub(super) fn wrapped(numbers: impl Iterator<Item = String>, indent: &str) -> Ve
         }
     }
     lines
-}
-
-fn finished(lines: &[String]) -> String {
-    let mut text = lines.join("\n");
-    text.push('\n');
-    text
 }

@@ -13,7 +13,7 @@ use super::fields::Fields;
 use super::rounding::RoundingBound;
 use super::summary::{Vocabulary, summary};
 use super::symbols::Kind;
-use super::text::ascii;
+use super::text::{ascii, file_text};
 use super::{Precision, Request};
 
 /// What every function of this file renders from.
@@ -141,8 +141,6 @@ impl Source<'_> {
         self.structures(&mut lines);
         self.start(&mut lines);
         self.step(&mut lines);
-        let mut text = lines.join("\n");
-        text.push('\n');
-        text
+        file_text(&lines)
     }
 }

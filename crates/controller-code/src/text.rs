@@ -1,7 +1,14 @@
-//! Lines of comments: paragraphs, columns, ASCII.
+//! The text of a file, and lines of comments: paragraphs, columns, ASCII.
 
 /// The longest line of a paragraph.
 const WIDTH: usize = 92;
+
+/// The text of a file of these lines.
+pub(super) fn file_text(lines: &[String]) -> String {
+    let mut text = lines.join("\n");
+    text.push('\n');
+    text
+}
 
 /// Breaks a paragraph into lines.
 pub(super) fn filled(paragraph: &str) -> Vec<String> {

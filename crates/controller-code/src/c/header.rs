@@ -1,11 +1,12 @@
 //! The header: the description, the types, the functions.
 
-use super::{Source, finished};
+use super::Source;
 use crate::detection::Method;
 use crate::rounding::RoundingBound;
 use crate::summary::summary;
 use crate::symbols::{Kind, Vector};
 use crate::tables::stored;
+use crate::text::file_text;
 
 impl Source<'_> {
     pub(super) fn header(&self, bound: Option<&RoundingBound>) -> String {
@@ -97,7 +98,7 @@ impl Source<'_> {
             String::new(),
             format!("#endif /* {capital}_H */"),
         ]);
-        finished(&lines)
+        file_text(&lines)
     }
 
     /// Numbers of signals, the sample time, bits of the status.

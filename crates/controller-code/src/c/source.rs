@@ -1,9 +1,10 @@
 //! The source file of a design: sizes, switches, tables, and the functions that the header declares.
 
-use super::{RUNTIME, Source, finished};
+use super::{RUNTIME, Source};
 use crate::arithmetic::Memory;
 use crate::symbols::Kind;
 use crate::tables::tables;
+use crate::text::file_text;
 
 impl Source<'_> {
     pub(super) fn implementation(&self) -> String {
@@ -36,7 +37,7 @@ impl Source<'_> {
         lines.extend([String::new(), format!("#include \"{RUNTIME}\"")]);
         self.starts(&mut lines);
         self.step(&mut lines);
-        finished(&lines)
+        file_text(&lines)
     }
 
     /// The functions with which an instance starts.
