@@ -123,8 +123,8 @@ impl Carrier {
         }
     }
 
-    /// Calls `call` with the filter at `estimate`, and stores the result there.
-    fn with<T>(
+    /// Updates `estimate` by `call` on the filter; an error of the call does not change it.
+    fn update<T>(
         &self,
         estimate: &mut Estimate,
         call: impl FnOnce(
@@ -151,7 +151,7 @@ impl Carrier {
         prediction: &Prediction<'_>,
     ) -> Result<(), Failure> {
         let step = self.design.sample_time / f64::from(prediction.steps);
-        self.with(estimate, |filter, plant| {
+        self.update(estimate, |filter, plant| {
             plant.u.copy_from_slice(prediction.u);
             (plant.time, plant.step, plant.steps) = (prediction.time, step, prediction.steps);
             filter.predict(plant, prediction.transform)
@@ -164,7 +164,7 @@ impl Carrier {
         estimate: &mut Estimate,
         sample: &Sample<'_>,
     ) -> Result<f64, Failure> {
-        self.with(estimate, |filter, plant| {
+        self.update(estimate, |filter, plant| {
             plant.u.copy_from_slice(sample.u);
             plant.time = sample.time;
             let is_due = |k: usize| sample.number % f64::from(sample.every[k]) < 0.5;

@@ -47,8 +47,17 @@ fn inputs(design: &KalmanDesign) -> Vec<Variable> {
     measurements.chain(commands).collect()
 }
 
-/// Of each element of z: name of its estimate, of its deviation and of its start, meaning, unit.
-fn elements(design: &KalmanDesign) -> Vec<([String; 3], String, Option<String>)> {
+/// An element of z.
+struct Element {
+    /// The names of its estimate, of the standard deviation and of the initial estimate.
+    estimate: String,
+    deviation: String,
+    initial: String,
+    meaning: String,
+    unit: Option<String>,
+}
+
+fn elements(design: &KalmanDesign) -> Vec<Element> {
     let (n, q) = (design.states.len(), design.fault_states());
     let states = design.states.iter().map(Signal::label);
     let states = states.map(|label| (label.meaning.to_owned(), label.unit.cloned()));
@@ -68,7 +77,16 @@ fn elements(design: &KalmanDesign) -> Vec<([String; 3], String, Option<String>)>
                 .map(|suffix| channel(&format!("{letter}{suffix}"), k, count))
         })
     });
-    names.zip(states.chain(faults)).map(|(names, (text, unit))| (names, text, unit)).collect()
+    names
+        .zip(states.chain(faults))
+        .map(|([estimate, deviation, initial], (meaning, unit))| Element {
+            estimate,
+            deviation,
+            initial,
+            meaning,
+            unit,
+        })
+        .collect()
 }
 
 fn estimates(design: &KalmanDesign) -> Vec<Variable> {
@@ -81,14 +99,14 @@ fn estimates(design: &KalmanDesign) -> Vec<Variable> {
         .collect();
     let output = |variable: Variable| variable.output(&[]).discrete().initially(known.clone());
     let mut all = Vec::new();
-    for (k, ([name, ..], text, unit)) in elements(design).into_iter().enumerate() {
-        let text = format!("Estimate of {text}");
-        let variable = Variable::real(name, text, move |model| &mut model.estimate.mean[k]);
+    for (k, Element { estimate, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
+        let text = format!("Estimate of {meaning}");
+        let variable = Variable::real(estimate, text, move |model| &mut model.estimate.mean[k]);
         all.push(output(with_unit(variable, unit.as_ref())));
     }
-    for (k, ([_, name, _], text, unit)) in elements(design).into_iter().enumerate() {
-        let text = format!("Standard deviation of the estimate of {text}");
-        let variable = Variable::real(name, text, move |model| &mut model.deviations[k]);
+    for (k, Element { deviation, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
+        let text = format!("Standard deviation of the estimate of {meaning}");
+        let variable = Variable::real(deviation, text, move |model| &mut model.deviations[k]);
         all.push(output(with_unit(variable, unit.as_ref())));
     }
     let text = "Square of the innovation relative to its covariance; on average the number of measurements";
@@ -121,9 +139,9 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
             Variable::integer(channel("every", k, p), text, move |model| &mut model.every[k]);
         all.push(every.range(1.0, 1e6).parameter());
     }
-    for (k, ([.., name], text, unit)) in elements(design).into_iter().enumerate() {
-        let text = format!("Estimate of {text} before the first sample");
-        let variable = Variable::real(name, text, move |model| &mut model.initial[k]);
+    for (k, Element { initial, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
+        let text = format!("Estimate of {meaning} before the first sample");
+        let variable = Variable::real(initial, text, move |model| &mut model.initial[k]);
         all.push(with_unit(variable, unit.as_ref()).parameter());
     }
     all
