@@ -139,6 +139,7 @@ pub(crate) fn faults(
     Ok(all)
 }
 
+/// Reads a fault; without an entry point it enters by `column` of F_a, from 0.
 fn fault(
     entry: &Entry<'_>,
     actuators: &[Signal],
@@ -148,8 +149,7 @@ fn fault(
     let table = entry.table()?;
     table.allow(&FAULT)?;
     let entry_point = entry_point(&table, actuators, measurements, column)?;
-    let own_unit = unit(&table)?;
-    let unit = own_unit.or_else(|| match entry_point {
+    let unit = unit(&table)?.or_else(|| match entry_point {
         EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
             actuators[at].unit.clone()
         }

@@ -42,7 +42,7 @@ pub(crate) struct LinearPlant {
     pub(crate) faults: Vec<Fault>,
     /// The time domain of the matrices.
     pub(crate) domain: Domain,
-    /// The fault models, in the same order.
+    /// The models of `faults`, in the same order.
     pub(crate) models: Vec<Model>,
     /// The disturbances of the file.
     pub(crate) disturbances: Vec<UnknownInput>,
@@ -319,8 +319,8 @@ fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = Strin
     })
 }
 
-/// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`; those of an
-/// FMU are the last columns of `matrices`.
+/// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`. Disturbances that are
+/// inputs of an FMU act by the last columns of F and G in `matrices`.
 fn disturbances(
     file: &PlantFile<'_>,
     b: &DMatrix<f64>,
@@ -328,7 +328,8 @@ fn disturbances(
     matrices: Option<&Delayed>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
     let columns = matrices.map_or(0, |matrices| matrices.f.ncols());
-    let mut next = columns - disturbance_inputs(file).count().min(columns)..;
+    let first = columns - disturbance_inputs(file).count().min(columns);
+    let mut input_columns = first..;
     let (n, p) = (b.nrows(), d.nrows());
     let one = |disturbance: &Disturbance| {
         let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
@@ -340,7 +341,7 @@ fn disturbances(
             (DisturbanceEntry::Sensor(at), _) => on_measurements[*at] = 1.0,
             (DisturbanceEntry::Input(_), None) => {}
             (DisturbanceEntry::Input(_), Some(matrices)) => {
-                let at = next.next().unwrap_or_default();
+                let at = input_columns.next().unwrap_or_default();
                 (on_states, on_measurements) = (column(&matrices.f, at), column(&matrices.g, at));
             }
         }
