@@ -58,8 +58,9 @@ fn kinds_of_feedback(design: &Design, limited: bool) -> [DependencyKind; 2] {
     }
 }
 
-/// x_hat, f_hat, x_i and r, from which commands are computed; with a direct term also what the innovation
-/// is computed from, and then the factor of x_hat changes with the compensation, too.
+/// The dependencies of K_x x_hat + K_f f_hat + K_i x_i + N_r r: f_hat is of kind `fault`, the others are of kind
+/// `state`. With a direct term P_f, f_hat depends on x_hat and on the signals of the innovation, whose factors then
+/// change with the compensation: both are of kind `fault`, too.
 fn of_law(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
     let estimate = if design.p_f.is_some() { fault } else { state };
     let mut groups = vec![(estimate, x_hat(design)), (fault, f_hat(design))];
@@ -69,7 +70,7 @@ fn of_law(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
     groups
 }
 
-/// What all commands are computed from: the same and u_t.
+/// The dependencies of all commands: those of [`of_law`] and u_t.
 fn of_feedback(design: &Design, kinds: [DependencyKind; 2]) -> Vec<Group> {
     let mut groups = of_law(design, kinds);
     groups.extend(transfers(design, true));
@@ -337,7 +338,7 @@ pub(crate) fn of_initial_fault(design: &Design, i: usize) -> Vec<String> {
     by_schedule(design, names)
 }
 
-/// The dependencies of the initial value of element `i` of z.
+/// The dependencies of the initial value of element `i` of z = [x_hat; f_hat; y_f; x_i; u_t].
 pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i >= design.transfer_at(0) {
@@ -358,6 +359,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
             names.extend(switches());
             names.push("monitor".to_owned());
             names.extend(row("L_f", &design.l_f, i - n));
+            // rho and delta of this fault.
             names.extend(sliding_mode(design).skip(i - n).step_by(q));
         }
         return by_schedule(design, names);

@@ -109,8 +109,8 @@ impl Sampler {
     }
 
     /// Takes the next sample, `offset` s after the measurements in `values` were given: computes z, e
-    /// and u, and the prediction for the sample after it. `mode` has the switches; the result has the
-    /// limits, too.
+    /// and u, and the prediction for the sample after it. Returns `mode` with the commands that are now
+    /// at a limit.
     pub(crate) fn sample(
         &mut self,
         design: &Design,

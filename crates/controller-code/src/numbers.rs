@@ -167,12 +167,12 @@ signals! {
 pub(super) struct Vectors<N>([Vec<N>; 17]);
 
 impl<N: Number> Vectors<N> {
-    /// All of them zero.
+    /// The vectors with all elements zero.
     pub(super) fn zero(controller: &Controller) -> Self {
         Self(SIGNALS.map(|vector| vec![N::zero(); vector.length(controller)]))
     }
 
-    /// One of them; empty for a vector that is none of `sample::Signals`.
+    /// The elements of `vector`; empty if it is none of `sample::Signals`.
     pub(super) fn get_mut(&mut self, vector: Vector) -> &mut [N] {
         let place = SIGNALS.iter().position(|signal| *signal == vector);
         place.and_then(|place| self.0.get_mut(place)).map_or(&mut [], |values| values)

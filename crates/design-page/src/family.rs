@@ -181,7 +181,7 @@ fn state_names(report: &Report) -> Vec<String> {
     report.plant.states.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// The integrals of the distances from references.
+/// The names of x_i, the integrals of r - H y: the columns of K_i are the references.
 fn integral_names(report: &Report) -> Vec<String> {
     let k_i = report.gains.iter().find(|gain| gain.name == "K_i");
     let names = k_i.iter().flat_map(|gain| &gain.columns);

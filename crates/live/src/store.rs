@@ -14,7 +14,7 @@ const VALUES: usize = 1_000_000;
 const MESSAGES: usize = 1000;
 /// Largest number of signals sent at once.
 pub(crate) const SHOWN: usize = 32;
-/// A page that has not asked for this time is closed.
+/// A page that has sent no request for longer than this counts as closed.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The state of a run at a communication point.

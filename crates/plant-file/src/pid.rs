@@ -45,7 +45,7 @@ pub struct Pair {
 }
 
 impl Pid {
-    /// Reads the entries, if there are any; `corner` is that of the filters, in rad/s.
+    /// Reads `structure` and `pairs` of `[loop]`; `None` if neither is stated. `corner`: w of the filters, in rad/s.
     pub(crate) fn read(
         file: &Table<'_>,
         table: &Table<'_>,

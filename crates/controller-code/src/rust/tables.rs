@@ -156,6 +156,7 @@ fn of_set<T, const N: usize>(table: &[[T; N]; GAIN_SETS], set: u32) -> &[T] {{
     }
 }
 
+/// Adds a static list; `head` is its name and type.
 fn list(lines: &mut Vec<String>, head: &str, values: impl Iterator<Item = String>) {
     lines.push(format!("\nstatic {head} = ["));
     lines.extend(wrapped(values, "    "));

@@ -38,7 +38,7 @@ const CANDIDATES: [(f64, f64); 18] = [
 /// From this number of states on, only the first candidates are examined, without the tolerances.
 const LARGE: usize = 24;
 const OF_LARGE: usize = 3;
-/// Candidates that are examined at the same time: fixed, so that the result is that of every machine.
+/// Number of candidates that are examined in parallel; fixed, so that the result is the same on every machine.
 const TOGETHER: usize = 3;
 /// Eigenvalues smaller than this part of the largest one have no speed.
 const NO_SPEED: f64 = 1e-9;

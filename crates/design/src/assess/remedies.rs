@@ -114,7 +114,7 @@ struct Trial {
     distance: f64,
 }
 
-/// One loop, or both, slower or faster.
+/// The variants of `file` with one loop, or both, slower or faster by each of [`FACTORS`].
 fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
     let with_factor = |factor: f64| {
         let observer = scaled("observer", "V", &file.observer.requirement, factor);

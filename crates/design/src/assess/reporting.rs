@@ -66,7 +66,8 @@ pub(crate) struct Assessment<'a> {
 }
 
 impl<'a> Assessment<'a> {
-    /// A design with the plants whose parameters vary; without certificates and bounds.
+    /// A design without description, detection, reconfiguration and fall-back, and with no time for certificates and
+    /// bounds.
     pub(crate) fn new(
         file: &'a PlantFile<'a>,
         parameters: Option<&'a ParameterFamily<'a>>,

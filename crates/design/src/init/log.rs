@@ -111,7 +111,7 @@ fn notes(logs: &[Log], estimate: &Estimate, fits: &[Fit]) -> Vec<String> {
     notes
 }
 
-/// Eight digits, which are more than an identification determines.
+/// Rounds to eight significant digits, which are more than an identification determines.
 fn rounded(value: f64) -> f64 {
     format!("{value:.7e}").parse().unwrap_or(value)
 }

@@ -132,7 +132,7 @@ impl GainChoice {
 }
 
 impl GainResult {
-    /// The result with another gain.
+    /// Replaces the gain by `map` of it; the gains in `choice` stay.
     pub(crate) fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self { gain: map(&self.gain), ..self }
     }

@@ -13,8 +13,8 @@ const PER_DECADE: u32 = 200;
 /// A peak of S that is larger by this factor with the delays themselves is a reason of the verdict.
 const LARGER: f64 = 1.05;
 
-/// Compares the stable loop of the judgement, whose peaks are those of `points`, with that of the delays themselves; none
-/// without delays.
+/// Compares `closed`, the stable loop with delays of [`JUDGED`] states each, with the loop with the delays themselves,
+/// at a grid of frequencies and at the peaks of S in `points`; `None` without delays.
 pub(super) fn exact(
     designed: &Solution,
     closed: &Loop,
