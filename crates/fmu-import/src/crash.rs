@@ -383,7 +383,8 @@ pub fn calls() -> Vec<Call> {
     place::calls(0).collect()
 }
 
-/// Returns the call of an FMU that this thread executes.
+/// Returns the call of an FMU that this thread executes. In a thread that executes none, for example one that an FMU
+/// started, returns the first call of any instance.
 #[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
 pub(crate) fn call_of_this_thread() -> Option<Call> {
     place::calls(last_of_this_thread()).next()

@@ -149,7 +149,7 @@ impl Grid {
         }
     }
 
-    /// Returns the stop time in s.
+    /// Returns the end of the run in s: the stop time or, before it, the end given by [`EarlyEnd`].
     pub(crate) fn stop(&self) -> Option<f64> {
         self.stop
     }

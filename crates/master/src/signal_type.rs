@@ -29,8 +29,8 @@ impl fmt::Display for SignalType {
 }
 
 impl SignalType {
-    /// Returns the type of a variable by its description: clocked if it has clocks, discrete if it is no floating-point
-    /// number or if its variability is not continuous.
+    /// Returns the type of a variable by its description: clocked if it is a clock or has clocks, discrete if it is no
+    /// floating-point number or if its variability is not continuous.
     #[must_use]
     pub fn of(variable: &ScalarVariable) -> Self {
         let is_real = ValueType::of(&variable.kind) == ValueType::Real;

@@ -198,23 +198,24 @@ impl System {
     }
 
     /// Connects a free output to a free input of another FMU if each is the only free one with its
-    /// unit; returns the new connections.
+    /// unit, which must not be dimensionless; returns the new connections.
     ///
     /// # Errors
     ///
-    /// Returns an error if [`System::connect`] does.
+    /// Same as [`System::connect_ports`].
     pub fn connect_equal_units(&mut self) -> Result<Vec<Connection>, SystemError> {
         let before = self.connections.len();
         let (outputs, inputs) = (self.free_outputs(), self.free_inputs());
         let unit = |port: Port| self.dimension(port).map(str::to_owned);
-        let units: Vec<_> = inputs.iter().map(|&input| unit(input)).collect();
-        let sources: Vec<_> = outputs.iter().map(|&output| unit(output)).collect();
-        for (&to, unit) in inputs.iter().zip(&units) {
+        let input_units: Vec<_> = inputs.iter().map(|&input| unit(input)).collect();
+        let output_units: Vec<_> = outputs.iter().map(|&output| unit(output)).collect();
+        for (&to, unit) in inputs.iter().zip(&input_units) {
             let same = |other: &&Option<String>| unit.is_some() && *other == unit;
-            if units.iter().filter(same).count() != 1 || sources.iter().filter(same).count() != 1 {
+            let is_single = |units: &[Option<String>]| units.iter().filter(same).count() == 1;
+            if !is_single(&input_units) || !is_single(&output_units) {
                 continue;
             }
-            let from = sources.iter().position(|other| other == unit).map(|at| outputs[at]);
+            let from = output_units.iter().position(|other| other == unit).map(|at| outputs[at]);
             if let Some(from) = from.filter(|from| from.slave != to.slave) {
                 self.connect_ports(from, to, Transformation::Identity, false)?;
             }

@@ -75,7 +75,7 @@ pub enum Verdict {
     },
     /// The step must be repeated from its start.
     Rejected {
-        /// Size of the repeated step in s, at most half of the rejected one.
+        /// Size of the repeated step in s: at most half of the rejected one, but at least the smallest step.
         retry: f64,
     },
     /// The smallest step does not meet the tolerance.

@@ -140,7 +140,8 @@ impl Binder<'_> {
         self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
     }
 
-    /// Applies one parameter to every variable that the target name matches.
+    /// Applies one parameter to every variable and connector with the target name of `entry`; adds the name to
+    /// `unmatched` if there is none.
     fn apply(
         &mut self,
         node: usize,
@@ -226,6 +227,7 @@ impl Binder<'_> {
         self.set_variable(&first.from.clone(), &Value::new(number, measure))
     }
 
+    /// Adds the setting of a variable of an FMU, or replaces an earlier one; warns if the variable cannot be set.
     fn set_variable(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let (tree, name) = (self.tree, self.tree.name(target));
         let Some(variable) = tree.variable(target) else {

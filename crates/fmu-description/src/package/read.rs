@@ -266,7 +266,7 @@ fn is_needed(name: &str) -> bool {
 ///
 /// # Errors
 ///
-/// Same as [`Unpacked::open`], except those about the content of the archive.
+/// Same as [`Unpacked::open`], but the archive needs no `modelDescription.xml`.
 pub fn unpack_archive(path: &Path) -> Result<(TemporaryFolder, Vec<String>), PackageError> {
     let mut archive = Archive::open(path)?;
     let folder = folder()?;

@@ -24,7 +24,7 @@ pub(crate) struct Entry {
     first: u32,
     /// Number of elements.
     count: u32,
-    /// Whether the variable is calculated, and has the value of one that may be set.
+    /// Whether the variable is calculated: it has the value of another variable and no start value.
     is_calculated: bool,
 }
 
@@ -65,7 +65,7 @@ impl Table {
         variables(self) == variables(other)
     }
 
-    /// Checks that no variable is calculated whose value that of another variable is.
+    /// Checks that the variables may be set: none is calculated from another one with the same value.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ impl Table {
         }
     }
 
-    /// Appends the value references of FMI 2.0 of all elements of the variables to `places`, in
+    /// Replaces the content of `places` by the value references of FMI 2.0 of all elements of the variables, in
     /// row-major order.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ impl Table {
         ))
     }
 
-    /// Returns the number of elements of each of the variables.
+    /// Returns the number of elements of each variable; 0 for an unknown value reference.
     pub(crate) fn sizes(&self, references: &[u32]) -> impl Iterator<Item = u32> {
         references
             .iter()

@@ -44,8 +44,8 @@ macro_rules! slots {
         }
 
         impl<M> Slots<M> {
-            /// Appends a variable: `build` makes its slot in a list and returns the position. Returns its
-            /// description and the position.
+            /// Appends the slot that `builder` builds to the list of its type. Returns the description of the
+            /// variable and the position of the slot.
             ///
             /// # Errors
             ///

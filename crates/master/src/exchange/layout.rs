@@ -38,8 +38,8 @@ pub(super) struct PortMap {
 }
 
 impl PortMap {
-    /// Builds the request of a step from the `values` of all inputs, and the input derivatives, output
-    /// values and output derivatives of the slave.
+    /// Builds the request of a step of this slave. `values` are those of the inputs of all slaves; the other slices
+    /// belong to this slave.
     #[inline]
     pub(super) fn request<'a>(
         &'a self,
@@ -127,8 +127,8 @@ impl Layout {
         layout
     }
 
-    /// Collects every connected Real output once, slave by slave, and then the Integers connected
-    /// to Reals.
+    /// Collects every output that passes as a Real ([`Way::Real`]) once: the Real outputs slave by slave, then the
+    /// Integer outputs.
     fn collect_outputs(&mut self, system: &System) {
         let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         let mut integers = Vec::new();
@@ -137,6 +137,7 @@ impl Layout {
             if Way::of(system, connection) != Way::Real {
                 continue;
             }
+            // 0 until `add_output` sets the index.
             if self.indices.insert(from, 0).is_some() {
                 continue;
             }

@@ -147,8 +147,8 @@ pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     }
 }
 
-/// Checks that a declared type exists and has the variable's kind, and that the variable keeps to
-/// its range.
+/// Checks the declared type of a variable, which an Enumeration must have: that the type exists, has the variable's
+/// kind, and includes the range of the variable or, of an Enumeration, the start value.
 fn check_declared_type(
     variable: &ScalarVariable,
     types: &HashMap<&str, &SimpleType>,
