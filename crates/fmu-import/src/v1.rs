@@ -19,8 +19,8 @@ use slave::{CallError, EventInfo, ValueType};
 pub(crate) struct Instance {
     pub(crate) component: Component,
     experiment: Experiment,
-    /// Whether the FMU has been initialised and no step has been made: then only inputs can be set.
-    settled: bool,
+    /// Whether the master is in initialization mode: the FMU is initialised already, and only inputs can be set.
+    in_initialization_mode: bool,
     /// The inputs: type and value reference.
     inputs: HashSet<(ValueType, u32)>,
     /// Value references of variables whose sign differs from that of their FMU's value reference
@@ -76,7 +76,7 @@ impl Instance {
         Self {
             component,
             experiment: Experiment { start_time: 0.0, stop_time: None, tolerance: None },
-            settled: false,
+            in_initialization_mode: false,
             inputs: inputs.collect(),
             negated,
             references: Vec::new(),
@@ -89,11 +89,11 @@ impl Instance {
         }
     }
 
-    /// Whether the FMU takes the values: between initialization and first step only those of inputs.
+    /// Whether the FMU takes the values: in initialization mode only if all of them are values of inputs.
     /// The master repeats settings there; the FMU has them already.
     fn takes(&mut self, kind: ValueType, references: &[u32]) -> bool {
         self.initialized = None;
-        !self.settled
+        !self.in_initialization_mode
             || references.iter().all(|reference| self.inputs.contains(&(kind, *reference)))
     }
 
@@ -110,12 +110,12 @@ impl Instance {
                 self.initialized = Some(self.component.initialize_model(tolerance)?);
             }
         }
-        self.settled = true;
+        self.in_initialization_mode = true;
         Ok(())
     }
 
     pub(crate) fn exit_initialization_mode(&mut self) {
-        self.settled = false;
+        self.in_initialization_mode = false;
     }
 
     /// Returns the description, in which negated aliases have value references of their own.

@@ -132,8 +132,8 @@ impl Place {
         &self.instance
     }
 
-    /// Notes an error of the instance, and returns it.
-    pub(crate) fn failed(&self, error: CallError) -> CallError {
+    /// Notes an error of the instance for a crash report, and returns it.
+    pub(crate) fn note_failure(&self, error: CallError) -> CallError {
         if !matches!(error.failure, Failure::Status(Status::Discard | Status::Pending)) {
             super::note(format!("{}: {error}", self.instance));
         }

@@ -229,7 +229,7 @@ impl Isolated {
         self.wait_for_answer(function)?;
         match self.values(read) {
             Some(values) => Ok(values),
-            None => Err(self.received_error(function)),
+            None => Err(self.receive_error(function)),
         }
     }
 

@@ -46,7 +46,7 @@ impl Isolated {
 
     /// Returns the error that the worker sent as the answer to `function`.
     #[cold]
-    pub(super) fn received_error(&mut self, function: Function) -> CallError {
+    pub(super) fn receive_error(&mut self, function: Function) -> CallError {
         match self.receive::<()>(function) {
             Ok(()) => self.invalid_answer(function),
             Err(error) => error,

@@ -207,6 +207,6 @@ impl<F: Copy> Base<F> {
     /// Returns the error of a call, with the instance's recent messages.
     #[cold]
     pub(super) fn failed(&self, function: &'static str, failure: Failure) -> CallError {
-        self.place.failed(CallError { function, failure, messages: self.sink.take() })
+        self.place.note_failure(CallError { function, failure, messages: self.sink.take() })
     }
 }

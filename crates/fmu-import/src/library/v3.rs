@@ -163,7 +163,7 @@ impl Library {
 /// library stays loaded until then.
 pub(crate) struct Component {
     pub(crate) base: Base<Functions>,
-    /// The courses of the inputs within the present step.
+    /// The polynomials of the inputs within the present step.
     inputs: Box<Inputs>,
 }
 

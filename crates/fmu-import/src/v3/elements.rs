@@ -164,7 +164,7 @@ fn free_references(description: &ModelDescription, count: usize) -> u32 {
     used.sort_unstable();
     used.dedup();
     let count = u32::try_from(count).unwrap_or(u32::MAX);
-    // References above the largest one, else the first gap that is wide enough.
+    // References above the largest one, else the first gap that is wide enough, else those below the smallest one.
     let largest = used.last().copied().unwrap_or(0);
     if largest < u32::MAX - count {
         return largest + 1;
@@ -215,7 +215,7 @@ struct Builder {
     view: ElementView,
     /// For each array, by value reference, its first cell.
     first_cell: HashMap<u32, usize>,
-    /// For each variable of the FMU, the position and number of its elements in the new description.
+    /// For each variable of the FMU, the position of its first element in the new description and their number.
     ranges: Vec<(usize, usize)>,
 }
 
@@ -345,7 +345,8 @@ impl Builder {
         Ok(self.view)
     }
 
-    /// Returns position and number of the elements of the variable with the 1-based index `index`.
+    /// Returns the position of the first element and the number of elements, in the new description, of the variable
+    /// with the 1-based index `index`.
     fn range(&self, index: u32) -> Option<(usize, usize)> {
         self.ranges.get((index as usize).checked_sub(1)?).copied()
     }
