@@ -105,7 +105,7 @@ fn parameter_set(node: &Node) -> Result<ParameterSet, SspError> {
 }
 
 fn parameter(node: &Node) -> Result<Parameter, SspError> {
-    let mut values = node.own_children().filter_map(|child| parameter_value(child).transpose());
+    let mut values = node.ssp_children().filter_map(|child| parameter_value(child).transpose());
     let expected = "one of Real, Integer, Boolean, String, Enumeration and Binary";
     let value = values.next().ok_or_else(|| node.wrong(expected, "none of them"))??;
     if values.next().is_some() {

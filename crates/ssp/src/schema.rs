@@ -87,7 +87,7 @@ fn visit(node: &Node, findings: &mut Findings) {
         }
     }
     let mut lists: Vec<&str> = Vec::new();
-    for child in node.own_children() {
+    for child in node.ssp_children() {
         let known = child.name.as_str();
         if !children.iter().any(|list| list.contains(&known)) {
             let sentence = format!("<{name}> has the element <{known}>, which is skipped");

@@ -253,7 +253,7 @@ impl Node {
     }
 
     /// Returns the children in SSP namespaces.
-    pub(super) fn own_children(&self) -> impl Iterator<Item = &Node> {
+    pub(super) fn ssp_children(&self) -> impl Iterator<Item = &Node> {
         self.children.iter().filter(|child| child.is_ssp)
     }
 
@@ -263,7 +263,7 @@ impl Node {
     }
 
     pub(super) fn children_named(&self, name: &str) -> impl Iterator<Item = &Node> {
-        self.own_children().filter(move |child| child.name == name)
+        self.ssp_children().filter(move |child| child.name == name)
     }
 
     /// Returns the child called `name`; more than one is an error.

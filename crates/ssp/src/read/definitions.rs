@@ -47,7 +47,7 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
 /// Reads the type that a child element states.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     let mut stated = None;
-    for child in node.own_children() {
+    for child in node.ssp_children() {
         let kind = match child.name.as_str() {
             "Real" | "Float64" | "Float32" => Type::Real(child.stated("unit")),
             "Integer" | "Int8" | "UInt8" | "Int16" | "UInt16" | "Int32" | "UInt32" | "Int64"
@@ -94,7 +94,7 @@ fn clocked(node: &Node) -> Option<Type> {
 /// Reads the transformation in a child element and `suppressUnitConversion`.
 pub(super) fn conversion(node: &Node) -> Result<Conversion, SspError> {
     let mut transformation = None;
-    for child in node.own_children().filter(|child| child.name.ends_with("Transformation")) {
+    for child in node.ssp_children().filter(|child| child.name.ends_with("Transformation")) {
         if transformation.is_some() {
             return Err(node.wrong("one transformation", "two"));
         }

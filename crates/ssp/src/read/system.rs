@@ -15,7 +15,7 @@ const OPEN_SIMULATION_PLATFORM: &str = "com.opensimulationplatform";
 
 pub(super) fn system(node: &Node) -> Result<System, SspError> {
     let mut elements = Vec::new();
-    for child in node.child("Elements")?.into_iter().flat_map(Node::own_children) {
+    for child in node.child("Elements")?.into_iter().flat_map(Node::ssp_children) {
         elements.push(match child.name.as_str() {
             "Component" => Element::Component(component(child)?),
             "System" => Element::System(system(child)?),
@@ -212,7 +212,7 @@ pub(super) fn experiment(node: &Node) -> Result<DefaultExperiment, SspError> {
 
 /// Returns the annotation of the Open Simulation Platform.
 fn annotation(node: &Node) -> Result<Option<&Node>, SspError> {
-    let list = node.child("Annotations")?.into_iter().flat_map(Node::own_children);
+    let list = node.child("Annotations")?.into_iter().flat_map(Node::ssp_children);
     let is_theirs =
         |annotation: &&Node| annotation.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);
     Ok(list.into_iter().find(is_theirs))
