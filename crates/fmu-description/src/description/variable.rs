@@ -206,9 +206,6 @@ impl ScalarVariable {
 
 /// Returns the product of the extents, at most `usize::MAX`.
 fn elements(extents: &[u64]) -> usize {
-    if extents.contains(&0) {
-        return 0;
-    }
     let product = extents.iter().fold(1_u64, |product, extent| product.saturating_mul(*extent));
     usize::try_from(product).unwrap_or(usize::MAX)
 }

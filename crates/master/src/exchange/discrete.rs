@@ -143,6 +143,14 @@ impl<T: Clone> ChannelState<T> {
         self.start.clone_from(&other.start);
         self.inputs.clone_from(&other.inputs);
     }
+
+    /// Returns the source value of the input at index `k`: the value at the start of the source's
+    /// step if the source is `ahead`, otherwise the latest one.
+    fn source(&self, wiring: &Wiring, k: usize, ahead: &dyn Fn(usize) -> bool) -> &T {
+        let source = wiring.sources[k];
+        let slave = wiring.output_ports[source].slave;
+        if ahead(slave) { &self.start[source] } else { &self.latest[source] }
+    }
 }
 
 impl Wiring {
@@ -185,7 +193,7 @@ impl Wiring {
 }
 
 impl<T: Clone + Default> Channel<T> {
-    /// Lays out `connections`, and the additional outputs `more`.
+    /// Creates the channel of `connections`, which also reads the outputs `more`.
     pub(crate) fn new(
         system: &System,
         access: Access<T>,
@@ -227,11 +235,8 @@ impl<T: Clone + Default> Channel<T> {
         for k in 0..self.wiring.faults.len() {
             if self.wiring.faults[k].is_some() {
                 let mut value = T::default();
-                (self.access.map)(
-                    self.source(k, ahead),
-                    &self.wiring.transformations[k],
-                    &mut value,
-                );
+                let source = self.state.source(&self.wiring, k, ahead);
+                (self.access.map)(source, &self.wiring.transformations[k], &mut value);
                 let number = (self.access.number)(&value);
                 if let Some(fault) = &mut self.wiring.faults[k] {
                     fault.commit(time, number);
@@ -244,14 +249,6 @@ impl<T: Clone + Default> Channel<T> {
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
         let faults = self.wiring.faults.iter().flatten();
         faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
-    }
-
-    /// Returns the source value of the input at index `k`: the value at the start of the source's
-    /// step if the source is `ahead`, otherwise the latest one.
-    fn source(&self, k: usize, ahead: &dyn Fn(usize) -> bool) -> &T {
-        let source = self.wiring.sources[k];
-        let slave = self.wiring.output_ports[source].slave;
-        if ahead(slave) { &self.state.start[source] } else { &self.state.latest[source] }
     }
 
     /// Makes the end values of the last step the start values of the next one.
@@ -269,11 +266,8 @@ impl<T: Clone + Default> Channel<T> {
     /// contribute the value at the start of their step.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
         for k in self.wiring.port_maps[slave].input_range.clone() {
-            let source = self.wiring.sources[k];
-            let is_ahead = ahead(self.wiring.output_ports[source].slave);
-            let value =
-                if is_ahead { &self.state.start[source] } else { &self.state.latest[source] };
-            (self.access.map)(value, &self.wiring.transformations[k], &mut self.values[k]);
+            let source = self.state.source(&self.wiring, k, ahead);
+            (self.access.map)(source, &self.wiring.transformations[k], &mut self.values[k]);
             if let Some(fault) = &self.wiring.faults[k] {
                 self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
             }
