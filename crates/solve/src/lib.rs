@@ -192,6 +192,7 @@ struct Convergence {
     residual: Vec<f64>,
     /// The weights of the first evaluation, kept so that residuals of one solution are comparable.
     weights: Vec<f64>,
+    /// The merit of the first evaluation.
     first: f64,
     /// `max_i |residual_i| / weights_i`.
     merit: f64,

@@ -44,13 +44,18 @@ pub struct Newton {
     /// `I - dG/du`, column by column, for unknowns divided by their nominals.
     matrix: Vec<f64>,
     factors: Factors,
+    /// Whether `factors` are usable: not before the first regular matrix, nor after [`Solver::forget`].
     known: bool,
-    /// Start of the last step; then its direction, its damping factor and the residual at its start.
+    /// The start u of the last step.
     base: Vec<f64>,
+    /// The direction d of the last step.
     direction: Vec<f64>,
+    /// The damping factor s of the last step.
     part: f64,
+    /// The merit ([`Convergence::merit`]) at the start of the last step.
     before: f64,
     stage: Stage,
+    /// The residual of the linear system, then its correction of the direction.
     left: Vec<f64>,
 }
 
@@ -131,6 +136,7 @@ impl Newton {
         }
     }
 
+    /// Writes `u + s d` to `u_next`.
     fn write_next(&self, u_next: &mut [f64]) -> Progress {
         for ((next, base), direction) in u_next.iter_mut().zip(&self.base).zip(&self.direction) {
             *next = base + self.part * direction;

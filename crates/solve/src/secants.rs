@@ -77,7 +77,7 @@ impl Secants {
         });
     }
 
-    /// Adds the pair of `residual` and `g` minus the evaluation `before` and drops the oldest pair if no
+    /// Adds the differences of `residual` and `g` from those of the evaluation `before`; drops the oldest pair if no
     /// slot is free.
     fn push(&mut self, residual: &[f64], g: &[f64], before: &(Vec<f64>, Vec<f64>)) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
@@ -105,7 +105,6 @@ impl Secants {
     }
 
     /// Computes `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
-    ///
     pub(super) fn apply(
         &mut self,
         residual: &[f64],

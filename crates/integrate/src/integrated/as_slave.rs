@@ -172,13 +172,13 @@ impl Slave for Integrated {
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         self.instance.save_state(slot)?;
-        self.save_own(slot);
+        self.save_integration(slot);
         Ok(())
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         self.instance.restore_state(slot)?;
-        self.restore_own(slot);
+        self.restore_integration(slot);
         Ok(())
     }
 

@@ -17,7 +17,8 @@ pub(super) struct Saved {
 }
 
 impl Integrated {
-    pub(super) fn save_own(&mut self, slot: usize) {
+    /// Saves the state of the integration in a slot; the FMU saves its own.
+    pub(super) fn save_integration(&mut self, slot: usize) {
         if self.saved.len() <= slot {
             self.saved.resize(slot + 1, Saved::default());
         }
@@ -28,8 +29,8 @@ impl Integrated {
         saved.tracks.clone_from(&self.inputs.tracks);
     }
 
-    /// Restores the state of a slot; an empty slot changes nothing.
-    pub(super) fn restore_own(&mut self, slot: usize) {
+    /// Restores the state of the integration from a slot; an empty slot changes nothing.
+    pub(super) fn restore_integration(&mut self, slot: usize) {
         let Some(saved) = self.saved.get(slot) else { return };
         let Some(point) = saved.point else { return };
         self.point = point;
@@ -40,6 +41,7 @@ impl Integrated {
         self.stepper.forget_slope();
     }
 
+    /// Returns the bytes of the state of the integration and of the state of the FMU.
     pub(super) fn serialize(&mut self) -> Result<Vec<u8>, CallError> {
         let saved = Saved {
             point: Some(Point { memory: self.stepper.memory, ..self.point }),
@@ -47,14 +49,15 @@ impl Integrated {
             indicators: self.indicators.clone(),
             tracks: self.inputs.tracks.clone(),
         };
-        let theirs = self.instance.serialize_state()?;
-        postcard::to_allocvec(&(saved, theirs))
+        let fmu_state = self.instance.serialize_state()?;
+        postcard::to_allocvec(&(saved, fmu_state))
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
+    /// Restores both states from bytes of [`Integrated::serialize`]. On failure the integration is unchanged.
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
-        let (saved, theirs) =
+        let (saved, fmu_state) =
             read.map_err(|error| failed(format!("cannot read a serialised state: {error}")))?;
         let fits = saved.point.is_some()
             && saved.states.len() == self.states.len()
@@ -64,10 +67,11 @@ impl Integrated {
             let what = "cannot read a serialised state: it is one of another FMU";
             return Err(failed(what.to_owned()));
         }
-        self.instance.deserialize_state(&theirs)?;
+        self.instance.deserialize_state(&fmu_state)?;
+        // In a temporary slot behind those of the master.
         let slot = self.saved.len();
         self.saved.push(saved);
-        self.restore_own(slot);
+        self.restore_integration(slot);
         self.saved.pop();
         Ok(())
     }
