@@ -199,8 +199,8 @@ fn role(variable: &Variable<'_>) -> TokenStream {
     }
 }
 
-/// All names of the variables of the fields, for a list.
-fn list<'a>(
+/// Generates an expression for a `Vec` with the names of the variables of `fields`, one for each element of an array.
+fn name_list<'a>(
     variables: &[Variable<'_>],
     fields: impl IntoIterator<Item = &'a Ident>,
 ) -> TokenStream {
@@ -227,12 +227,12 @@ fn dependencies(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStr
             variables.iter().filter(known).map(|other| other.field.clone()).collect()
         };
         let fields: Vec<Ident> = attributes.depends.clone().unwrap_or_else(all);
-        let names = list(variables, &fields);
+        let names = name_list(variables, &fields);
         let kind = quote!(::fmu::description::DependencyKind::Dependent);
         calls.extend(quote!(.depends(#kind, #names)));
     }
     if let Some(fields) = &attributes.initially {
-        let names = list(variables, fields);
+        let names = name_list(variables, fields);
         calls.extend(quote!(.initially(#names)));
     }
     calls

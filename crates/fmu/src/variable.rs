@@ -305,6 +305,7 @@ impl<M> Variable<M> {
         self.any_parameter(Variability::Tunable)
     }
 
+    /// Makes the variable a parameter of this variability; a structural parameter remains one.
     fn any_parameter(mut self, variability: Variability) -> Self {
         let declaration = &mut self.declaration;
         if declaration.causality != Causality::StructuralParameter {

@@ -169,7 +169,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3UpdateDiscreteStates`.
+    /// `fmi3UpdateDiscreteStates`: ends the ticks of all clocks; the model may tick them for a further update.
     pub(crate) fn update_discrete_states_3(&mut self) -> Result<Event, Failure> {
         let event = self.update_discrete_states()?;
         self.clear_clocks();

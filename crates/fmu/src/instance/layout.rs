@@ -43,7 +43,7 @@ impl ser::Error for Refusal {
 
 type Hashed = Result<(), Refusal>;
 
-/// Converts up to eight bytes to a number.
+/// Converts up to eight bytes, the highest one first, to a number.
 const fn number(bytes: &[u8]) -> u64 {
     let (mut number, mut k) = (0, 0);
     while k < bytes.len() {

@@ -22,6 +22,7 @@ impl ModelDescription {
     }
 }
 
+/// Checks the lists of `ModelStructure`: members, dependencies and their kinds.
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let structure = &description.structure;
     let states = states(["Derivatives", "attribute derivative"], description, problems);

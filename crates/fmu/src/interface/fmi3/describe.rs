@@ -293,11 +293,11 @@ fn parameters(old: &ModelDescription) -> Vec<u32> {
     indices(old, &|variable| variable.causality == Causality::Parameter)
 }
 
-/// Returns the indices of the continuous states.
+/// Returns the 1-based indices of the continuous states, by their derivatives in `ModelStructure`.
 fn derivative_states(old: &ModelDescription) -> Vec<u32> {
     let rows = old.structure.derivatives.iter();
-    let derivative = rows.map(|row| &old.variables[row.index as usize - 1]);
-    derivative
+    let derivatives = rows.map(|row| &old.variables[row.index as usize - 1]);
+    derivatives
         .filter_map(|variable| variable.kind.as_real().and_then(|real| real.derivative))
         .collect()
 }
