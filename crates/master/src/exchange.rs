@@ -73,16 +73,17 @@ impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals: Vec<Port> = reals.integer_sources().iter().map(|(port, _)| *port).collect();
-        let along = |way| -> Vec<&Connection> {
+        let passing = |way| -> Vec<&Connection> {
             system
                 .connections
                 .iter()
                 .filter(|connection| Way::of(system, connection) == way)
                 .collect()
         };
-        let held = Channels::new(system, &along(Way::Held), &to_reals);
-        let at_events = Channels::new(system, &along(Way::AtEvents), &[]);
-        let ticks = Ticks::new(system, &along(Way::Tick));
+        // The held connections also read the Integer outputs that are connected to Reals.
+        let held = Channels::new(system, &passing(Way::Held), &to_reals);
+        let at_events = Channels::new(system, &passing(Way::AtEvents), &[]);
+        let ticks = Ticks::new(system, &passing(Way::Tick));
         let watch = Watch::new(system, |port| reals.output(port));
         let allow_nan = algorithm.allow_nan;
         Self { reals, held, at_events, ticks, allow_nan, faulty: false, watch }

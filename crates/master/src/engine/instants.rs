@@ -21,13 +21,16 @@ const ROUNDING: f64 = 1e-6;
 pub(crate) struct Instants {
     /// Their positions.
     members: Vec<usize>,
-    /// For each slave: the time in s of its next known event if other slaves are connected to it, and of the
-    /// event at which its last step ended; otherwise infinite.
+    /// For each slave, the time in s of its next known event; infinite without one, and for a slave without
+    /// connections.
     next: Vec<f64>,
+    /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
     pub(crate) pending: Vec<f64>,
+    /// For each slave, whether it has connections.
     connected: Vec<bool>,
-    /// For each slave, whether it is in event mode, and whether its inputs have been set since it entered it.
+    /// For each slave, whether it is in event mode.
     in_event: Vec<bool>,
+    /// For each slave, whether its inputs have been set since it entered event mode or updated its discrete states.
     set: Vec<bool>,
     /// Values of the connected Reals before the instant.
     before: Vec<f64>,
@@ -105,7 +108,8 @@ impl Instants {
                 .any(|drive| self.members.contains(&drive.port().slave) && drive.breaks_at(time))
     }
 
-    /// Iterates the instant at `time`.
+    /// Iterates the instant at `time`: slaves with a pending event or a driven variable that jumps enter event mode;
+    /// then values are exchanged and discrete states updated until nothing changes.
     pub(crate) fn iterate(
         &mut self,
         parts: &mut Parts<'_>,
@@ -119,17 +123,17 @@ impl Instants {
             }
         }
         self.drive(parts, time)?;
-        let mut update = self.in_event.contains(&true);
+        let mut needs_update = self.in_event.contains(&true);
         for _ in 0..MOST {
-            if !(self.exchange(parts, time)? || update) {
+            if !(self.exchange(parts, time)? || needs_update) {
                 return self.leave(parts, time);
             }
-            update = match self.update(parts, time)? {
-                Updated::Ended(ending) => {
+            needs_update = match self.update(parts, time)? {
+                UpdateResult::Ended(ending) => {
                     return Ok(InstantEnd { ending: Some(ending), jumped: false });
                 }
-                Updated::Again => true,
-                Updated::Settled => false,
+                UpdateResult::Again => true,
+                UpdateResult::Settled => false,
             };
         }
         Err(self.unsettled(parts, time))
@@ -201,7 +205,7 @@ impl Instants {
     }
 
     /// Updates the discrete states of the slaves in event mode.
-    fn update(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<Updated, SystemError> {
+    fn update(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<UpdateResult, SystemError> {
         let mut again = false;
         for slave in 0..self.in_event.len() {
             if !self.in_event[slave] {
@@ -210,13 +214,13 @@ impl Instants {
             parts.system.show_event(slave, time)?;
             let info = at(parts.system, slave, time, |events| events.update_discrete_states())?;
             if info.terminate_simulation {
-                return Ok(Updated::Ended(Ending { slave, time }));
+                return Ok(UpdateResult::Ended(Ending { slave, time }));
             }
             again |= info.discrete_states_need_update;
         }
         parts.exchange.end_ticks();
         self.set.fill(false);
-        Ok(if again { Updated::Again } else { Updated::Settled })
+        Ok(if again { UpdateResult::Again } else { UpdateResult::Settled })
     }
 
     /// Leaves event mode and reads the outputs.
@@ -294,10 +298,12 @@ impl Instants {
 }
 
 /// The outcome of an update.
-enum Updated {
+enum UpdateResult {
     /// A slave needs another one.
     Again,
+    /// No slave needs another one.
     Settled,
+    /// A slave requested the end of the simulation.
     Ended(Ending),
 }
 
