@@ -130,7 +130,7 @@ pub(crate) struct Claim {
     pub(crate) paper: &'static str,
     pub(crate) measured: f64,
     pub(crate) unit: &'static str,
-    /// `None` if the run ended too early to judge the claim.
+    /// `None` if the run ended too early to judge the claim; false if it failed or the pendulum fell before.
     pub(crate) holds: Option<bool>,
 }
 

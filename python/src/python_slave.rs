@@ -70,7 +70,8 @@ impl PythonSlave {
         Ok(Self { object, description, inputs, outputs, values, start, raised, saved })
     }
 
-    /// Calls the function `name` of the object with `call`, keeps an exception for the run.
+    /// Runs `call` with the object; stores its exception as the cause of the error of the run. `function` is the name
+    /// in the error.
     fn call<T>(
         &self,
         function: &'static str,
@@ -349,7 +350,7 @@ fn describe(
     }
 }
 
-/// Sets an entry of `given` in the type of the variable.
+/// Sets the entry of `inputs` for `variable`, in the type of the variable.
 #[expect(clippy::cast_possible_truncation, reason = "an integer")]
 fn set(inputs: &Bound<'_, PyDict>, variable: &ScalarVariable, value: f64) -> PyResult<()> {
     match &variable.kind {

@@ -112,7 +112,7 @@ impl Stepper {
         self.advance(py, |steps, _| steps >= count)
     }
 
-    /// Steps until `time` (in s) is reached; returns the number of steps.
+    /// Steps until `time` (in s) is reached or the run is finished; returns the number of steps.
     fn run_until(&self, py: Python<'_>, time: f64) -> PyResult<u64> {
         if time.is_nan() {
             return Err(PyValueError::new_err("time is nan, expected a number"));

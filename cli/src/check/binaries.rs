@@ -238,14 +238,14 @@ fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
 /// Functions that need no instance.
 const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"];
 
-/// Returns the functions that a library for `interfaces` must export.
+/// Returns the functions of FMI 2.0 that a library for `interfaces` must export: [`ALWAYS`], and all that an importer
+/// may call in some state.
 fn required_functions(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
-    let belongs = |function: &Function| {
-        let mut states = State::EVERY.iter();
-        states
-            .any(|state| interfaces.iter().any(|interface| allowed(*interface, *function, *state)))
+    let is_callable = |function: &Function| {
+        let in_state = |interface, state: &State| allowed(interface, *function, *state);
+        interfaces.iter().any(|one| State::EVERY.iter().any(|state| in_state(*one, state)))
     };
-    let names = Function::EVERY.iter().copied().filter(belongs).map(Function::name);
+    let names = Function::EVERY.iter().copied().filter(is_callable).map(Function::name);
     ALWAYS.into_iter().chain(names)
 }
 

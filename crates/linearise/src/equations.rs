@@ -13,10 +13,10 @@ const DIFFERENCE: f64 = 6e-6;
 
 /// The equations x' = f(t, x, u), y = h(t, x, u) of an FMU for model exchange.
 ///
-/// They are functions of t, x and u: where a trajectory begins ([`PlantEquations::begin`]) the discrete variables are those of
-/// the start, made consistent with t, x and u by an event. So the memory of discrete variables, such as the side of a
-/// hysteresis or the samples of a part in discrete time, is that of the start. The order of x is that of the FMU, that of u
-/// and y the one of the request; u has its inputs, then its faults.
+/// They are functions of t, x and u: where a trajectory begins ([`PlantEquations::begin`]) the discrete variables are
+/// those of the start, made consistent with t, x and u by an event. So the memory of discrete variables, such as the
+/// side of a hysteresis or the samples of a part in discrete time, is that of the start. The order of x is that of the
+/// FMU, that of u and y the one of the request; u has its inputs, then its faults.
 pub struct PlantEquations {
     component: Box<dyn ModelExchange>,
     names: Names,
@@ -51,7 +51,8 @@ struct Names {
 }
 
 impl PlantEquations {
-    /// The equations of `fmu` with the parameters of `request`, whose states must be those of the FMU.
+    /// Creates the equations of `fmu` with the parameters of `request`. Its `states` do not matter: x has all states of
+    /// the FMU.
     ///
     /// # Errors
     ///

@@ -47,7 +47,8 @@ fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     (DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / lengths[j]), lengths)
 }
 
-/// Returns the T with the least norm of X T - Y; `None` if X does not have full column rank.
+/// Returns the T with the least norm of X T - Y; `None` if a diagonal entry of R is exactly zero or a result is not
+/// finite. Columns that are dependent up to rounding pass; [`Directions`] detects them.
 ///
 /// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with
 /// more rows than columns; `y`: r x k. About 2 r c^2 multiplications.

@@ -90,22 +90,24 @@ pub trait Sink: Send {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Values`] if the row does not match the columns; [`ResultsError::Write`] if the file
-    /// cannot be written.
+    /// [`ResultsError::Values`] if the row does not match the columns; the errors of [`Sink::flush`] if rows
+    /// are written to the file now.
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError>;
 
     /// Passes every row so far to the operating system; the file is then complete and readable.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Write`] if the file cannot be written.
+    /// [`ResultsError::Write`] if the file cannot be written; [`ResultsError::Length`],
+    /// [`ResultsError::Overwritten`], [`ResultsError::Gone`] or [`ResultsError::Forked`] if an FMU or another
+    /// program has interfered with it.
     fn flush(&mut self) -> Result<(), ResultsError>;
 
     /// Completes and closes the file.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Write`] if the file cannot be written.
+    /// Same as [`Sink::flush`].
     fn finish(self: Box<Self>) -> Result<(), ResultsError>;
 }
 
