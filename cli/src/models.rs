@@ -61,6 +61,7 @@ fn built_in() -> Option<PathBuf> {
     option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|folder| is_clone(folder))
 }
 
+/// Returns the clone of this project that the current folder is in.
 pub(crate) fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
     let here = std::env::current_dir().context("the current folder")?;
     Ok(here.ancestors().find(|folder| is_clone(folder)).map(Path::to_path_buf))

@@ -60,7 +60,7 @@ pub(crate) struct Study {
     slaves: Vec<(String, Py<PyAny>)>,
 }
 
-/// A column of an input: its name, and times and values as bytes.
+/// A column of an input: its name, and times and values as the bytes of `f64`.
 type TableInMemory = (String, PyBackedBytes, PyBackedBytes);
 
 /// Slaves with the exceptions that they raise.

@@ -31,8 +31,8 @@ pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Resu
 /// The outputs at each communication point of a trial, including the start.
 type Trajectory = Vec<Vec<Value>>;
 
-/// Runs the FMU of `description`, if `thorough` for the time of its default experiment, with instances created by `make`; returns the result and the
-/// findings.
+/// Runs the FMU of `description` with instances created by `make`, if `thorough` for the time of its default
+/// experiment; returns the result and the findings.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
     thorough: bool,

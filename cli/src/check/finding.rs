@@ -92,7 +92,7 @@ impl fmt::Display for Severity {
 }
 
 impl Finding {
-    /// Writes the finding as text; `more` follows the description.
+    /// Writes the finding as text; `more` follows [`Finding::what`].
     pub(crate) fn write(&self, formatter: &mut fmt::Formatter<'_>, more: &str) -> fmt::Result {
         let Self { severity, place, what, section, why, .. } = self;
         write!(formatter, "{severity}: {place}: {what}{more}")?;

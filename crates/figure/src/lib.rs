@@ -228,6 +228,8 @@ impl Panel<'_> {
         Axis::exact(start, end, (left, WIDTH - RIGHT), 10)
     }
 
+    /// Returns the vertical axis for the values in the range of `horizontal` and for the limits; `pixels` are the
+    /// places of its lowest and highest value.
     fn vertical(&self, horizontal: &Axis, pixels: (f64, f64)) -> Axis {
         let (start, end) = horizontal.range();
         let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);

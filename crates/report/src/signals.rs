@@ -6,7 +6,7 @@ use results::{Column, Selection};
 
 use crate::{Connection, Run};
 
-/// Largest number of FMUs that the names of a file without a run state.
+/// Largest number of FMUs for which the column names of a file without a run are grouped.
 const NAMED: usize = 8;
 
 /// How soon a variable is shown.
@@ -48,7 +48,8 @@ impl Signals {
     }
 }
 
-/// Returns the parts of the names before the first point, if each name has one and they are few.
+/// Returns the different parts of the names before the first point; none if a name has no point or if there are more
+/// than [`NAMED`].
 fn first_parts(names: &[&str]) -> Vec<String> {
     let mut parts: Vec<String> = Vec::new();
     for name in names {
@@ -61,7 +62,7 @@ fn first_parts(names: &[&str]) -> Vec<String> {
     parts
 }
 
-/// Returns the position of the FMU with the longest name that `name` starts with; the last one is that of no FMU.
+/// Returns the position of the FMU with the longest name that `name` starts with; the last position if there is none.
 fn position(fmus: &[String], name: &str) -> usize {
     let is_of = |fmu: &str| name.strip_prefix(fmu).is_some_and(|rest| rest.starts_with('.'));
     let fits = fmus.iter().enumerate().filter(|(_, fmu)| !fmu.is_empty() && is_of(fmu));

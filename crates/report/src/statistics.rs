@@ -38,8 +38,11 @@ pub enum Basis {
 /// Collects the statistics of a variable row by row.
 pub(crate) struct Builder {
     statistics: Statistics,
+    /// Whether the variable keeps its value between two rows.
     holds: bool,
+    /// Time and value of the last finite row.
     before: Option<(f64, f64)>,
+    /// Time in s between the first and the last finite row.
     length: f64,
     /// Integrals of the value and of its square.
     integrals: [f64; 2],

@@ -78,7 +78,7 @@ pub struct Row<'a> {
     pub booleans: &'a [i32],
     /// Values of the String columns.
     pub strings: &'a [String],
-    /// For each clocked column, in their order, whether its value is one of this row; without it, all are.
+    /// For each clocked column, in their order, whether it has a value in this row; columns beyond the end have one.
     pub present: &'a [bool],
 }
 

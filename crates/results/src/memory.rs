@@ -10,15 +10,15 @@ use super::{Column, ColumnKind, ResultsError, Row, Sink, Widths, check_names, cr
 /// The values of a column, one for each row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Values {
-    /// Of a [`ColumnKind::Real`].
+    /// A column of kind [`ColumnKind::Real`].
     Real(Vec<f64>),
-    /// Of a [`ColumnKind::Integer`].
+    /// A column of kind [`ColumnKind::Integer`].
     Integer(Vec<i32>),
-    /// Of a [`ColumnKind::Long`].
+    /// A column of kind [`ColumnKind::Long`].
     Long(Vec<i64>),
-    /// Of a [`ColumnKind::Boolean`].
+    /// A column of kind [`ColumnKind::Boolean`].
     Boolean(Vec<bool>),
-    /// Of a [`ColumnKind::String`].
+    /// A column of kind [`ColumnKind::String`].
     String(Texts),
 }
 
@@ -71,7 +71,7 @@ pub struct Columns {
     pub time: Vec<f64>,
     /// The columns with their values.
     pub columns: Vec<(Column, Values)>,
-    /// For each clocked column, in their order, whether its value in each row is one of this row.
+    /// For each clocked column, in their order, whether it has a value in each row.
     pub present: Vec<Vec<bool>>,
 }
 

@@ -40,7 +40,7 @@ pub enum Error {
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
-    /// A file that the run would write is one that it reads, or another one that it writes.
+    /// Two files that the run would write are the same, or one of them is a file that it reads.
     #[error(transparent)]
     Outputs(#[from] files::OutputConflict),
     /// A file cannot be read or written.

@@ -153,7 +153,8 @@ impl Recorder {
         if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
-    /// Prepares a step; see [`SlowValues::before_step`].
+    /// Reads the start values of slaves that step every several communication steps. Call it before every
+    /// [`Simulation::step`].
     ///
     /// # Errors
     ///

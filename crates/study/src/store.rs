@@ -21,7 +21,7 @@ pub struct Store {
     systems: Mutex<HashMap<Stamp, Arc<Opened>>>,
 }
 
-/// A file at a state of its content.
+/// Identifies a file and its content: a changed file has another stamp.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Stamp {
     path: PathBuf,
@@ -43,7 +43,7 @@ impl Stamp {
     }
 }
 
-/// An FMU at a state of its file, for instances in this process or in separate ones.
+/// Identifies an FMU in the store, for instances in this process or in separate ones.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct FmuKey {
     stamp: Stamp,

@@ -164,7 +164,7 @@ fn flags(kind: FrameKind) -> u8 {
     }
 }
 
-/// Returns the data length code of CAN FD (ISO 11898-1): lengths above 8 have steps.
+/// Returns the data length code of CAN FD (ISO 11898-1). Above 8 bytes a frame has 12, 16, 20, 24, 32, 48 or 64.
 fn length_code(length: usize) -> usize {
     match length {
         0..=8 => length,

@@ -43,13 +43,13 @@ macro_rules! fault {
 body! {
     /// `ramp`: `begin` up to the time `from`, `end` after the time `until`, linear in between.
     Ramp {
-        /// Time in s.
+        /// Start of the ramp in s.
         from: f64,
-        /// Time in s.
+        /// End of the ramp in s.
         until: f64,
-        /// Value before.
+        /// Value up to the time `from`.
         begin: f64,
-        /// Value after.
+        /// Value from the time `until` on.
         end: f64,
     }
 }
@@ -67,7 +67,7 @@ body! {
         /// Mean.
         #[serde(default)]
         offset: f64,
-        /// Time in s; default: the start of the simulation.
+        /// Start of the sine in s; default: the start of the simulation.
         from: Option<f64>,
     }
 }

@@ -89,13 +89,13 @@ impl<'a> Resolver<'a> {
         self.add(&target, DriveSource { signal, start: f64::NEG_INFINITY, texts }, path)
     }
 
+    /// Returns the signal of a column; by default the column has the name of the variable, with or without its slave.
     fn column(&mut self, csv: &Csv, target: &Target<'_>) -> Result<Signal, Reason> {
         let (path, table) = self.file(csv.file.get_ref())?;
-        let variable = &target.variable.name;
         let name = match &csv.column {
             Some(column) => column.get_ref().clone(),
             None if table.column(&target.name).is_some() => target.name.clone(),
-            None => variable.clone(),
+            None => target.variable.name.clone(),
         };
         column_signal(&path, &table, &name, target, csv.hold)
     }
@@ -282,6 +282,7 @@ fn column_signal(
     Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), between)?))
 }
 
+/// Returns the signal in the unit of the variable; without a conversion it still shares the values of its table.
 fn scaled(signal: Signal, conversion: Conversion) -> Signal {
     if conversion == Conversion::NONE {
         return signal;
