@@ -284,6 +284,7 @@ fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String,
     declaration.try_iter()?.map(|name| Ok((name?.extract()?, Start::Real(0.0)))).collect()
 }
 
+/// Reads a start value. A bool is an int in Python, so it is tested first.
 fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     use pyo3::types::{PyBool, PyInt};
     if let Ok(value) = value.cast::<PyBool>() {

@@ -134,9 +134,9 @@ impl<S: Slave> Trial<'_, S> {
         self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
 
-    /// Creates an instance and brings it to step mode; adds a finding if that fails.
-    fn initialized(&mut self, name: &str, stop_time: Option<f64>, before: Option<S>) -> Option<S> {
-        let mut slave = match (self.make)(name, before) {
+    /// Creates an instance, in place of the `former` one, and brings it to step mode; adds a finding if that fails.
+    fn initialized(&mut self, name: &str, stop_time: Option<f64>, former: Option<S>) -> Option<S> {
+        let mut slave = match (self.make)(name, former) {
             Ok(slave) => slave,
             Err(error) => {
                 self.refused(&error);
@@ -214,8 +214,8 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Runs an instance with the name `name` from start to end; returns its outputs and the
     /// instance.
-    fn trajectory(&mut self, name: &str, before: Option<S>) -> Option<(Trajectory, S)> {
-        let mut slave = self.initialized(name, None, before)?;
+    fn trajectory(&mut self, name: &str, former: Option<S>) -> Option<(Trajectory, S)> {
+        let mut slave = self.initialized(name, None, former)?;
         if name == "first" {
             self.start_values(&mut slave)?;
         }

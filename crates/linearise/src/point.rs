@@ -104,7 +104,7 @@ pub(super) struct Equations<'p> {
     inputs: Vec<u32>,
     outputs: Vec<u32>,
     /// Whether the FMU can save and restore its state.
-    returns: bool,
+    restores: bool,
 }
 
 impl<'p> Equations<'p> {
@@ -134,13 +134,13 @@ impl<'p> Equations<'p> {
         }
         let u = read(&mut *component, parts.inputs.iter())?;
         let flags = fmu.description().model_exchange.as_ref();
-        let returns = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
-        if returns {
+        let restores = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
+        if restores {
             component.save_state(0)?;
         }
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
         let (inputs, outputs) = (references(&parts.inputs), references(&parts.outputs));
-        Ok(Self { component, parts, states, x, u, inputs, outputs, returns })
+        Ok(Self { component, parts, states, x, u, inputs, outputs, restores })
     }
 
     /// Returns the state or input of a column of the Jacobian and its value at the operating point.
@@ -157,7 +157,7 @@ impl<'p> Equations<'p> {
         &mut self,
         change: Option<(usize, f64)>,
     ) -> Result<Vec<f64>, LineariseError> {
-        if self.returns {
+        if self.restores {
             self.component.restore_state(0)?;
         }
         let (mut x, mut u) = (self.x.clone(), self.u.clone());

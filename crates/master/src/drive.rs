@@ -66,8 +66,8 @@ impl Drive {
     /// Creates the drive of the variable at `port` with the value reference `reference` and the
     /// type `kind`.
     #[must_use]
-    pub fn new(port: Port, reference: u32, kind: DriveKind, following: DriveSource) -> Self {
-        let DriveSource { signal, start, texts } = following;
+    pub fn new(port: Port, reference: u32, kind: DriveKind, source: DriveSource) -> Self {
+        let DriveSource { signal, start, texts } = source;
         let cursor = Cursor::default();
         let faults = None;
         let (written, accepted) = (None, None);

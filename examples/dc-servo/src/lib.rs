@@ -41,8 +41,7 @@ struct DcServo {
 
 impl DcServo {
     fn motor(&self) -> Motor<f64> {
-        let (parameters, friction) = (self.parameters, self.friction);
-        Motor { parameters, faulty: self.begun[0], friction }
+        Motor { parameters: self.parameters, faulty: self.begun[0], friction: self.friction }
     }
 
     /// The motion from `time` on, under the input `u` and its derivative at that time.

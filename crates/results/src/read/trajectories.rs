@@ -62,7 +62,7 @@ impl Precision {
         }
     }
 
-    /// Returns the number in the bytes, as many as [`Precision::size`]; NaN for other ones.
+    /// Returns the little-endian number in [`Precision::size`] bytes; NaN for too few.
     fn number(self, bytes: &[u8]) -> f64 {
         let number = match self {
             Self::Double => bytes.try_into().ok().map(f64::from_le_bytes),
@@ -155,10 +155,10 @@ impl<'a> Source<'a> {
 
     /// Reads the columns of a matrix of texts.
     fn texts(&mut self, matrix: &Matrix) -> Result<Vec<String>, ResultsError> {
-        let signs = self.numbers(matrix)?;
-        Ok(signs
+        let codes = self.numbers(matrix)?;
+        Ok(codes
             .chunks(matrix.rows.max(1))
-            .map(|signs| text(signs.iter().copied().map(sign)))
+            .map(|codes| text(codes.iter().copied().map(byte)))
             .collect())
     }
 }
@@ -171,15 +171,15 @@ fn integer(bytes: &[u8]) -> u32 {
     bytes.try_into().map_or(0, u32::from_le_bytes)
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sign of a text")]
-fn sign(number: f64) -> u8 {
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a character code")]
+fn byte(number: f64) -> u8 {
     number as u8
 }
 
 /// Returns a text without the zeros and spaces at its end.
-fn text(signs: impl Iterator<Item = u8>) -> String {
-    let signs: Vec<u8> = signs.collect();
-    String::from_utf8_lossy(&signs).trim_end_matches(['\0', ' ']).to_owned()
+fn text(bytes: impl Iterator<Item = u8>) -> String {
+    let bytes: Vec<u8> = bytes.collect();
+    String::from_utf8_lossy(&bytes).trim_end_matches(['\0', ' ']).to_owned()
 }
 
 pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError> {
@@ -232,9 +232,9 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
     Ok((Layout { varying, places }, columns))
 }
 
-/// Checks the four lines of `Aclass`, which are the rows of a matrix of signs.
-fn check_class(signs: &[f64]) -> Result<(), String> {
-    let line = |row: usize| text(signs.iter().skip(row).step_by(4).copied().map(sign));
+/// Checks the four lines of `Aclass`, which are the rows of a matrix of character codes.
+fn check_class(codes: &[f64]) -> Result<(), String> {
+    let line = |row: usize| text(codes.iter().skip(row).step_by(4).copied().map(byte));
     match (line(0).as_str(), line(3).as_str()) {
         ("Atrajectory", "binTrans") => Ok(()),
         (class, layout) => Err(format!("its class is {class:?} and its layout {layout:?}")),

@@ -154,18 +154,18 @@ impl<'a> Resolver<'a> {
     pub(super) fn add(
         &mut self,
         target: &Target<'_>,
-        following: DriveSource,
+        source: DriveSource,
         path: &str,
     ) -> Result<(), Reason> {
         if let Some((_, first)) = self.driver(target.port) {
             return Err(Reason::Twice { name: target.name.clone(), first: first.clone() });
         }
-        let takes = target.description.co_simulation.as_ref();
+        let flags = target.description.co_simulation.as_ref();
         let derivatives = target.is_continuous()
             && matches!(target.variable.kind, Kind::Real(_))
-            && takes.is_some_and(|takes| takes.can_interpolate_inputs);
+            && flags.is_some_and(|flags| flags.can_interpolate_inputs);
         let kind = DriveKind::of(&target.variable.kind, target.description.version(), derivatives);
-        let drive = Drive::new(target.port, target.variable.value_reference, kind, following);
+        let drive = Drive::new(target.port, target.variable.value_reference, kind, source);
         self.drives.push((drive, path.to_owned()));
         Ok(())
     }

@@ -56,8 +56,8 @@ impl<'a> Resolver<'a> {
             points.push((set.at + 0.0, value));
         }
         for Settings { target, path, entry, points, texts } in variables {
-            let following = settings_following(points, texts).map_err(at(entry, &path))?;
-            self.add(&target, following, &path).map_err(at(entry, &path))?;
+            let source = source_of_settings(points, texts).map_err(at(entry, &path))?;
+            self.add(&target, source, &path).map_err(at(entry, &path))?;
         }
         Ok(())
     }
@@ -122,8 +122,8 @@ impl<'a> Resolver<'a> {
                     if known.iter().all(|(drive, _)| drive.port() != target.port) {
                         let signal = column_signal(&file, &table, column, &target, false)?;
                         let texts = Vec::new();
-                        let following = DriveSource { signal, start: f64::NEG_INFINITY, texts };
-                        self.add(&target, following, path)?;
+                        let source = DriveSource { signal, start: f64::NEG_INFINITY, texts };
+                        self.add(&target, source, path)?;
                         continue;
                     }
                 }
@@ -187,9 +187,9 @@ fn encode(
     Ok(conversion.absolute(number))
 }
 
-/// Returns the signal of settings sorted by time; of several at the same time, the last one stated
+/// Returns the signal that holds each setting until the next one; of several at the same time, the last one stated
 /// applies.
-fn settings_following(
+fn source_of_settings(
     mut points: Vec<(f64, f64)>,
     texts: Vec<String>,
 ) -> Result<DriveSource, Reason> {
