@@ -218,6 +218,18 @@ robustness.noise = 1e-4
 """
 
 
+def results_of(aso_ftc, folder, fmus, links, settings, stop):
+    """The columns of a run of FMUs with a communication step of 1 ms; the first one is the time."""
+    text = "[fmus]\n" + "".join(f'{name} = "{fmu}"\n' for name, fmu in fmus.items())
+    text += "".join(f'[[connections]]\nfrom = "{start}"\nto = "{end}"\n' for start, end in links)
+    text += "[settings]\n" + "".join(f'"{name}" = {value}\n' for name, value in settings.items())
+    text += f'[algorithm]\nstep = 0.001\nextrapolation = "hold"\n[experiment]\nstop-time = {stop}\n'
+    (folder / "system.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("run", folder / "system.toml", "--results", folder / "results.csv", "--force")
+    assert done.returncode == 0, done.stderr
+    return np.genfromtxt(folder / "results.csv", delimiter=",", names=True, dtype=None, encoding=None, deletechars="")
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_for_a_linear_plant_the_estimates_are_those_of_the_designed_observer(attempt, aso_ftc, examples, method):
     """Whose gain is that of the stationary Kalman filter, with which the filter starts."""
@@ -227,18 +239,87 @@ def test_for_a_linear_plant_the_estimates_are_those_of_the_designed_observer(att
     fmus = {"plant": examples["DcServo"], "filter": path, "controller": controller}
     links = [("plant.theta_m", "filter.theta_m"), ("plant.theta_m", "controller.theta_m")]
     links += [("controller.u", "plant.u"), ("controller.u", "filter.u")]
-    system = "[fmus]\n" + "".join(f'{name} = "{fmu}"\n' for name, fmu in fmus.items())
-    system += "".join(f'[[connections]]\nfrom = "{start}"\nto = "{end}"\n' for start, end in links)
-    system += f'[settings]\n"plant.friction" = 0\n"plant.theta" = 0.3\n"filter.method" = "{method}"\n'
-    system += '[algorithm]\nstep = 0.001\nextrapolation = "hold"\n[experiment]\nstop-time = 0.3\n'
-    (path.parent / "system.toml").write_text(system, encoding="utf-8")
-    done = aso_ftc("run", path.parent / "system.toml", "--results", path.parent / "results.csv")
-    assert done.returncode == 0, done.stderr
-    table = np.genfromtxt(path.parent / "results.csv", delimiter=",", names=True, dtype=None, encoding=None, deletechars="")
+    settings = {"plant.friction": 0, "plant.theta": 0.3, "filter.method": f'"{method}"'}
+    table = results_of(aso_ftc, path.parent, fmus, links, settings, 0.3)
     for name in ("f_hat", *(f"x_hat[{k}]" for k in (1, 2))):
         theirs, estimates = (table[f"{one}.{name}"].astype(float) for one in ("controller", "filter"))
         assert np.abs(theirs).max() > 0
         assert np.abs(estimates - theirs).max() < 1e-6 * np.abs(theirs).max(), name
+
+
+@pytest.fixture(scope="module")
+def servo(attempt, tmp_path_factory):
+    """Makes the FMUs of a plant file for the servo: the filter, the controllers with and without observer."""
+
+    def design(text):
+        folder = tmp_path_factory.mktemp("controllers")
+        paths = {name: folder / f"{name}.fmu" for name in ("controller", "feedback")}
+        options = ["--fmu", paths["controller"], "--feedback-fmu", paths["feedback"]]
+        done, paths["filter"] = attempt(text, *options)
+        assert all(path.exists() for path in paths.values()), done.stderr
+        return paths
+
+    return design
+
+
+FROM_THE_FILTER = [("plant.theta_m", "filter.theta_m"), ("filter.x_hat[1]", "feedback.x_filter[1]")]
+FROM_THE_FILTER += [("filter.x_hat[2]", "feedback.x_filter[2]"), ("filter.f_hat", "feedback.f_filter")]
+FROM_THE_FILTER += [("feedback.u", "plant.u"), ("feedback.u", "filter.u")]
+
+
+@pytest.mark.parametrize("more", ["", "t_on = 0.1", '[reference]\ntrack = ["theta_m"]'], ids=["regulator", "t_on", "reference"])
+def test_a_linear_plant_moves_alike_with_the_filter_and_with_the_observer(servo, aso_ftc, examples, tmp_path, more):
+    """With a friction, which acts like a fault, and a reference if there is one."""
+    text = SERVO.format(plant=examples["DcServo"])
+    paths = servo(f"{more}\n{text}" if more.startswith("t_on") else f"{text}\n{more}")
+    settings = {"plant.friction": 0.002, "plant.theta": 0.3}
+    angles = []
+    for name in ("controller", "feedback"):
+        with_reference = "track" in more
+        links = [("plant.theta_m", "controller.theta_m"), ("controller.u", "plant.u")]
+        fmus = {"plant": examples["DcServo"], "controller": paths["controller"]}
+        if name == "feedback":
+            links = [*FROM_THE_FILTER, *([("plant.theta_m", "feedback.theta_m")] if with_reference else [])]
+            fmus = {"plant": examples["DcServo"], "filter": paths["filter"], "feedback": paths["feedback"]}
+        reference = {f"{name}.r_theta_m": 0.5} if with_reference else {}
+        table = results_of(aso_ftc, tmp_path, fmus, links, settings | reference, 0.4)
+        angles.append(table["plant.theta_m"].astype(float))
+    assert np.abs(angles[0]).max() > 0.25
+    assert np.abs(angles[0] - angles[1]).max() < 1e-6
+
+
+def test_a_sensor_of_every_seventh_sample_gives_the_loop_of_the_periodic_kalman_filter(servo, aso_ftc, examples, tmp_path):
+    """That of numpy, for the sampled plant of the design, with its gains."""
+    paths = servo(SERVO.format(plant=examples["DcServo"]))
+    fmus = {"plant": examples["DcServo"], "filter": paths["filter"], "feedback": paths["feedback"]}
+    settings = {"plant.friction": 0, "plant.theta": 0.3, "filter.every": 7}
+    table = results_of(aso_ftc, tmp_path, fmus, FROM_THE_FILTER, settings, 0.4)
+    with zipfile.ZipFile(paths["controller"]) as archive:
+        design = tomllib.loads(archive.read("resources/design.toml").decode())
+    a, b, c, f_a, k_x, k_f = (np.array(design[name]) for name in ("A", "B", "C", "F_a", "K_x", "K_f"))
+    w, v, p = covariances(paths["filter"])
+    n = len(a)
+    a_0 = np.block([[a, f_a], [np.zeros((1, n)), np.eye(1)]])
+    c_0 = np.hstack([c, np.zeros((1, 1))])
+    b_0 = np.vstack([b, np.zeros((1, 1))])
+    x, z, commands = np.array([0.3, 0.0]), np.zeros(n + 1), []
+    for k in range(len(table)):
+        if k % 7 == 0:
+            gain = p @ c_0.T / (c_0 @ p @ c_0.T + v)
+            z, p = z + gain @ (c @ x - c_0 @ z), (np.eye(n + 1) - gain @ c_0) @ p
+        u = k_x @ z[:n] + k_f @ z[n:]
+        commands.append(u[0])
+        x, z, p = a @ x + b @ u, a_0 @ z + b_0 @ u, a_0 @ p @ a_0.T + w
+    actual = table["feedback.u"].astype(float)
+    assert np.abs(actual - commands).max() < 1e-5 * np.abs(commands).max()
+
+
+def test_a_controller_without_observer_has_no_decisions_on_faults(attempt, examples, tmp_path):
+    text = TANKS.format(plant=examples["ThreeTank"]) + NOISE + "\n[detection]\nfalse_alarm_interval = 1e6\n"
+    done, path = attempt(text, "--feedback-fmu", tmp_path / "Feedback.fmu")
+    assert (done.returncode, path.exists()) == (2, False)
+    assert "no controller for the estimates of the Kalman filter" in done.stderr
+    assert "a plant file without [detection]" in done.stderr
 
 
 def test_far_from_the_operating_point_the_filters_take_no_nonlinearity_for_a_fault(root, aso_ftc, packed_filter, python):

@@ -98,6 +98,8 @@ def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
 def test_a_kalman_filter_needs_the_fmu_of_the_plant(design, tmp_path):
     with pytest.raises(af.DesignError, match="states an FMU"):
         design.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
+    with pytest.raises(af.DesignError, match="states an FMU"):
+        design.controller.feedback_fmu(tmp_path / "Filter.fmu")
     assert not (tmp_path / "Filter.fmu").exists()
 
 
