@@ -1,5 +1,6 @@
 //! A plant file with the worst plant within the tolerances.
 
+use control::detection::UnknownInput;
 use control::faults::FaultEntry;
 use nalgebra::DMatrix;
 use toml::{Table, Value};
@@ -9,10 +10,13 @@ use crate::report::identity::identity;
 use crate::report::robustness::Parameter;
 use crate::solve::solution::Solution;
 use plant_file::detection::DisturbanceEntry;
+use plant_file::signals::Signal;
 use plant_file::{Model, PlantFile};
 
-/// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
-/// that matrices describe.
+/// Returns the plant file with the matrices of the worst plant within the tolerances; matrices replace an FMU.
+///
+/// None if the loop is not stable, or if a plant file of matrices cannot state how a fault or a disturbance enters the
+/// FMU.
 pub(crate) fn plant_file(
     file: &PlantFile<'_>,
     designed: &Solution,
@@ -49,7 +53,7 @@ pub(crate) fn plant_file(
     )))
 }
 
-/// Replaces what is of sampled time; the worst matrices are of continuous time.
+/// Replaces the entries of sampled time; the worst matrices are of continuous time.
 fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix<f64>>) {
     table.remove("matrices");
     if let Some(f_a) = f_a {
@@ -66,7 +70,7 @@ fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix
     }
 }
 
-/// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
+/// Replaces the entries that refer to the plant's FMU; false if a fault or a disturbance cannot be stated without it.
 fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     // Members and points of a schedule are linearised from the FMU.
     for key in ["plant", "operating_point", "preload", "linearisation_step", "family", "schedule"] {
@@ -75,6 +79,9 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     let linear = &designed.linear;
     let names = linear.plant_states().iter().map(|signal| Value::String(signal.name.clone()));
     table.insert("states".to_owned(), Value::Array(names.collect()));
+    state_operating_point(table, "states", linear.plant_states());
+    state_operating_point(table, "actuators", &linear.actuators);
+    state_operating_point(table, "measurements", &linear.measurements);
     if let Some(Value::Table(robustness)) = table.get_mut("robustness") {
         robustness.remove("parameters");
     }
@@ -99,9 +106,89 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
         let rows = (0..n).map(|at| floats(columns.iter().map(|column| &column[at])));
         table.insert("F_a".to_owned(), Value::Array(rows.collect()));
     }
+    match table.get_mut("disturbances") {
+        Some(Value::Array(disturbances)) => state_columns(disturbances, &linear.disturbances, n),
+        _ => true,
+    }
+}
+
+/// States the operating point of each signal under `key`, which the FMU gave: a name becomes a table.
+fn state_operating_point(table: &mut Table, key: &str, signals: &[Signal]) {
+    let Some(Value::Array(entries)) = table.get_mut(key) else { return };
+    for (entry, signal) in entries.iter_mut().zip(signals) {
+        if entry.is_str() {
+            let name = ("name".to_owned(), Value::String(signal.name.clone()));
+            *entry = Value::Table(Table::from_iter([name]));
+        }
+        if let (Some(stated), Some(operating)) = (entry.as_table_mut(), signal.operating) {
+            stated.insert("operating".to_owned(), Value::Float(operating));
+        }
+    }
+}
+
+/// Replaces `input` of each disturbance by its column E of the `n` states; false if one acts on a measurement or on the
+/// state of a delay.
+fn state_columns(disturbances: &mut [Value], inputs: &[UnknownInput], n: usize) -> bool {
+    for (disturbance, input) in disturbances.iter_mut().zip(inputs) {
+        let Some(stated) = disturbance.as_table_mut() else { continue };
+        if stated.remove("input").is_none() {
+            continue;
+        }
+        let mut others = input.on_states.iter().skip(n).chain(input.on_measurements.iter());
+        if others.any(|entry| *entry != 0.0) {
+            return false;
+        }
+        stated.insert("E".to_owned(), floats(input.on_states.iter().take(n)));
+    }
     true
 }
 
 fn floats<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Value {
     Value::Array(numbers.into_iter().copied().map(Value::Float).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+
+    const OFFSET: &str = "[[disturbances]]\nsensor = \"y\"\n";
+
+    fn table(text: &str) -> Table {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_disturbance_by_an_input_of_the_fmu_gets_its_column() {
+        let unknown_input = |on_states: &[f64], on_measurement: f64| UnknownInput {
+            on_states: DVector::from_column_slice(on_states),
+            on_measurements: DVector::from_element(1, on_measurement),
+        };
+        let columns = |disturbance: UnknownInput| {
+            let mut file = table(&format!("{OFFSET}[[disturbances]]\ninput = \"d\""));
+            let Some(Value::Array(all)) = file.get_mut("disturbances") else { panic!("a list") };
+            // The third state is that of a delay.
+            let is_stated = state_columns(all, &[unknown_input(&[0.0; 3], 1.0), disturbance], 2);
+            is_stated.then_some(file)
+        };
+        let expected = table(&format!("{OFFSET}[[disturbances]]\nE = [0.0, 2.0]"));
+        assert_eq!(columns(unknown_input(&[0.0, 2.0, 0.0], 0.0)), Some(expected));
+        assert_eq!(columns(unknown_input(&[0.0, 2.0, 0.0], 1.0)), None);
+        assert_eq!(columns(unknown_input(&[0.0, 2.0, 3.0], 0.0)), None);
+    }
+
+    #[test]
+    fn matrices_in_place_of_an_fmu_state_the_operating_point() {
+        let mut file = table("actuators = [\"u\", { name = \"v\", limits = [1, 5] }]");
+        let signal = |name: &str, value: f64| Signal {
+            operating: Some(value),
+            ..Signal::named(name.to_owned())
+        };
+        let signals = [signal("u", 0.5), signal("v", 2.0)];
+        state_operating_point(&mut file, "actuators", &signals);
+        let u = "{ name = \"u\", operating = 0.5 }";
+        let v = "{ name = \"v\", limits = [1, 5], operating = 2.0 }";
+        assert_eq!(file, table(&format!("actuators = [{u}, {v}]")));
+    }
 }
