@@ -218,6 +218,13 @@ REFUSED = {
     "measurement": (constant("y1"), [], "measurement y1 is 2.5 throughout"),
     "short": (lambda signals: {name: column[:60] for name, column in signals.items()}, [], "at least 100 rows, found 60"),
     "unknown": (lambda signals: None, ["--inputs", "u1,v"], "there is no column v; expected one of u1, u2, y1, y2"),
+    "twice": (lambda signals: None, ["--inputs", "u1,u1"], "--inputs: the column u1 is stated twice"),
+    "twice measured": (lambda signals: None, ["--outputs", "y1,y2,y1"], "--outputs: the column y1 is stated twice"),
+    "alone": (
+        lambda signals: {name: signals[name] for name in ("time", "u1")},
+        ["--inputs", "u1"],
+        "--inputs names all columns but the time, u1, so that none is left for the measurements",
+    ),
     "both": (lambda signals: None, ["--inputs", "u1", "--outputs", "y1,u1"], "u1 is among --inputs and --outputs"),
     "names": (
         lambda signals: {name.replace("u", "valve"): column for name, column in signals.items()},

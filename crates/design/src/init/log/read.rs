@@ -127,6 +127,13 @@ impl Columns<'_> {
         } else {
             self.all().filter(|position| !inputs.contains(position)).collect()
         };
+        if outputs.is_empty() && !options.inputs.is_empty() {
+            return Err(format!(
+                "--inputs names all columns but the time, {}, so that none is left for the measurements; expected a log \
+                 with a measurement",
+                self.names()
+            ));
+        }
         if inputs.is_empty() || outputs.is_empty() {
             return Err(format!(
                 "it is a log, and {} says which columns are commands and which measurements; expected --inputs and --outputs, \
@@ -158,6 +165,7 @@ impl Columns<'_> {
         self.all().filter(is_numbered).collect()
     }
 
+    /// The positions of the columns that `option` names; an error names a column that is missing or stated twice.
     fn positions(&self, option: &str, names: &[String]) -> Result<Vec<usize>, String> {
         let one = |name: &String| {
             let is_it = |position: &usize| {
@@ -167,7 +175,13 @@ impl Columns<'_> {
                 || format!("{option}: there is no column {name}; expected one of {}", self.names());
             self.all().find(is_it).ok_or_else(missing)
         };
-        names.iter().map(one).collect()
+        let positions = names.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+        let repeated = (1..positions.len()).find(|&at| positions[..at].contains(&positions[at]));
+        if let Some(at) = repeated {
+            let name = &names[at];
+            return Err(format!("{option}: the column {name} is stated twice, expected it once"));
+        }
+        Ok(positions)
     }
 }
 
