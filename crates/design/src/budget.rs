@@ -9,10 +9,10 @@ use control::lmi::{Ending, until};
 /// The time that a design may take, and how to end it.
 #[derive(Debug, Clone)]
 pub struct TimeLimits {
-    /// Of the search for gains. A design whose gains are not found by then is refused.
+    /// Time for the search for gains. A design whose gains are not found by then is refused.
     pub gains: Duration,
-    /// Of certificates and bounds together. The rest of them is left out, and the report says so. Zero
-    /// leaves all of them out.
+    /// Time for certificates and bounds together. Those that are not computed by then are left out, and the report says
+    /// so. Zero leaves all of them out.
     pub certificates: Duration,
     /// True ends the search for gains, certificates and bounds; the report has what was done by then.
     pub interrupted: Arc<AtomicBool>,
@@ -48,7 +48,7 @@ pub(crate) struct Budget {
     start: Instant,
     limit: Duration,
     phase: &'static str,
-    /// The option that allows more.
+    /// The command-line option that allows more time.
     option: &'static str,
     interrupted: Arc<AtomicBool>,
 }
@@ -64,7 +64,7 @@ impl Budget {
         Self { start: Instant::now(), limit, phase, option, interrupted }
     }
 
-    /// Starts the clock of a phase within this one, which has a part of the whole time.
+    /// Starts the clock of a phase within this one, which has the fraction `part` of the whole time.
     pub(crate) fn part(&self, part: f64, phase: &'static str) -> Self {
         Self { start: Instant::now(), limit: self.limit.mul_f64(part), phase, ..self.clone() }
     }
@@ -73,14 +73,14 @@ impl Budget {
         self.start.elapsed() >= self.limit || self.interrupted.load(Ordering::Relaxed)
     }
 
-    /// Runs `compute`, whose linear matrix inequalities end with the budget.
+    /// Runs `compute`; linear matrix inequalities in it end when the time is over.
     pub(crate) fn run<T>(&self, compute: impl FnOnce() -> T) -> T {
         let budget = self.clone();
         let ending: Ending = Arc::new(move || budget.is_over());
         until(Some(ending), compute)
     }
 
-    /// The reason for leaving something out.
+    /// Returns why something was left out, as a part of a sentence that begins with "left out".
     pub(crate) fn reason(&self) -> String {
         let Self { limit, phase, option, .. } = self;
         if self.interrupted.load(Ordering::Relaxed) {

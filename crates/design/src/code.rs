@@ -13,8 +13,8 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// [`Error::Invalid`] for a continuous design; for an entry of the design that has no code; for a
-    /// number beyond the range of the precision.
+    /// [`Error::Invalid`] for a continuous design, for an entry of the design that has no code, and for a number beyond
+    /// the range of the precision.
     pub fn code(&self, language: Language, precision: Precision) -> Result<Code, Error> {
         let invalid = |error: &dyn std::error::Error| Error::Invalid(error.to_string());
         let design = aso_controller::Design::parse(&self.file, "design.toml");

@@ -20,12 +20,12 @@ use plant_file::estimation::Law;
 
 /// Designs the controller of the plant file at `path` with each law.
 ///
-/// The law that the file names has the parameters of the file, the others have default parameters.
-/// Certificates and bounds are left out.
+/// The law that the file names has the parameters of the file, the others have default parameters. A law that does not
+/// exist for the plant has a reason in place of a result. Certificates and bounds are left out.
 ///
 /// # Errors
 ///
-/// Same as [`crate::design()`] for the augmented observer.
+/// Same as [`crate::design()`], for the augmented observer and for each law that exists.
 pub fn compare(path: &Path) -> Result<Comparison, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
     let parsed = source.parse()?;

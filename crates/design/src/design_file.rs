@@ -27,7 +27,7 @@ use plant_file::faults::EntryPoint;
 use plant_file::signals::Signal as PlantSignal;
 
 impl Designed {
-    /// Returns the design file.
+    /// Returns the content of `design.toml`.
     pub(crate) fn file(
         &self,
         file: &PlantFile<'_>,
@@ -112,7 +112,7 @@ impl Designed {
     }
 }
 
-/// A signal as the design file has it.
+/// Returns a signal as the design file has it.
 pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
     Signal {
         name: signal.name.clone(),
@@ -122,8 +122,8 @@ pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
     }
 }
 
-/// `transfer` of the design file for a time constant in s: the rate in 1/s, in a sampled controller the part of u_t that a
-/// sample removes.
+/// Returns `transfer` of the design file for a time constant in s: the rate in 1/s; in a sampled controller the part of
+/// u_t that a sample removes.
 fn decay(time: f64, sample_time: Option<f64>) -> f64 {
     sample_time.map_or(1.0 / time, |period| -(-period / time).exp_m1())
 }
@@ -250,7 +250,7 @@ fn estimator(estimator: control::aso::Estimator) -> Estimator {
     }
 }
 
-/// Returns the unit divided by seconds, if it can be written.
+/// Returns the unit divided by seconds; None if FMI has no such unit.
 fn per_second(unit: &str) -> Option<String> {
     let slope = format!("{unit}/s");
     Unit::parse(&slope).is_ok().then_some(slope)

@@ -13,7 +13,7 @@ use crate::Error;
 
 /// The files that turn a packed FMU into that of a design.
 pub(crate) struct Content<'a> {
-    /// The model whose packed FMU takes them.
+    /// The name of the model in the packed FMU.
     pub(crate) model: &'static str,
     /// The files in `resources`, by name.
     pub(crate) resources: &'a [(&'static str, &'a [u8])],
@@ -28,7 +28,8 @@ pub struct DesignedFmu {
 }
 
 impl DesignedFmu {
-    /// Inserts `content` into the FMU `base` and lets its library generate the model description.
+    /// Inserts `content` into the packed FMU `base`, whose library then generates the model description. Refuses an FMU
+    /// of another model.
     pub(crate) fn new(base: &Path, content: &Content<'_>) -> Result<Self, Error> {
         let unpacked = Unpacked::open_whole(base).map_err(|error| {
             let what = format!("cannot open {}, the packed FMU", base.display());

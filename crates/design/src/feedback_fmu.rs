@@ -3,20 +3,20 @@
 use aso_controller::design::{Estimator, Measurement, Signal};
 use aso_controller::{Design, Matrix, channel};
 
-/// The controller of `design`, of n states of the plant, q states of the fault model and p measurements, which takes the
-/// estimates as inputs.
+/// Returns the controller of `design` that takes the estimates as inputs; the plant has n states, the fault model q.
 ///
 /// ```text
 /// y = [x_filter; f_filter; measurements]     the last ones with integral action only
 /// A = 0,  B = 0,  F_a = 0,  A_f = 0,  C = [I; 0; 0],  L_x = [I, 0, 0],  L_f = 0,  P_f = [0, I, 0],  H = [0, 0, H]
 /// ```
 ///
-/// So `x_hat` = `x_filter` and `f_hat` = `f_filter` in each sample; commands, limits, references and switches are those of
-/// `design`.
+/// So `x_hat` = `x_filter` and `f_hat` = `f_filter` in each sample; commands, limits, references and switches are those
+/// of `design`.
 ///
 /// # Errors
 ///
-/// Why there is none, and what helps.
+/// A sentence that says why there is none and what helps: with `[detection]`, `[reconfiguration]` or `[fallback]`, and
+/// with direct feedthrough.
 pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> {
     if design.detection.is_some() || design.is_reconfigurable() {
         return Err(
@@ -74,7 +74,7 @@ pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> 
     })
 }
 
-/// The element (i, j) of the unit matrix.
+/// Returns the element (i, j) of the unit matrix.
 fn unit(i: usize, j: usize) -> f64 {
     if i == j { 1.0 } else { 0.0 }
 }

@@ -18,7 +18,7 @@ use plant_file::PlantFile;
 
 pub use log::LogOptions;
 
-/// Rates of a measurement filter, in 1/s, that are tried for a plant with direct feedthrough.
+/// Rates of the measurement filter, in 1/s, that are tried in turn for a plant with direct feedthrough.
 const FILTERS: [f64; 4] = [10.0, 100.0, 1000.0, 1.0];
 
 /// A new plant file.
@@ -31,16 +31,18 @@ pub struct NewPlantFile {
     pub warnings: Vec<String>,
 }
 
-/// Writes a plant file for the plant at `sources`: an FMU (`.fmu`), MATLAB variables A, B, C, D and Ts (`.mat`), a table of
-/// them with names (`.csv`, see the book's page on plant files), or logs of its signals over time, which `options` describe
-/// and from which the plant is identified. `out` is where the file will be: its folder is where the path of an FMU starts.
+/// Writes a plant file for the plant at `sources`: an FMU (`.fmu`), MATLAB variables A, B, C, D and Ts (`.mat`), a
+/// table of them with names (`.csv`, see the book's page on plant files), or logs of its signals over time, which
+/// `options` describe and from which the plant is identified. `out` is where the file will be: its folder is where the
+/// path of an FMU starts.
 ///
-/// The faults are those of all actuators, or of as many as the measurements can tell apart. Feedback and observer have the
-/// bandwidths that a design without requirements would have.
+/// The faults are those of all actuators, or of as many as the measurements can tell apart. Feedback and observer have
+/// the bandwidths that a design without requirements would have. If no controller is found, the file has the faults of
+/// all actuators and no bandwidths, and states the reason.
 ///
 /// # Errors
 ///
-/// [`Error`]: a source cannot be read, is no plant, or a log from which none can be identified.
+/// [`Error`]: there is no source; one cannot be read, or is no plant; no plant can be identified from a log.
 pub fn new_plant_file(
     sources: &[PathBuf],
     options: &LogOptions,
@@ -72,7 +74,7 @@ pub fn new_plant_file(
     Ok(NewPlantFile { text, refusal: Some(refusal), warnings })
 }
 
-/// The plant, by the kind of its sources.
+/// Reads the plant, by the kind of its sources.
 fn draft(sources: &[PathBuf], options: &LogOptions, out: &Path) -> Result<Draft, Error> {
     let [source, others @ ..] = sources else {
         return Err(Error::Invalid("expected the file of a plant, found none".to_owned()));
@@ -98,7 +100,7 @@ fn draft(sources: &[PathBuf], options: &LogOptions, out: &Path) -> Result<Draft,
     }
 }
 
-/// Faults and filters to try: those of all actuators first, then of fewer.
+/// Returns the faults and filters to try: first the faults of all actuators, then of fewer, last of one.
 fn attempts(draft: &Draft) -> Vec<Settings> {
     let all = draft.actuators.len();
     let one = |faulty: Vec<usize>, filter| Settings { faulty, filter, bandwidths: None };

@@ -18,18 +18,19 @@ use plant_file::faults::EntryPoint;
 use plant_file::signals::Signal as PlantSignal;
 use plant_file::signals::joined;
 
-/// Largest modulus of an eigenvalue of A times the integration step: Runge-Kutta's method of order 4 has then an error of
-/// some 1e-6 a step.
+/// Largest modulus of an eigenvalue of A times the integration step: Runge-Kutta's method of order 4 has then an error
+/// of some 1e-6 a step.
 const RESOLUTION: f64 = 0.2;
 /// Most integration steps of a sample that are chosen.
 const MOST_STEPS: f64 = 1e4;
 
-/// The Kalman filter for the plant of `file`, for the noise of the designed observer; `stop_time`: of its default experiment,
-/// in s.
+/// Returns the Kalman filter for the plant of `file`, for the noise of the designed observer; `stop_time`: of its
+/// default experiment, in s.
 ///
 /// # Errors
 ///
-/// The file asks for something that this filter does not have, with its line and what helps.
+/// The file asks for something that this filter does not have, or its FMU cannot be carried; with the line, and what
+/// helps.
 pub(crate) fn kalman_design(
     file: &PlantFile<'_>,
     designed: &Designed,
@@ -123,7 +124,8 @@ pub(crate) fn kalman_design(
     })
 }
 
-/// The factor of the covariances: with it the variances of the measurements are those of the file, in the geometric mean.
+/// Returns the factor of the covariances with which the variances of the measurements are those of the file, in the
+/// geometric mean; None if the file does not state them.
 fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
     if !noise.is_relative {
         return Some(1.0);

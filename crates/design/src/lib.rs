@@ -66,11 +66,11 @@ pub struct Design {
     /// The text that every file of this design contains: the plant file's name and a number from
     /// the names of its signals.
     pub identity: String,
-    /// A plant file with the worst plant that was found within the tolerances; none if the loop is
-    /// not stable, or if a plant file cannot state the faults of the plant's FMU.
+    /// A plant file with the worst plant that was found within the tolerances; None if the loop is not stable, or if a
+    /// plant file of matrices cannot state how a fault or a disturbance enters the plant's FMU.
     pub worst_case: Option<String>,
-    /// The loop of the plant and the controller within its limits, in deviations from the operating point; that of
-    /// the plant of the file in a design for several. Sampled, if the controller is.
+    /// The loop of plant and controller while commands are within their limits, in deviations from the operating point;
+    /// sampled if the controller is. In a design for several plants it is the loop of the plant of the file.
     pub closed_loop: Loop,
     /// The FMU of the plant, if the plant file names one.
     pub model: Option<PathBuf>,
@@ -90,7 +90,7 @@ pub fn design(path: &Path) -> Result<Design, Error> {
     design_within(path, &TimeLimits::default(), &|_| {})
 }
 
-/// [`design()`] within `limits`. `observer` is called when a step begins.
+/// Same as [`design()`] within `limits`. `observer` is called when a step begins.
 ///
 /// # Errors
 ///
@@ -185,12 +185,13 @@ impl Design {
         Ok(fmu)
     }
 
-    /// Makes the FMU of the controller that takes the estimates of [`Design::kalman_fmu`] in place of its own; from the packed
-    /// controller at `base`.
+    /// Makes the FMU of the controller that uses the estimates of [`Design::kalman_fmu`] in place of its own, from the
+    /// packed controller at `base`.
     ///
     /// # Errors
     ///
-    /// [`Error`]: there is no such filter; the controller needs its own observer; `base` is no packed ASO controller.
+    /// [`Error`]: there is no such filter; the controller needs its own observer; `base` is no packed ASO controller,
+    /// or its library refuses the design.
     pub fn feedback_fmu(&self, base: &Path) -> Result<DesignedFmu, Error> {
         self.kalman.as_ref().map_err(|refusal| Error::from(refusal.clone()))?;
         let invalid = |text: String| Error::Invalid(text);
@@ -210,13 +211,14 @@ impl Design {
         DesignedFmu::new(base, &content)
     }
 
-    /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that carries the plant's
-    /// FMU; from the packed one at `base`.
+    /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that carries
+    /// the plant's FMU; from the packed one at `base`.
     ///
     /// # Errors
     ///
-    /// [`Error`]: the plant is no FMU, or has what this filter has not; the gain of the observer follows from no noise; `base`
-    /// is no packed Kalman filter.
+    /// [`Error`]: the plant is no FMU, or has something that this filter does not support; the gain of the observer
+    /// follows from no noise; the FMU of the plant cannot be read; `base` is no packed Kalman filter, or its library
+    /// refuses the design.
     pub fn kalman_fmu(&self, base: &Path) -> Result<DesignedFmu, Error> {
         let (Ok(design), Some(model)) = (&self.kalman, &self.model) else {
             let refusal = self.kalman.as_ref().err().cloned();
@@ -230,20 +232,20 @@ impl Design {
         DesignedFmu::new(base, &content)
     }
 
-    /// The report as an HTML page that needs no other file.
+    /// Returns the report as an HTML page that needs no other file.
     #[must_use]
     pub fn page(&self) -> String {
         design_page::page(&self.report, &self.identity)
     }
 
-    /// Whether all checks hold and the verdict is not red.
+    /// Whether the verdict is not red, for which all checks must hold.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.report.verdict.level != Level::Red
     }
 }
 
-/// The user's sentence, or one that names the faults.
+/// Returns the description of the plant file, or a sentence that names the faults.
 fn description(file: &PlantFile<'_>, solution: &Solution) -> String {
     let faults = joined(solution.linear.faults.iter().map(|fault| fault.name.as_str()));
     let default = || format!("Fault-tolerant controller that estimates and compensates {faults}");

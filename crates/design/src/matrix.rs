@@ -8,12 +8,12 @@ pub(crate) fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
 }
 
-/// Returns real and imaginary parts.
+/// Returns the real and the imaginary part of each number.
 pub(crate) fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     numbers.iter().map(|number| [number.re, number.im]).collect()
 }
 
-/// The matrix as the design file has it: -0.0 is 0.0.
+/// Returns the matrix as the design file has it; negative zeros become zeros.
 pub(crate) fn matrix(dense: &DMatrix<f64>) -> Matrix {
     let values =
         dense.row_iter().flat_map(|row| row.iter().map(|entry| entry + 0.0).collect::<Vec<_>>());

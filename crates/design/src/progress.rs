@@ -1,4 +1,4 @@
-//! How far a design is.
+//! The progress of a design.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
-    /// What is computed from now on, a noun.
+    /// The name of what is computed from now on.
     pub step: &'static str,
-    /// The part of the work that is done, 0 to 1: an estimate for a large plant.
+    /// The part of the work that is done, from 0 to below 1, estimated for a large plant.
     pub done: f64,
 }
 
-/// Is called when a step begins, by several threads at the same time.
+/// A function that is called when a step begins, possibly by several threads at the same time.
 pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
 
 /// The steps that take the time of a design. Some of them run at the same time.
@@ -44,7 +44,7 @@ impl Step {
         Self::Remedies,
     ];
 
-    /// Its name, and its part of the time of a design with 100 states, relative to the other steps.
+    /// Returns the name of the step, and its part of the time of a design with 100 states, relative to the other steps.
     fn name_and_weight(self) -> (&'static str, u32) {
         match self {
             Self::Gains => ("gains", 5),
@@ -61,7 +61,7 @@ impl Step {
     }
 }
 
-/// The steps of one design that are done.
+/// Counts the steps of one design that are done.
 pub(crate) struct Steps<'a> {
     observer: &'a Observer<'a>,
     done: AtomicU32,
@@ -72,7 +72,7 @@ impl<'a> Steps<'a> {
         Self { observer, done: AtomicU32::new(0) }
     }
 
-    /// Runs `compute` as a step.
+    /// Tells the observer that `step` begins, and runs `compute`.
     pub(crate) fn run<T>(&self, step: Step, compute: impl FnOnce() -> T) -> T {
         let all: u32 = Step::ALL.into_iter().map(|step| step.name_and_weight().1).sum();
         let (name, weight) = step.name_and_weight();

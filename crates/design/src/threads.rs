@@ -7,8 +7,7 @@ use rayon::ThreadPoolBuilder;
 
 use crate::Error;
 
-/// Starts the threads. Rayon, which starts them at their first use, would panic if the system refuses
-/// one.
+/// Starts the threads, unless they run. Rayon would start them at their first use, and panic if the system refuses one.
 ///
 /// # Errors
 ///
@@ -17,7 +16,7 @@ pub(crate) fn start() -> Result<(), Error> {
     static REFUSAL: OnceLock<Option<String>> = OnceLock::new();
     let refusal = REFUSAL.get_or_init(|| {
         let started = ThreadPoolBuilder::new().build_global();
-        // An error without a cause: the program has started them.
+        // An error without a cause says that the program has started them before.
         started.err().and_then(|error| error.source().map(ToString::to_string))
     });
     match refusal {

@@ -15,17 +15,17 @@ use plant_file::faults::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
-/// The parts of a sampling interval in which a fault may change and at which the states are read.
+/// Number of equal parts of a sample time: a fault is constant over each, and the states are read at its start.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
-/// Number of outputs for each thread between two looks at the clock.
+/// Number of outputs that each thread computes between two checks of the time limit.
 const OUTPUTS_AT_ONCE: usize = 64;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
 pub(crate) struct Outputs {
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<Option<String>>,
-    /// Positions in [x; e; eps] of quantities known to the user, without states of filters and delays and rates.
+    /// The position of each output in [x; e; eps], which also has states of filters and delays, and rates of faults.
     pub(crate) positions: Vec<usize>,
 }
 
@@ -49,7 +49,7 @@ impl Outputs {
     }
 }
 
-/// The H-infinity norm, and how it was computed. Where the level sets do not converge, as with a zero of the
+/// Returns the H-infinity norm, and how it was computed. If the level sets do not converge, as with a zero of the
 /// whole system at z = 1, it is the largest value on a grid of frequencies.
 pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), Error> {
     match h_infinity(system, WIDTH) {
@@ -64,7 +64,8 @@ pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), E
     }
 }
 
-/// The peak gains of an output from each fault, from the rates, and from what the compensation leaves.
+/// The peak gains of an output from the faults, from their rates, and from the part of the faults that the
+/// compensation leaves; 1 x q each.
 type PeakGains = [RowDVector<f64>; 3];
 
 /// Why an output has no peak gains.
@@ -100,10 +101,11 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
-    /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
-    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too, if its plant is known
-    /// there. The errors of
-    /// the faults come first, as long as the time of `budget` allows.
+    /// Returns the peak-to-peak gains of each output. Those of a sampled loop also hold between its samples, if its
+    /// plant is known there.
+    ///
+    /// The errors of the faults are computed first, then those of the states, then the states. Outputs that are left
+    /// when the time of `budget` is over are [`Missing::Time`].
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions = &self.outputs.positions;
         let mut peaks = vec![Err(Missing::Time); positions.len()];
@@ -129,7 +131,8 @@ impl<'a> Loops<'a> {
         Ok(peaks)
     }
 
-    /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
+    /// Returns the gains of the outputs at the positions `rows` in [x; e; eps]. If they do not converge together, each
+    /// output is computed alone, and one that does not converge is [`Missing::Numerics`].
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let Solution { extended, plant, gains, domain, .. } = self.designed;
         let peaks = match (extended.domain, *domain) {
@@ -203,8 +206,7 @@ impl<'a> Loops<'a> {
         Ok((bounds, reasons.into_iter().filter_map(warning).collect()))
     }
 
-    /// Returns the transfer function from the faults, as `system` has them, to their estimation
-    /// errors.
+    /// Returns the part of `system` from its inputs, the faults or their rates, to the errors of their estimates.
     fn to_fault_errors(&self, system: &StateSpace) -> StateSpace {
         let channels = &self.designed.extended.channels;
         let columns: Vec<_> = channels.iter().map(|channel| channel.estimate).collect();
@@ -219,7 +221,8 @@ impl<'a> Loops<'a> {
         }
     }
 
-    /// Returns the singular values from the faults to their estimates and to the estimation errors.
+    /// Returns the singular values from the faults to their estimates and to the estimation errors; unless a constant
+    /// fault leaves a lasting error, also those from the rates of the faults to these errors.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
         let errors = self.to_fault_errors(&self.of_faults);
         let count = errors.d.ncols();

@@ -13,8 +13,8 @@ use crate::solve::designed::design;
 use plant_file::requirements::{Bandwidth, Request, Requirement};
 use plant_file::{PlantFile, Sampling};
 
-/// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback:
-/// the first that makes the verdict green is taken.
+/// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback,
+/// in the order in which they are tried.
 const CANDIDATES: [(f64, f64); 18] = [
     (1.0, 4.0),
     (0.5, 4.0),
@@ -37,13 +37,14 @@ const CANDIDATES: [(f64, f64); 18] = [
 ];
 /// From this number of states on, only the first candidates are examined, without the tolerances.
 const LARGE: usize = 24;
+/// Number of candidates for such a plant.
 const OF_LARGE: usize = 3;
 /// Number of candidates that are examined in parallel; fixed, so that the result is the same on every machine.
 const TOGETHER: usize = 3;
-/// Eigenvalues smaller than this part of the largest one have no speed.
+/// Eigenvalues smaller than this part of the largest one do not count for the speed of the plant.
 const NO_SPEED: f64 = 1e-9;
-/// Relative change of the entries of A. An eigenvalue that it changes by half is rounding and has no speed, as those of
-/// integrators in other coordinates.
+/// Relative change of the entries of A. An eigenvalue whose modulus it changes by half or more is a rounding error and
+/// does not count for the speed, as those of integrators in other coordinates.
 const LAST_DIGITS: f64 = 1e-9;
 /// Largest bandwidth of the feedback in rad per sample.
 const PER_SAMPLE: f64 = 0.2;
@@ -52,12 +53,15 @@ const OBSERVER_PER_SAMPLE: f64 = 1.5;
 /// The bandwidth for a plant without a speed of its own, rad/s.
 const WITHOUT_SPEED: f64 = 1.0;
 
-/// Returns `file` with the bandwidths that it leaves open.
+/// Returns `file` with the bandwidths that it leaves open: those of the first candidate with a green verdict, otherwise
+/// those of the best stable one, see [`Judged::is_better`].
 ///
-/// The speed of the plant is the median of the moduli of its eigenvalues in 1/s, at least twice the largest real part; of a
-/// loop whose feedback is stated by eigenvalues, the median of these. Of the candidates the first with a green verdict is
-/// taken, otherwise that with the lowest peak of S. If gains cannot be computed, the error also says what no controller of the
-/// plant reaches.
+/// Candidates that are left when the time of `budget` is over are not tried.
+///
+/// # Errors
+///
+/// The gains of the first candidates cannot be computed: the error also says what no controller of the plant reaches.
+/// No candidate has a stable loop. The plant cannot be read.
 pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantFile<'a>, Error> {
     if !file.feedback.is_open() && !file.observer.is_open() {
         return Ok(file.clone());
@@ -114,7 +118,8 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
     }
 }
 
-/// Examines the loop of a file, with its tolerances if `varies` and the nominal loop is green; None if it is not stable.
+/// Examines the loop of a file, with its tolerances if `varies` and the nominal loop is green; None if it is not
+/// stable.
 fn judged(file: &PlantFile<'_>, varies: bool) -> Result<Option<Judged>, Error> {
     let nominal = design(file)?.nominal;
     let judged = Judged::of(&nominal, None)?;
@@ -122,7 +127,7 @@ fn judged(file: &PlantFile<'_>, varies: bool) -> Result<Option<Judged>, Error> {
     if varies { Judged::of(&nominal, Some(&file.robustness)) } else { Ok(judged) }
 }
 
-/// The file with bandwidths where it leaves them open, with the digits that a plant file has.
+/// Returns `file` with these bandwidths in rad/s where it leaves them open, at most [`OBSERVER_PER_SAMPLE`] per sample.
 fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a> {
     let most =
         file.sampling.map_or(f64::INFINITY, |sampling| OBSERVER_PER_SAMPLE / sampling.period);
@@ -139,7 +144,10 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
     other
 }
 
-/// The speed of the plant, or of the stated feedback, rad/s.
+/// Returns the speed of the plant in rad/s, to which the bandwidths are relative: a stated bandwidth of the feedback,
+/// or the median of the moduli of the eigenvalues, those stated for the feedback or else those of the plant.
+///
+/// A median is at least twice the largest real part, and at most what sample time and delays allow.
 fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, file.sampling) {
         (Requirement::Eigenvalues(all), _) => all.clone(),
@@ -171,7 +179,7 @@ fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     Ok(median.max(2.0 * unstable).min(most))
 }
 
-/// Whether an error is that of gains, for which the file states no requirement.
+/// Whether `error` is at the place of a requirement that the file leaves open.
 fn is_at_request(file: &PlantFile<'_>, error: &PlaceError) -> bool {
     let place = |error: &PlaceError| (error.line(), error.column());
     let requests = [&file.feedback, &file.observer].into_iter().filter(|request| request.is_open());
@@ -179,7 +187,7 @@ fn is_at_request(file: &PlantFile<'_>, error: &PlaceError) -> bool {
     errors.any(|other| place(&other) == place(error))
 }
 
-/// A with other last digits.
+/// Returns A with each entry changed by [`LAST_DIGITS`], up or down in a fixed pattern.
 fn with_other_digits(a: &DMatrix<f64>) -> DMatrix<f64> {
     a.map_with_location(|row, column, entry| {
         let sign = if (row * row + 3 * column + row * column) % 4 < 2 { 1.0 } else { -1.0 };
@@ -187,7 +195,7 @@ fn with_other_digits(a: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The finite moduli in ascending order; a sampled eigenvalue of 0 has none.
+/// Returns the finite moduli in ascending order. The rate of a sampled eigenvalue of 0 is infinite and left out.
 fn moduli(eigenvalues: &[Complex<f64>]) -> Vec<f64> {
     let sizes = eigenvalues.iter().map(|value| value.norm());
     let mut sizes: Vec<_> = sizes.filter(|size| size.is_finite()).collect();

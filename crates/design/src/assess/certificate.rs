@@ -27,6 +27,7 @@ pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget
     }
 }
 
+/// Returns the outcome of `solve`, or the reason of `budget` if its time is over before, or when `solve` fails.
 fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     if budget.is_over() {
         return Err(budget.reason());
@@ -35,7 +36,7 @@ fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Res
     if outcome.is_err() && budget.is_over() { Err(budget.reason()) } else { outcome }
 }
 
-/// Returns the largest norm of the fault vector, from the bounds of the plant file.
+/// Returns the largest norm of a vector whose entries have these bounds; None if a bound is missing.
 fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let squares = bounds.map(|bound| bound.map(|bound| bound * bound));
     squares.sum::<Option<f64>>().map(f64::sqrt)
@@ -46,7 +47,7 @@ fn fault_bound(designed: &Solution) -> Result<f64, String> {
     largest(bounds).ok_or_else(|| "it needs `bound` for every fault".to_owned())
 }
 
-/// Checks that the theorem applies: a continuous observer of constant faults.
+/// Checks that the theorem applies: an augmented observer of constant faults in continuous time.
 fn applies(designed: &Solution) -> Result<(), String> {
     if designed.law.law != Law::Augmented {
         return Err("the theorem is about the augmented observer".to_owned());
@@ -60,7 +61,7 @@ fn applies(designed: &Solution) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that linear matrix inequalities for the estimation error end in a few seconds.
+/// Checks that the theorem applies, and that the observer is small enough for linear matrix inequalities.
 fn solvable(designed: &Solution) -> Result<(), String> {
     applies(designed)?;
     let order = designed.plant.a.nrows() + designed.plant.f_a.ncols();
@@ -113,7 +114,7 @@ fn free(designed: &Solution) -> Result<FreeP, String> {
     })
 }
 
-/// Returns the ball that the error converges to for bounded rates of the faults.
+/// Returns the ball that the error converges to for bounded rates of the faults, or why there is none.
 fn ultimate(designed: &Solution) -> Result<Ultimate, String> {
     solvable(designed)?;
     let rates = designed.linear.faults.iter().map(|fault| fault.rate_bound);

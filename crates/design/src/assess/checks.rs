@@ -10,7 +10,7 @@ use crate::solve::solution::Solution;
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
 
-/// Returns all conditions, each with its numerical value.
+/// Returns all conditions, with a numerical value where there is one.
 pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     let mut all = Vec::from(existence(designed));
     all.push(check(
@@ -48,8 +48,8 @@ pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     all
 }
 
-/// Returns the conditions for the existence of feedback and observer, without which no design is
-/// returned.
+/// Returns the conditions for the existence of feedback and observer. A plant that does not satisfy them is refused
+/// before.
 fn existence(designed: &Solution) -> [Check; 3] {
     let Solution { controllability, distance, detectability, .. } = designed;
     // For a large system no lower bound is searched.

@@ -24,13 +24,13 @@ use plant_file::detection::{DetectionRequest, Method};
 use prediction::{Prediction, TestKind};
 use problem::Problem;
 
-/// A fault does not act on a residual whose mean it moves by less than this part of that of the fault
-/// that the test is for.
+/// A test does not react to a fault that moves the means of its residuals by less than this part of the motion that
+/// the tested fault causes.
 const INSENSITIVE: f64 = 1e-6;
 /// Time constants of the slowest filter after which its initial error is a thousandth.
 const SETTLING: f64 = 7.0;
-/// An excess of the interior of the limits of parameters above this part is a warning: the brackets of the
-/// means have a relative width of 0.01.
+/// Relative excess of the means within the limits of parameters over those at the corners, above which there is a
+/// warning: the brackets of the means have a relative width of 0.01.
 const NOTICEABLE: f64 = 0.02;
 /// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
 const LARGEST_DRIFT: f64 = 2.0;
@@ -54,15 +54,16 @@ struct PlannedTest {
     /// The combinations: rows x residuals of the filter.
     rows: DMatrix<f64>,
     kind: TestKind,
-    /// The largest mean of the residuals that errors of the model give them.
+    /// The largest length of the mean of the residuals that errors of the model cause, in standard deviations.
     bias: f64,
-    /// By which part the largest of these means within the limits of parameters exceeds that at the corners.
+    /// By which part the largest of these means within the limits of parameters exceeds that at the corners; None
+    /// unless parameters of an FMU vary.
     interior_excess: Option<f64>,
-    /// Whether it reacts to each fault.
+    /// Whether the test reacts to each fault.
     reacts: Vec<bool>,
 }
 
-/// Designs the detection that the plant file asks for, if it does.
+/// Designs the detection that the plant file asks for; None if it asks for none.
 pub(crate) fn detection(
     file: &PlantFile<'_>,
     designed: &Designed,
@@ -87,7 +88,7 @@ pub(crate) fn detection(
     Ok(Some(Detection { section, report, warnings }))
 }
 
-/// Refuses several plants that the tests cannot allow for.
+/// Refuses schedules, and families that the tests cannot allow for.
 fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), crate::Error> {
     let message = if file.schedule.is_some() {
         "the thresholds rely on residuals that are white with variance 1, which interpolated filters give at the \
@@ -114,7 +115,8 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// Plans the filters and their tests.
+    /// With isolation each fault has a filter and a test, without there is one filter: by CUSUM it has a test for each
+    /// fault, by chi-square one test for all.
     fn parts(&self) -> Result<Vec<Part>, crate::Error> {
         let Self { file, request, problem, .. } = *self;
         let q = problem.faults.len();
@@ -142,7 +144,7 @@ impl Planner<'_> {
         Ok(vec![Part { decoupling: base, tests }])
     }
 
-    /// Plans the test for some faults, one of `count` tests.
+    /// Plans the test for some faults, one of `count` tests that share the rate of false alarms.
     fn plan(
         &self,
         decoupling: &Decoupling,
@@ -198,7 +200,7 @@ impl Planner<'_> {
     }
 }
 
-/// Whether the test for the fault `tested` reacts to each fault.
+/// Returns for each fault whether the test for the fault `tested` reacts to it.
 fn reacting(
     problem: &Problem,
     decoupling: &Decoupling,
@@ -218,12 +220,12 @@ fn reacting(
         .collect()
 }
 
-/// The largest length of a column.
+/// Returns the largest length of a column.
 fn largest(means: &DMatrix<f64>) -> f64 {
     means.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
 }
 
-/// All tests with the filters that they belong to.
+/// Returns all tests, each with the filter that it belongs to.
 fn tests(parts: &[Part]) -> impl Iterator<Item = (&Decoupling, &PlannedTest)> {
     parts.iter().flat_map(|part| part.tests.iter().map(|test| (&part.decoupling, test)))
 }
@@ -309,7 +311,7 @@ fn test_report(
     })
 }
 
-/// Predicts the detection of a fault by the test that is for it.
+/// Predicts the detection of a fault by the test that is for it; None if there is no such test.
 fn fault_report(
     problem: &Problem,
     parts: &[Part],
@@ -342,7 +344,8 @@ fn fault_report(
     }))
 }
 
-/// Names what the tests cannot do.
+/// Warns of faults that no test tells apart, of parameters that are worst within their limits, and of disturbances that
+/// are decoupled only while they are constant.
 fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
     for group in confused {
         warnings.push(format!(
@@ -387,7 +390,7 @@ fn hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) 
     }
 }
 
-/// Groups of faults to which the same tests react.
+/// Returns the groups of two or more faults to which the same tests react.
 fn confused(reacts: &[Vec<bool>], problem: &Problem) -> Vec<Vec<String>> {
     let signature = |fault: usize| reacts.iter().map(|test| test[fault]).collect::<Vec<_>>();
     let q = problem.faults.len();

@@ -21,7 +21,7 @@ const SETTLED: f64 = 0.02;
 /// The frequency of the sinusoidal fault relative to the mean rate of the observer.
 const SLOW: f64 = 0.1;
 
-/// Returns law and conditions of the estimates, with their errors.
+/// Returns the law of the estimates, its equations, parameters and conditions, with the errors of the estimates.
 pub(crate) fn estimation(designed: &Solution, errors: Vec<EstimationErrors>) -> Estimation {
     let law = &designed.law;
     let sampled = designed.domain != Domain::Continuous;
@@ -35,7 +35,8 @@ pub(crate) fn estimation(designed: &Solution, errors: Vec<EstimationErrors>) -> 
     }
 }
 
-/// Returns the errors of the estimate of each fault. What noise does to it is known for a stable loop only.
+/// Returns the errors of the estimate of each fault. The effect of noise is left out for a loop that is not stable,
+/// where `robustness` is None.
 pub(crate) fn errors(
     designed: &Solution,
     robustness: Option<&Robustness>,
@@ -92,7 +93,7 @@ impl<'a> Errors<'a> {
         let of_fault = to_error(&self.of_faults);
         let step = step_response(&of_fault, 0)?;
         let transient = step.transient(0, SETTLED);
-        // A ramp of f is a constant f' of its estimate, which a ramp model follows without lag.
+        // A ramp of f is a constant f', which a ramp model follows without lag.
         let ramp = match (law.leaks(), channel.rate) {
             (true, _) => None,
             (false, Some(_)) => Some(0.0),

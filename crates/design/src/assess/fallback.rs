@@ -27,7 +27,8 @@ const LOSSES: u32 = 10;
 /// Decay rates below this part of that of the intact loop count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// The case with the slowest loop, if its decay rate is below the required one.
+/// Returns the case with the slowest loop, if its decay rate is below the required one; None if all loops are fast
+/// enough.
 pub(crate) fn slowest(cases: &Cases<'_>, fallback: &Fallback) -> Result<Option<SlowCase>, Error> {
     let Cases { designed, request } = *cases;
     let gains = fallback.gains(designed);
@@ -51,7 +52,7 @@ pub(crate) fn slowest(cases: &Cases<'_>, fallback: &Fallback) -> Result<Option<S
     Ok(slowest.filter(|slowest| slowest.rate < required))
 }
 
-/// Returns the report on the fall-back of `designed`.
+/// Returns the report on the fall-back of `designed`; None if the plant file asks for none.
 pub(crate) fn report(
     file: &PlantFile<'_>,
     designed: &Solution,
@@ -97,12 +98,12 @@ pub(crate) fn report(
 struct Examination<'a> {
     cases: Cases<'a>,
     gains: Gains,
-    /// H2 norms of the intact loop.
+    /// H2 norms of the intact loop, one for each measurement.
     reference: Vec<f64>,
 }
 
 impl Examination<'_> {
-    /// The case at a position; `failed`: the actuator, and the command at which it is stuck if it is gone.
+    /// Returns the case at a position; `failed`: its actuator, and the command at which that is stuck if it is gone.
     fn case(&self, at: usize, failed: Option<(usize, f64)>) -> Result<FallbackCase, crate::Error> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, extended, domain, .. } = designed;
@@ -135,8 +136,9 @@ impl Examination<'_> {
         })
     }
 
-    /// Margins and delay margin in s while an actuator has failed. One that is gone is no input of the loop:
-    /// the plant has no column of it, and the controller no command, although the observer goes on with it.
+    /// Returns margins, and the delay margin in s, while an actuator has failed. An actuator that is gone is no input
+    /// of the loop: the plant has no column for it and the controller no command, although the observer goes on with
+    /// it.
     fn margins(&self, failed: Option<usize>) -> Result<(Vec<LoopPoint>, f64), Error> {
         let Cases { designed, request } = self.cases;
         let LinearPlant { actuators, measurements, .. } = &designed.linear;
@@ -158,10 +160,10 @@ impl Examination<'_> {
         Ok((loop_points(&closed_loop, &inputs, measurements)?, delay?))
     }
 
-    /// The equilibrium of the loop, and the actuator that is gone with its command.
+    /// Returns the equilibrium of the loop, and the actuator with its command if it is gone.
     ///
-    /// What acts is the difference between the effect of the operating point's command and that of the
-    /// actuator: its stuck command, or the part that it has lost.
+    /// The input of the loop is the deviation of the actuator from its command at the operating point: its stuck
+    /// command less that, or the part of it that is lost.
     fn rest(
         &self,
         whole: &DMatrix<f64>,
@@ -193,7 +195,7 @@ impl Examination<'_> {
     }
 }
 
-/// H2 norms from white noise on the commands, before a loss, to the measurements of the loop `whole`.
+/// Returns the H2 norms from white noise on the commands, before a loss, to the measurements of the loop `whole`.
 fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
     let Solution { linear, plant, domain, .. } = designed;
     let (p, order) = (linear.c.nrows(), whole.nrows());
@@ -208,8 +210,8 @@ fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
     Ok(energy(&system)?.peaks)
 }
 
-/// What the fall-back contributes to the verdict; `limit`: the peak of S above which a design is red and
-/// its fall-back amber.
+/// Returns the reasons of the verdict by the fall-back; `limit`: the peak of S above which a design is red and its
+/// fall-back amber.
 pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String)> {
     let mut reasons = Vec::new();
     let mut amber = |text: String| reasons.push((Level::Amber, text + " (amber)"));

@@ -18,7 +18,7 @@ use crate::solve::family::{NOMINAL, name};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
-/// Returns the report on the family of `designed`, if it has one.
+/// Returns the report on the family of `designed`; None if it has none.
 pub(crate) fn family(
     designed: &Designed,
     limits: &RobustnessLimits,
@@ -48,7 +48,8 @@ pub(crate) fn family(
     }))
 }
 
-/// Returns margins, noise and tolerances of `linear` with the controller of `designed`.
+/// Returns margins, noise and tolerances of `linear` with the controller of `designed`; no margins if the loop is not
+/// stable, no tolerances if parameters of an FMU vary.
 pub(crate) fn member(
     designed: &Solution,
     linear: &LinearPlant,
@@ -74,7 +75,7 @@ pub(crate) fn member(
     Ok(MemberReport { name, instability, margins: Some(margins) })
 }
 
-/// One P for all loops, or the reason why there is none.
+/// Returns one P for all loops, or the reason why there is none. `name`: of the loop at a position.
 pub(crate) fn common(
     loops: &[DMatrix<f64>],
     domain: Domain,

@@ -1,4 +1,4 @@
-//! What the verdict on the loop of a solution depends on.
+//! The figures of a loop that decide whether its verdict is green, for the comparison of designs.
 
 use std::cmp::Ordering;
 
@@ -11,6 +11,7 @@ use plant_file::robustness::RobustnessLimits;
 /// The peaks of S of a stable loop, and its stability within the tolerances.
 pub(crate) struct Judged {
     pub(crate) points: Vec<LoopPoint>,
+    /// Whether a plant within the tolerances is unstable; false if the tolerances were not examined.
     pub(crate) is_unstable: bool,
 }
 
@@ -34,13 +35,13 @@ impl Judged {
         Ok(Some(Self { points, is_unstable }))
     }
 
-    /// Whether the verdict has no reason to be other than green.
+    /// Whether peaks of S and tolerances allow a green verdict.
     pub(crate) fn is_green(&self, limits: &RobustnessLimits) -> bool {
         !self.is_unstable && self.largest_peak() <= limits.amber
     }
 
-    /// Whether the peaks are within the limit where those of the other are not, else whether it is stable within the
-    /// tolerances where the other is not, else whether its peaks are lower.
+    /// Whether this loop is better than the other: its peaks are within the limit and those of the other are not; if
+    /// both or neither are, it alone is stable within the tolerances; if that is equal, too, its largest peak is lower.
     pub(crate) fn is_better(&self, other: &Self, limits: &RobustnessLimits) -> bool {
         let rank = |judged: &Self| (judged.largest_peak() > limits.amber, judged.is_unstable);
         match rank(self).cmp(&rank(other)) {

@@ -72,13 +72,14 @@ fn number(name: &str, value: f64) -> Number {
     Number { name: name.to_owned(), unit: None, value }
 }
 
-/// What the losses contribute to the verdict.
+/// Returns the reasons of the verdict by the losses.
 pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
     report.loops.iter().filter_map(|lossy| reason(lossy, &report.stated)).collect()
 }
 
-/// A loop that constant losses within the stated range make unstable is red, a loop without a proof
-/// amber. With the compensation off, which may never happen, the first is amber, too.
+/// Returns the reason of the verdict by a loop: red if constant losses within the stated range make it unstable, amber
+/// if nothing is proven. With the compensation off, which may never happen, the first is amber and the second no
+/// reason.
 fn reason(report: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
     let on = report.name == ON;
     let limit = &report.constant[0];
@@ -111,7 +112,7 @@ struct Variant {
     closed: DesignLoop,
 }
 
-/// Returns the controllers with compensation on and off.
+/// Returns the controllers with compensation on and off; only on if integrals act and the estimates are held.
 fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
     let Solution { linear, plant, gains, domain, .. } = designed;
     let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
@@ -135,7 +136,7 @@ fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
     Ok(if held_integrals { vec![on] } else { vec![on, off] })
 }
 
-/// The controller whose estimates of the faults are held: an observer of the states only.
+/// Returns the controller whose estimates of the faults are held: an observer of the states only.
 fn without_estimates(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -182,7 +183,7 @@ impl Examination<'_> {
         self.stated.iter().map(|loss| loss.up_to).collect()
     }
 
-    /// The stated losses together; with several, also each one alone.
+    /// Returns the largest losses of all actuators together; with several actuators, then also those of each alone.
     fn boxes(&self) -> Vec<Vec<f64>> {
         let all = self.largest();
         let alone = |at: usize| {
@@ -196,7 +197,7 @@ impl Examination<'_> {
         self.lossy.intact.nrows() > LARGEST_ORDER
     }
 
-    /// Why no proof is searched.
+    /// Returns why no proof is searched; None if one is.
     fn obstacle(&self, constant: &ConstantLoss) -> Option<String> {
         if !constant.stable && constant.factor <= 1.0 {
             let losses = described(&constant.losses);
@@ -211,7 +212,7 @@ impl Examination<'_> {
         })
     }
 
-    /// The constant losses that make the loop unstable, up to a loss of 1.
+    /// Returns the constant losses, proportional to `largest`, from which on the loop is unstable, up to a loss of 1.
     fn constant(&self, largest: &[f64]) -> Result<ConstantLoss, Error> {
         let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
         let limit = self.lossy.constant_limit(largest, most)?;
@@ -224,7 +225,8 @@ impl Examination<'_> {
         })
     }
 
-    /// The proof for the stated losses; decay rate and bounds of the states if `bounded`.
+    /// Returns the proof for the stated losses, or why there is none; with decay rate and bounds of the states if
+    /// `bounded` and the time allows.
     fn proof(&self, bounded: bool) -> Result<Result<LossProof, String>, Error> {
         let largest = self.largest();
         let certificate = match self.lossy.certificate(&largest, &Region::default())? {
@@ -249,6 +251,8 @@ impl Examination<'_> {
         }))
     }
 
+    /// Returns the largest losses with a proof, for each of [`Self::boxes`] as far as the time allows. `constant`: the
+    /// limits of constant losses, one for each box.
     fn certified(&self, constant: &[ConstantLoss]) -> Result<Vec<CertifiedLoss>, Error> {
         let mut all = Vec::new();
         for (largest, limit) in self.boxes().iter().zip(constant) {
@@ -266,7 +270,8 @@ impl Examination<'_> {
         Ok(all)
     }
 
-    /// The bounds of the states under each disturbance of known size.
+    /// Returns the bounds of the states under each disturbance of known size; those without a proof, or without time,
+    /// are left out. `decay`: the proven decay rate.
     fn peaks(&self, decay: f64) -> Result<Vec<LossPeak>, Error> {
         let linear = &self.designed.linear;
         let corners = self.lossy.corners(&self.largest());
@@ -303,8 +308,8 @@ impl Examination<'_> {
         Ok(peaks)
     }
 
-    /// What acts on the plant with a known size: the lost part of each command of the operating point,
-    /// and every other fault whose bound is stated.
+    /// Returns what acts on the plant with a known size: the lost part of each command of the operating point, and each
+    /// fault with a stated bound, without losses of effectiveness; a sensor fault only if the plant has the filter.
     fn disturbances(&self) -> Vec<Disturbance> {
         let Solution { linear, extended, whole, .. } = self.designed;
         let plant = &whole.plant;
@@ -315,7 +320,7 @@ impl Examination<'_> {
                 column: plant.b.column(loss.actuator).into_owned(),
             });
         let faults = linear.faults.iter().zip(&extended.channels).filter_map(|(fault, channel)| {
-            // A sensor fault acts through the filter, which may be part of the controller.
+            // A sensor fault acts through the filter, which with integral action is part of the controller.
             let additive = match fault.entry_point {
                 EntryPoint::Loss { .. } => false,
                 EntryPoint::Sensor(_) => plant.a.nrows() > linear.states.len(),

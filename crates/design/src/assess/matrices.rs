@@ -45,7 +45,8 @@ impl Names {
         }
     }
 
-    /// Returns A, B, C, F_a of the plant, and the model in the observer if it differs.
+    /// Returns A, B, C, F_a of the plant, and D with direct feedthrough; the model in the observer if it differs, and
+    /// A_f if it is not 0.
     pub(crate) fn plant_matrices(&self, designed: &Solution) -> Vec<Matrix> {
         let Self { states, extended, actuators, measurements, faults, .. } = self;
         let linear = &designed.linear;
@@ -124,7 +125,8 @@ pub(crate) fn names(signals: &[Signal]) -> Vec<String> {
     signals.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// Matrices of the shapes of A, B, C and D of the plant without its delays; that of D if the plant has one.
+/// Returns four matrices with the rows and columns of A, B, C and D of the plant without its delays; the last one only
+/// if D is not 0.
 pub(crate) fn of_plant(
     linear: &LinearPlant,
     meaning: &str,

@@ -7,7 +7,7 @@ use crate::solve::tracking::Tracking;
 use plant_file::PlantFile;
 use plant_file::pid::Pair;
 
-/// The controllers of low order of a solution; none of a state feedback.
+/// Returns the controllers of low order of a solution; none for a state feedback.
 pub(crate) fn controllers(file: &PlantFile<'_>, designed: &Solution) -> Vec<PidController> {
     let (Some(pid), Some(references)) = (file.pid(), &file.references) else { return Vec::new() };
     let Solution { linear, feedback, tracking, .. } = designed;

@@ -14,7 +14,7 @@ use crate::solve::tracking::{REACHED, Tracking, TrackingAction};
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];
 
-/// Returns the responses to a step of each reference.
+/// Returns the response to a step of each reference.
 pub(crate) fn reference_steps(designed: &Solution) -> Result<Vec<ReferenceStep>, Error> {
     let Some(tracking) = &designed.tracking else {
         return Ok(Vec::new());
@@ -23,7 +23,7 @@ pub(crate) fn reference_steps(designed: &Solution) -> Result<Vec<ReferenceStep>,
     (0..tracking.signals.len()).map(|at| reference_loop.step(at)).collect()
 }
 
-/// Returns the condition that constant references are reached.
+/// Returns the condition that constant references are reached; None without references.
 pub(crate) fn reached(steps: &[ReferenceStep]) -> Option<Check> {
     let error = steps.iter().map(|step| step.steady_state_error.abs()).reduce(f64::max)?;
     Some(Check {
@@ -64,7 +64,7 @@ struct Output {
 struct ReferenceLoop<'a> {
     designed: &'a Solution,
     tracking: &'a Tracking,
-    /// The measurements, then what references for combinations of them set.
+    /// The measurements, then the combinations of measurements that references set.
     outputs: Vec<Output>,
     /// The output that each reference sets.
     tracked: Vec<usize>,
@@ -101,7 +101,7 @@ impl<'a> ReferenceLoop<'a> {
         })
     }
 
-    /// The points of an output, each a time and a value; for a sampled loop also between samples.
+    /// Returns the points of an output, each a time and a value; for a sampled loop also between samples.
     fn points(&self, trace: &TimeResponse, output: usize) -> Vec<(f64, f64)> {
         let first = self.outputs.len() + self.designed.plant.b.ncols();
         let between = |part: usize| first + part * self.outputs.len() + output;
@@ -110,7 +110,7 @@ impl<'a> ReferenceLoop<'a> {
         })
     }
 
-    /// The response to a step of reference `at`.
+    /// Returns the response to a step of reference `at`.
     fn step(&self, at: usize) -> Result<ReferenceStep, Error> {
         let trace = step_response(&self.system, at)?;
         let stated = self.tracking.steps[at];
@@ -166,7 +166,7 @@ impl<'a> ReferenceLoop<'a> {
         })
     }
 
-    /// The curve of a row of the system, for a step of this size.
+    /// Returns the curve of a row of the system, for a step of this size.
     fn curve(&self, trace: &TimeResponse, row: usize, size: f64, output: &Output) -> Curve {
         let points = if row < self.outputs.len() {
             self.points(trace, row)
@@ -189,7 +189,8 @@ impl<'a> ReferenceLoop<'a> {
     }
 }
 
-/// The loop from the references to `rows` times the states and the commands, and the same between samples.
+/// Returns the loop from the references to `rows` times the states, then the commands, then for a sampled loop `rows`
+/// times the states at each time between samples.
 fn system(
     designed: &Solution,
     tracking: &Tracking,
@@ -227,13 +228,13 @@ fn system(
     Ok(system)
 }
 
-/// The time from 10 % to 90 % of the step.
+/// Returns the time from 10 % to 90 % of the step; None if 90 % is not reached.
 fn rise_time(points: &[(f64, f64)]) -> Option<f64> {
     let [from, to] = RISE.map(|level| reaches(points, level));
     Some(to? - from?)
 }
 
-/// The first time at which a value reaches `level`, by linear interpolation.
+/// Returns the first time at which a value reaches `level`, by linear interpolation; None if none does.
 fn reaches(points: &[(f64, f64)], level: f64) -> Option<f64> {
     let at = points.iter().position(|point| point.1 >= level)?;
     let (time, value) = points[at];
@@ -243,7 +244,7 @@ fn reaches(points: &[(f64, f64)], level: f64) -> Option<f64> {
     Some(before + (level - low) / (value - low) * (time - before))
 }
 
-/// The time after which the points stay within the band around one.
+/// Returns the time after which the points stay within the band around one; the last time if the last point is outside.
 fn settled(points: &[(f64, f64)]) -> f64 {
     let outside = |point: &(f64, f64)| (point.1 - 1.0).abs() > SETTLED;
     let Some(last) = points.iter().rposition(outside) else {
@@ -257,7 +258,8 @@ fn settled(points: &[(f64, f64)]) -> f64 {
     time + ((edge - value) / (inside - value)).clamp(0.0, 1.0) * (after - time)
 }
 
-/// The largest negative and positive step within the limits, from the commands of a step of `size`.
+/// Returns the largest negative and positive step within the limits, infinite without limits, from the commands of a
+/// step of `size`.
 fn largest_step(commands: &[CommandPeak], size: f64) -> [f64; 2] {
     let mut sizes = [f64::NEG_INFINITY, f64::INFINITY];
     for command in commands {

@@ -22,7 +22,7 @@ const FASTEST: f64 = 4.0;
 const WEIGHT_POWER: i32 = -4;
 /// Largest number of states for which other designs are tried.
 const LARGEST_ORDER: usize = 24;
-/// A peak that is lower by less than this part is not worth a change.
+/// A change is worth it if it lowers the peak below this part of its present value.
 const LOWER: f64 = 0.95;
 
 /// Returns what changes the peaks of S above their limit and instability within the tolerances, one item for
@@ -131,7 +131,8 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
     FACTORS.into_iter().flat_map(with_factor).collect()
 }
 
-/// The requirement of the loop `name` with eigenvalues times `factor`, or with another `weight`.
+/// Returns the requirement of the loop `name` with eigenvalues or bandwidth times `factor`, or with another `weight`;
+/// None for other requirements.
 fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
     // The line of the plant file has these digits.
     let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);
@@ -181,7 +182,7 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
 }
 
 impl Variant {
-    /// Designs the variant and examines its loop; None if there is no stable one.
+    /// Designs the variant and examines its loop; None if there is no design, or its loop is not stable.
     fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
         let Self { observer, feedback, factor } = self;
         let mut other = file.clone();
@@ -207,8 +208,8 @@ impl Variant {
 }
 
 impl Trial {
-    /// Whether no peak rises above its limit, or above its present value if that is larger, and the loop does not become
-    /// unstable within the tolerances.
+    /// Whether no peak rises above its limit, or above its present value if that is larger, and the loop does not
+    /// become unstable within the tolerances.
     fn is_harmless(&self, present: &Present, limits: &RobustnessLimits) -> bool {
         let mut peaks = self.judged.points.iter().zip(&present.peaks);
         peaks.all(|(point, peak)| point.judged <= peak.max(limits.amber))
@@ -222,8 +223,9 @@ impl Trial {
 }
 
 impl Reason {
-    /// The smallest change that removes all reasons, else this one; else the one with the lowest peak. A change that
-    /// is for the worse elsewhere is none.
+    /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, else for a
+    /// peak the change with the lowest one; without any, a sentence that says so. Changes that make something else
+    /// worse are left out.
     fn remedy(self, trials: &[Trial], present: &Present, limits: &RobustnessLimits) -> Remedy {
         let harmless = || trials.iter().filter(|trial| trial.is_harmless(present, limits));
         let reached = |trial: &&Trial| match self.aim {

@@ -198,7 +198,7 @@ fn sampling(file: &PlantFile<'_>, solution: &Solution) -> Option<Sampled> {
     })
 }
 
-/// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.
+/// Returns a part of the report; an empty one, with a reason in `missing`, if a numerical method failed.
 fn unless_numerical<T>(
     part: &str,
     results: Result<Vec<T>, Error>,
@@ -323,7 +323,7 @@ fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
     all
 }
 
-/// Returns the largest stable loss of effectiveness of each actuator.
+/// Returns the largest stable loss of effectiveness of each actuator that has a fault of this kind.
 fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, Error> {
     let lossy = |model: &control::faults::Fault| match model.entry {
         FaultEntry::LossOfEffectiveness(input) => Some(input),
@@ -415,7 +415,7 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     all
 }
 
-/// Says what the set points rely on.
+/// Returns the assumption that the set points rely on; None without references.
 fn tracking_assumption(designed: &Solution) -> Option<String> {
     Some(match &designed.tracking.as_ref()?.action {
         TrackingAction::Feedforward(_) => {

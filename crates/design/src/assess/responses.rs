@@ -17,13 +17,13 @@ use plant_file::faults::Fault;
 pub(crate) const SETTLED: f64 = 0.02;
 /// Parts of a sample time, between which points are shown besides the samples.
 pub(crate) const PARTS: u32 = 5;
-/// A curve has at most four points for each of so many parts of the logarithmic time axis; the second
-/// number for loops from `LARGE` states on.
+/// Number of parts of the logarithmic time axis, for each of which a curve has at most four points; the second number
+/// is for loops from `LARGE` states on.
 const MOST: [usize; 2] = [1000, 250];
 const LARGE: usize = 48;
 
-/// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
-/// and to steps of all faults together.
+/// Returns the responses to a change of each fault, as a step and, if its rate has a bound, as a ramp of this rate; and
+/// with several faults to steps of all together.
 pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error> {
     let shown = ShownLoop::of(designed)?;
     let faults = &designed.linear.faults;
@@ -67,7 +67,7 @@ pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error>
     Ok(all)
 }
 
-/// The size of the change of a fault.
+/// Returns the size of the change of a fault: the stated step, or its bound, or 1.
 fn size(fault: &Fault) -> f64 {
     fault.step.or(fault.bound).unwrap_or(1.0)
 }
@@ -128,7 +128,7 @@ impl<'a> ShownLoop<'a> {
         Ok(Self { designed, outputs: Outputs::of(designed), system })
     }
 
-    /// The loop with one input that changes all faults by their sizes.
+    /// Returns the loop with one input that changes all faults by their sizes.
     fn together(&self) -> StateSpace {
         let mut sizes = DMatrix::zeros(self.system.b.ncols(), 1);
         let designed = self.designed;
@@ -196,8 +196,8 @@ impl<'a> ShownLoop<'a> {
 
 /// Returns the points of a curve, each a time and a value.
 ///
-/// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time
-/// after it. Times between samples are added where the trace has neighbouring samples.
+/// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time after it;
+/// without a value there is no point. Times between samples are added where the trace has neighbouring samples.
 pub(crate) fn points(
     designed: &Solution,
     trace: &TimeResponse,
@@ -222,8 +222,8 @@ pub(crate) fn points(
     points
 }
 
-/// Returns the first, the lowest, the highest and the last point of each of `parts` parts of the logarithmic
-/// time axis, and the points before it; all points if there are no more than that.
+/// Returns the points at times up to 0, then the first, the lowest, the highest and the last point of each of `parts`
+/// parts of the logarithmic time axis; all points if there are at most four for each part.
 fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
     if points.len() <= 4 * parts {
         return points.to_vec();

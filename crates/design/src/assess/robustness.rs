@@ -38,7 +38,7 @@ const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
 const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
 
-/// The loop of a design: the plant, and the controller with its filter and its integrals.
+/// Returns the loop of a design: the plant, and the controller with its filter and its integrals.
 pub(crate) fn loop_of(designed: &Solution) -> Result<Loop, Error> {
     let physical = Physical::of(designed)?;
     physical.closed(&physical.controller)
@@ -154,7 +154,7 @@ pub(crate) fn loop_points(
     POINTS.into_par_iter().map(point).collect()
 }
 
-/// The signals at a point of the loop.
+/// Returns the signals at a point of the loop.
 fn signals_at<'a>(at: Point, inputs: &'a [Signal], outputs: &'a [Signal]) -> &'a [Signal] {
     match at {
         Point::Input => inputs,
@@ -242,7 +242,7 @@ fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoin
     })
 }
 
-/// Returns the derivatives of the judged peaks with respect to the entries of A, B, C and D.
+/// Returns for each point of the loop the derivatives of its judged peak with respect to the entries of A, B, C and D.
 fn slopes(
     linear: &LinearPlant,
     physical: &Physical,
@@ -291,7 +291,8 @@ fn disk(margin: &DiskMargin) -> Disk {
     }
 }
 
-/// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
+/// Returns the norms of the gains, and the peaks of S, beside those of a linear-quadratic design of the same speed, as
+/// far as there is one.
 fn comparison(
     designed: &Solution,
     physical: &Physical,

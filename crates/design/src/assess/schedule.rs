@@ -16,13 +16,12 @@ use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
 
-/// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
-/// computed, less 1.
+/// Number of equal parts of each interval between points of the schedule, at whose ends eigenvalues are computed.
 const CHECKED: u32 = 20;
-/// An eigenvalue this near to the stability limit is one on it, with rounding errors.
+/// An eigenvalue this near to the stability limit counts as one on it, because of rounding errors.
 const NEUTRAL: f64 = 1e-7;
 
-/// Returns the report on the schedule of `designed`, if it has one.
+/// Returns the report on the schedule of `designed`; None if it has none.
 pub(crate) fn schedule(
     designed: &Designed,
     limits: &RobustnessLimits,
@@ -80,7 +79,8 @@ pub(crate) fn schedule(
     }))
 }
 
-/// P(variable) for the stated rate, or for the largest one that is found.
+/// Returns P as a function of the variable, for the stated rate or else for the largest one that is found, or why there
+/// is none.
 fn bounded(
     scheduled: &Scheduled,
     intervals: &[control::lmi::Interval],

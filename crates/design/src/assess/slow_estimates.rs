@@ -15,8 +15,8 @@ const SLOW: f64 = 0.05;
 /// A mode has settled within 2 % after this many time constants.
 const SETTLED: f64 = 4.0;
 
-/// Returns a warning if the slowest mode of the observer takes much longer than that of the feedback, which happens with
-/// weights and bandwidths: a combination of faults hardly acts on the measurements.
+/// Returns a warning if the slowest mode of the observer is much slower than that of the feedback: a combination of
+/// faults hardly acts on the measurements. Only observers by weights or by a bandwidth are examined.
 pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Option<String>, Error> {
     let requirement = &file.observer.requirement;
     if !matches!(requirement, Requirement::Bandwidth(_) | Requirement::Weights { .. }) {

@@ -6,7 +6,7 @@ use crate::report::robustness::{
 };
 use plant_file::robustness::RobustnessLimits;
 
-/// Judges a design.
+/// Returns the verdict on a design; `further`: reasons besides checks, peaks of S and tolerances.
 pub(crate) fn verdict(
     checks: &[Check],
     robustness: Option<&Robustness>,
@@ -39,12 +39,13 @@ pub(crate) fn verdict(
     Verdict { level, reasons, remedies, limits: stated }
 }
 
-/// The sentence about a peak of S above a limit, and the level of the verdict.
+/// Returns the sentence about a peak of S above a limit, with the level of the verdict; None if it is within the
+/// limits.
 pub(crate) fn peak_reason(point: &LoopPoint, limits: &RobustnessLimits) -> Option<(Level, String)> {
     peak_reason_with(point, "", limits)
 }
 
-/// The same with text after the place, such as a plant.
+/// Same as [`peak_reason`], with the text `plant` after the place of the peak.
 pub(crate) fn peak_reason_with(
     point: &LoopPoint,
     plant: &str,
@@ -60,7 +61,7 @@ pub(crate) fn peak_reason_with(
     Some((level, format!("the peak of S at the {at}{plant} is {peak:.3}, above {limit} ({word})")))
 }
 
-/// The sentence about a loop that parameters within their tolerances make unstable.
+/// Returns the sentence about a loop that parameters within their tolerances make unstable.
 pub(crate) fn instability(test: &ToleranceResult) -> String {
     let range = test.range();
     let (cases, first) = (test.cases, test.first_unstable);

@@ -5,20 +5,20 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
-/// A plant of which a file is written.
+/// A plant for which a plant file is written.
 pub(super) struct Draft {
-    /// What the plant is from, one line.
+    /// The source of the plant, in one line.
     pub(super) origin: String,
     pub(super) model: Model,
     pub(super) actuators: Vec<Named>,
     pub(super) measurements: Vec<Named>,
-    /// Outputs that are no measurements, as they contain a command.
+    /// Names of outputs that are no measurements, because they contain a command.
     pub(super) left_out: Vec<String>,
     pub(super) has_feedthrough: bool,
     pub(super) identification: Identification,
 }
 
-/// What is known of a plant that was identified; empty for others.
+/// What an identification found out about its plant; empty for other plants.
 #[derive(Default)]
 pub(super) struct Identification {
     /// Time, s, between the samples of the log.
@@ -30,7 +30,7 @@ pub(super) struct Identification {
     pub(super) warnings: Vec<String>,
 }
 
-/// A signal with what is known of it.
+/// A signal: its name, and what is known about it.
 #[derive(Clone, Default)]
 pub(super) struct Named {
     pub(super) name: String,
@@ -47,7 +47,7 @@ pub(super) enum Model {
         c: DMatrix<f64>,
         d: DMatrix<f64>,
         states: Vec<Named>,
-        /// Time of a sample, s, of sampled matrices.
+        /// Sample time, s, of sampled matrices.
         sampled: Option<f64>,
     },
     Fmu {
@@ -56,7 +56,7 @@ pub(super) enum Model {
     },
 }
 
-/// What is chosen for the plant.
+/// What the plant file asks for.
 #[derive(Clone)]
 pub(super) struct Settings {
     /// The actuators that may be faulty.
@@ -68,7 +68,7 @@ pub(super) struct Settings {
 }
 
 impl Draft {
-    /// The plant file. `refusal`: why there is no controller for it.
+    /// Returns the plant file. `refusal`: the lines that say why there is no controller for it; empty if there is one.
     pub(super) fn text(&self, settings: &Settings, refusal: &[&str]) -> String {
         let mut text = format!(
             "# Plant: {}. Each entry is described in the reference of plant files.\n\n",
@@ -178,7 +178,7 @@ impl Draft {
     }
 }
 
-/// The name of a file without its folder.
+/// Returns the name of a file without its folder.
 pub(super) fn shown(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -209,13 +209,13 @@ fn list(text: &mut String, key: &str, signals: &[Named]) {
     *text += "]\n";
 }
 
-/// A key of TOML.
+/// Returns the name as a key of TOML.
 fn key(name: &str) -> String {
     let is_bare = |sign: char| sign.is_ascii_alphanumeric() || "_-".contains(sign);
     if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
 }
 
-/// A text of TOML.
+/// Returns the text as a string of TOML.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }

@@ -11,7 +11,9 @@ use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named};
 use crate::plant::linear::significant;
 
-/// Reads inputs and outputs of the FMU; `out` is the plant file that will name it.
+/// Reads the continuous inputs and outputs of the FMU; `out` is the plant file that will name it.
+///
+/// An output that contains a command is no measurement, unless all do.
 pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
     let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
     let fmu = Fmu::open_any(path).map_err(|error| invalid(files::sentence(&error)))?;
@@ -65,7 +67,8 @@ fn described(description: &ModelDescription, name: &str) -> Option<String> {
     variable.and_then(|variable| variable.description.clone()).filter(|text| !text.is_empty())
 }
 
-/// The path of the FMU as the plant file at `out` states it: relative to its folder if the FMU is in it or below.
+/// Returns the path of the FMU as the plant file at `out` states it: relative to the folder of `out` if the FMU is in
+/// it or below, otherwise absolute.
 fn relative(path: &Path, out: &Path) -> Result<String, Error> {
     let whole = |path: &Path| fs::canonicalize(path).map_err(Error::file("read", path));
     let folder = match out.parent() {

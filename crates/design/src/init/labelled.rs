@@ -1,4 +1,4 @@
-//! A table of the matrices with the names of rows and columns.
+//! Reads a table of the matrices A, B, C and D with the names of its rows and columns.
 //!
 //! ```text
 //!             , position [m] , speed [m/s] , force [N]
@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named, shown};
 
-/// Reads the table.
+/// Reads the table in the file at `path`.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let text = fs::read_to_string(path).map_err(Error::file("read", path))?;
     table(&text, &shown(path))
@@ -57,7 +57,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     split(&rows, &columns, file)
 }
 
-/// What the table has to be.
+/// The form of the table, for messages.
 const EXPECTED: &str = "expected a table of the matrices: the first line names states and commands, the first cell of \
                         each further line the state whose derivative it is, or the measurement";
 
@@ -97,13 +97,13 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
     })
 }
 
-/// The state of `der(x)` or `x'`.
+/// Returns x for `der(x)` and `x'`; other cells are returned unchanged.
 fn derivative(cell: &str) -> &str {
     let inner = cell.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
     inner.or_else(|| cell.strip_suffix('\'')).unwrap_or(cell)
 }
 
-/// `name [unit]`.
+/// Reads a signal from a cell: `name` or `name [unit]`.
 pub(super) fn named(cell: &str) -> Named {
     let parts = cell.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
     let (name, unit) =

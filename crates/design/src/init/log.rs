@@ -17,14 +17,15 @@ use read::Log;
 
 pub(super) use read::is_log;
 
-/// How a log becomes a plant.
+/// How a plant is identified from a log.
 #[derive(Debug, Clone, Default)]
 pub struct LogOptions {
-    /// The columns that are commands; none if their names, `u`, `u1` and so on, say it.
+    /// The columns that are commands; empty for those called `u`, `u1` and so on.
     pub inputs: Vec<String>,
-    /// The columns that are measurements; none for `y`, `y1` and so on or, beside stated inputs, all others.
+    /// The columns that are measurements; empty for all columns besides stated inputs or, without stated inputs, for
+    /// those called `y`, `y1` and so on.
     pub outputs: Vec<String>,
-    /// The number of states; None for the one that predicts the last quarter of the logs best.
+    /// The number of states; None for the smallest one that predicts the last quarter of the logs about best.
     pub order: Option<usize>,
 }
 
@@ -73,7 +74,8 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     })
 }
 
-/// The states: measurements and rates, if they are the states.
+/// Returns the states: the measurements and, at the positions `rates`, their rates; without `rates` `x1`, `x2` and so
+/// on.
 fn states(rates: Option<&[usize]>, outputs: &[Named], order: usize) -> Vec<Named> {
     let Some(rates) = rates else {
         let one = |at| Named { name: format!("x{at}"), ..Named::default() };
@@ -87,7 +89,7 @@ fn states(rates: Option<&[usize]>, outputs: &[Named], order: usize) -> Vec<Named
     outputs.iter().cloned().chain(rates.iter().map(|&at| rate(&outputs[at]))).collect()
 }
 
-/// What the file says about the identification.
+/// Returns the lines that the plant file has about the identification.
 fn notes(logs: &[Log], estimate: &Estimate, fits: &[Fit]) -> Vec<String> {
     let samples: usize = logs.iter().map(|log| log.record.len()).sum();
     let order = estimate.continuous.a.nrows();

@@ -1,4 +1,4 @@
-//! The matrices A, B, C and D of a file of MATLAB.
+//! Reads the matrices A, B, C and D of a MAT file, the file format of MATLAB.
 
 use std::fs::File;
 use std::path::Path;
@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named, shown};
 
-/// Reads the matrices.
+/// Reads A, B and C, D if the file has it, and the sample time `Ts` if the matrices are sampled.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let file = File::open(path).map_err(Error::file("read", path))?;
     let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
@@ -68,7 +68,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     })
 }
 
-/// The matrix of this name; None if the file has none.
+/// Returns the matrix of this name; None if the file has none, an error if it is no finite real matrix.
 fn matrix(content: &MatFile, name: &str) -> Result<Option<DMatrix<f64>>, String> {
     let Some(array) = content.find_by_name(name) else { return Ok(None) };
     macro_rules! numbers {

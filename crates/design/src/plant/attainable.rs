@@ -19,8 +19,8 @@ const NO_LOOP: f64 = 1e6;
 /// |S| is at most this up to the bandwidth.
 const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Returns warnings of a peak of S above the limit that no controller avoids, and of a feedback that is too fast for a
-/// zero in the right half plane.
+/// Returns warnings of a peak of S above the limit of a green verdict that no controller avoids, and of a feedback that
+/// is too fast for a zero in the right half plane.
 ///
 /// ```text
 /// continuous, one command and one measurement, for a zero z:  max |S| >= M = product over unstable p of |z + p*| / |z - p|
@@ -29,9 +29,9 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// sampled every h, m commands:                                max |S| >= exp(h sum of Re p / m)
 /// ```
 ///
-/// Sources: J. S. Freudenberg, D. P. Looze, Right half plane poles and zeros and design tradeoffs in feedback systems, IEEE
-/// Trans. Autom. Control 30 (1985), theorem 2; for samples the sum of log |S| over the unit circle: H.-K. Sung, S. Hara, Int. J.
-/// Control 48 (1988).
+/// Sources: J. S. Freudenberg, D. P. Looze, Right half plane poles and zeros and design tradeoffs in feedback systems,
+/// IEEE Trans. Autom. Control 30 (1985), theorem 2; for samples the sum of log |S| over the unit circle: H.-K. Sung, S.
+/// Hara, Int. J. Control 48 (1988).
 ///
 /// # Errors
 ///
@@ -89,7 +89,7 @@ pub(crate) fn warnings(
     Ok(warnings)
 }
 
-/// The eigenvalues of A in 1/s; of a plant in sampled time ln z / T.
+/// Returns the eigenvalues of A in 1/s; for a plant in sampled time ln z / T.
 pub(crate) fn rates(a: &DMatrix<f64>, domain: Domain) -> Result<Vec<Complex<f64>>, control::Error> {
     let values = eigenvalues(a)?.into_iter();
     Ok(match domain {
@@ -98,6 +98,8 @@ pub(crate) fn rates(a: &DMatrix<f64>, domain: Domain) -> Result<Vec<Complex<f64>
     })
 }
 
+/// Returns the warning of a zero in the right half plane, for the plant or for the requested feedback; None if both
+/// allow a peak of S within the limit.
 fn of_zero(
     file: &PlantFile<'_>,
     zero: Complex<f64>,
@@ -123,7 +125,7 @@ fn of_zero(
     if zero.im != 0.0 || reached <= limit {
         return None;
     }
-    // The angle at which the bound is the limit.
+    // The exponent t with which the bound is the limit, and the speed that gives it.
     let t = (limit / AT_BANDWIDTH).ln() / (least / AT_BANDWIDTH).ln();
     let allowed = zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan();
     let message = format!(
@@ -136,19 +138,21 @@ fn of_zero(
     Some(file.error_at(&file.feedback.place, message))
 }
 
-/// The peak of S that a zero forces beside unstable poles.
+/// Returns the peak of S that a zero forces beside unstable poles; 1 without them.
 fn forced(zero: Complex<f64>, poles: &[Complex<f64>]) -> f64 {
     poles.iter().map(|pole| (zero + pole.conj()).norm() / (zero - pole).norm()).product()
 }
 
-/// The same for a real zero if S is small up to `speed`.
+/// Returns the peak of S that a real zero forces if |S| is at most [`AT_BANDWIDTH`] up to `speed`; `least`: see
+/// [`forced`].
 fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
     let pi = std::f64::consts::PI;
     let t = pi / (pi - 2.0 * (speed / zero.re).atan());
     least.powf(t) * AT_BANDWIDTH.powf(1.0 - t)
 }
 
-/// The speed of the slowest eigenvalue that the feedback is asked for, or its bandwidth, rad/s.
+/// Returns the modulus of the slowest eigenvalue that the file states for the feedback, or the stated bandwidth, rad/s;
+/// None for other requirements.
 fn requested(file: &PlantFile<'_>) -> Option<f64> {
     let slowest = |sizes: &mut dyn Iterator<Item = f64>| sizes.min_by(f64::total_cmp);
     match &file.feedback.requirement {

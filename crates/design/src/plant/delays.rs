@@ -13,14 +13,15 @@ use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
 
-/// Number of states for each delay in the plant of the judgement: the error of its approximation is below 2e-7 up to 7 rad
-/// in the delay.
+/// Number of states for each delay in the plant of the judgement: the error of its approximation is below 2e-7 up to 7
+/// rad in the delay.
 pub(crate) const JUDGED: usize = 10;
 
-/// Delays of less than this part of the plant's fastest time constant, or of more than its inverse, are beyond rounding.
+/// Smallest delay that is allowed, relative to the plant's fastest time constant, and the inverse of the largest one:
+/// beside others rounding errors hide the delay, or the plant.
 const PART: f64 = 1e-9;
 
-/// Refuses delays that rounding hides beside the plant, or the plant beside them.
+/// Refuses delays that are much too short or too long beside the fastest time constant of the plant.
 pub(crate) fn check(
     file: &PlantFile<'_>,
     delays: &Delays,
@@ -47,7 +48,7 @@ pub(crate) fn check(
     Ok(())
 }
 
-/// The delays that the plant file states.
+/// Returns the delays that the plant file states.
 pub(crate) fn of(file: &PlantFile<'_>) -> Delays {
     let all = |signals: &[Signal]| signals.iter().map(|signal| signal.delay).collect();
     Delays { inputs: all(&file.actuators), outputs: all(&file.measurements) }
@@ -63,7 +64,8 @@ pub(crate) struct Delayed {
     pub(crate) g: DMatrix<f64>,
 }
 
-/// The plant with the states of its delays that the observer has, and those of the filters of controllers of low order.
+/// Adds to a plant the states of its delays that the observer has, and those of the filters of controllers of low
+/// order.
 pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,
@@ -76,7 +78,7 @@ pub(crate) fn delayed(
     Ok(Delayed { a, b, c, d, f, g })
 }
 
-/// The same with the fault inputs after the commands.
+/// Same as [`delayed`], as one system with the fault inputs after the commands.
 pub(crate) fn with_delays(
     file: &PlantFile<'_>,
     plant: &StateSpace,
@@ -113,8 +115,8 @@ pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> T
     Tolerances { of, common: common.iter().map(placed).collect() }
 }
 
-/// The states of the plant, then those of its delays with their values at the operating point, then those of the filters
-/// of controllers of low order.
+/// Returns the states of the plant, then those of its delays with their values at the operating point, then those of
+/// the filters of controllers of low order.
 ///
 /// A constant command u leads to z = [u, 0, ...], a constant measurement y to z = -d A'^-1 `e_1` y, see
 /// [`Delays::approximated`].

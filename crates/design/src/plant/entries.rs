@@ -27,7 +27,7 @@ pub(crate) struct EntryTolerances {
     pub(crate) placed: Tolerances,
 }
 
-/// Returns the tolerances that a plant file states; `order`: of the approximated delays.
+/// Returns the tolerances that a plant file states; `order`: the number of states of each delay.
 pub(crate) fn tolerances(
     linear: &LinearPlant,
     order: usize,

@@ -10,8 +10,8 @@ use crate::plant::linear::LinearPlant;
 use plant_file::PlantFile;
 use plant_file::requirements::Requirement;
 
-/// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
-/// without feedthrough.
+/// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and with feedthrough all entries that
+/// are for plants without it.
 pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), PlaceError> {
     let LinearPlant { d, models, measurements, actuators, undelayed, .. } = linear;
     let entries = || (0..d.nrows()).flat_map(|row| (0..d.ncols()).map(move |column| (row, column)));

@@ -1,4 +1,5 @@
-//! The filters of PI, PID and other controllers of low order: states of the observer's model that only the controller has.
+//! The filters of PI, PID and other controllers of low order: states of the observer's model that only the controller
+//! has.
 //!
 //! ```text
 //! z' = F z + g y,   F = -w, g = w                                     PI
@@ -6,8 +7,9 @@
 //!                   the last row of F is -w^n [a_0, a_1 / w, ...]     order n: z = [y_f; y_f'; ...]
 //! ```
 //!
-//! with the coefficients `a_k` of the Butterworth polynomial of order n. In sampled time y is held between samples. With the rows of the observer gain that [`gains`] returns, each filter
-//! follows its measurement and nothing else, whatever the model.
+//! with the coefficients `a_k` of the Butterworth polynomial of order n. In sampled time y is held between samples.
+//! With the rows of the observer gain that [`gains`] returns, each filter depends on its measurement alone, not on the
+//! model.
 
 use control::aso::FaultyPlant;
 use control::hold::zero_order_hold;
@@ -17,7 +19,7 @@ use plant_file::pid::Pid;
 use plant_file::signals::Signal;
 use std::f64::consts::FRAC_PI_2;
 
-/// F and g of one filter.
+/// Returns F and g of one filter.
 fn filter(pid: &Pid, domain: Domain) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let w = pid.corner;
     let last = pid.order - 1;
@@ -37,7 +39,7 @@ fn filter(pid: &Pid, domain: Domain) -> Result<(DMatrix<f64>, DMatrix<f64>), Err
     }
 }
 
-/// `a_0` to `a_(n-1)` of the Butterworth polynomial 1 + `a_1` s + ... + s^n:
+/// Returns `a_0` to `a_(n-1)` of the Butterworth polynomial 1 + `a_1` s + ... + s^n:
 /// `a_k` = `a_(k-1)` cos((k - 1) pi / (2 n)) / sin(k pi / (2 n)).
 ///
 /// Source: S. Butterworth, On the theory of filter amplifiers, Wireless Engineer 7 (1930).
@@ -49,7 +51,7 @@ fn butterworth(order: usize) -> Vec<f64> {
     all.take(order).map(|(_, coefficient)| coefficient).collect()
 }
 
-/// The states of the filters, in the order of the measurements.
+/// Returns the states of the filters, in the order of the measurements.
 pub(crate) fn states(pid: &Pid, measurements: &[Signal]) -> Vec<Signal> {
     let mut all = Vec::new();
     for signal in pid.measurements().into_iter().map(|at| &measurements[at]) {
@@ -69,7 +71,7 @@ pub(crate) fn states(pid: &Pid, measurements: &[Signal]) -> Vec<Signal> {
     all
 }
 
-/// A plant in continuous time with the filters of its measurements, whose states follow its own.
+/// Adds to a plant the filters of its measurements, whose states follow those of the plant.
 pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, Error> {
     let StateSpace { a, b, c, d, .. } = plant;
     let n = a.nrows();
@@ -85,7 +87,7 @@ pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, 
     Ok(extended)
 }
 
-/// Gives a plant that was sampled as a whole the filters of the controllers, which take samples of its measurements.
+/// Replaces the filters in a plant that was sampled together with them: they take samples of the measurements.
 ///
 /// `c`: of the plant with the filters, p x n.
 pub(crate) fn sample(
@@ -115,7 +117,7 @@ fn enter(pid: &Pid, a: &mut DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -> R
     Ok(())
 }
 
-/// The rows of the observer gain for the filters, in the order of [`states`].
+/// Returns the rows of the observer gain for the filters, in the order of [`states`]; `p`: the number of measurements.
 pub(crate) fn gains(pid: &Pid, p: usize, domain: Domain) -> Result<DMatrix<f64>, Error> {
     let (_, g) = filter(pid, domain)?;
     let order = pid.order;

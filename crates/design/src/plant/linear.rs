@@ -27,9 +27,11 @@ pub(crate) const AT_REST: f64 = 1e-6;
 /// Part of the largest entry of a row of C below which an entry of D counts as zero.
 const NOTHING: f64 = 1e-9;
 
-/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' where the plant is
-/// known in its samples only. The states of its delays, each approximated,
-/// follow those that the plant file states, then those of the filters of controllers of low order.
+/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
+/// known in its samples only.
+///
+/// The states are those of the plant, then those of its approximated delays, then those of the filters of controllers
+/// of low order.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
@@ -44,9 +46,9 @@ pub(crate) struct LinearPlant {
     pub(crate) domain: Domain,
     /// The models of `faults`, in the same order.
     pub(crate) models: Vec<Model>,
-    /// The disturbances of the file.
+    /// How the disturbances of the file act, in their order.
     pub(crate) disturbances: Vec<UnknownInput>,
-    /// The plant without its delays.
+    /// The plant without the states of delays and filters.
     pub(crate) undelayed: StateSpace,
     /// The delays of commands and measurements.
     pub(crate) delays: Delays,
@@ -64,12 +66,12 @@ impl LinearPlant {
         self.d.amax() > 0.0
     }
 
-    /// The plant from the commands to the measurements.
+    /// Returns the plant from the commands to the measurements.
     pub(crate) fn state_space(&self) -> StateSpace {
         system([&self.a, &self.b, &self.c, &self.d], self.domain)
     }
 
-    /// The matrix of the states in the condition of rest: A in A x + B u = 0, in sampled time A - I.
+    /// Returns the matrix of the states in the condition of rest: A in A x + B u = 0, in sampled time A - I.
     pub(crate) fn a_at_rest(&self) -> DMatrix<f64> {
         match self.domain {
             Domain::Continuous => self.a.clone(),
@@ -77,8 +79,9 @@ impl LinearPlant {
         }
     }
 
-    /// Phi and Gamma: the states after `time` are Phi x + Gamma u, with u held and `inputs`, columns like those of B. In
-    /// sampled time those after a sample.
+    /// Returns Phi and Gamma, with which the states after `time` are Phi x + Gamma u if u is held. `inputs`: the
+    /// columns through which u acts, such as those of B. In sampled time the states are those after one sample, for any
+    /// `time`.
     pub(crate) fn held(
         &self,
         inputs: &DMatrix<f64>,
@@ -90,7 +93,8 @@ impl LinearPlant {
         }
     }
 
-    /// The times between two samples of `period` at which the plant is known: fractions of it in `parts` equal parts.
+    /// Returns the times after a sample that divide `period` into `parts` equal parts; none if the plant is known in
+    /// its samples only.
     pub(crate) fn times_between(&self, period: f64, parts: u32) -> Vec<f64> {
         match self.domain {
             Domain::Continuous => {
@@ -100,34 +104,36 @@ impl LinearPlant {
         }
     }
 
-    /// The plant from the commands to the measurements for the judgement: with better approximations of its delays.
+    /// Returns the plant from the commands to the measurements for the judgement: with better approximations of its
+    /// delays, and without filters.
     pub(crate) fn judged(&self) -> Result<StateSpace, Error> {
         self.delays.approximated(&self.undelayed, delays::JUDGED)
     }
 
-    /// The states without those of delays.
+    /// Returns the states without those of delays and filters.
     pub(crate) fn plant_states(&self) -> &[Signal] {
         &self.states[..self.undelayed.a.nrows()]
     }
 
-    /// The positions of the states of delays and filters.
+    /// Returns the positions of the states of delays and filters.
     pub(crate) fn delay_states(&self) -> Range<usize> {
         self.undelayed.a.nrows()..self.states.len()
     }
 
-    /// The positions of the states of the filters of controllers of low order, the last ones.
+    /// Returns the positions of the states of the filters of controllers of low order, the last ones.
     pub(crate) fn filter_states(&self, file: &PlantFile<'_>) -> Range<usize> {
         let count = file.pid().map_or(0, Pid::states);
         self.states.len() - count..self.states.len()
     }
 
-    /// Whether a mode is one of delays or filters, which is stable. Of equal delays of two signals no gain moves one.
+    /// Whether a mode is one of delays or filters, which is stable. If two signals have equal delays, there is such a
+    /// mode that no gain moves.
     pub(crate) fn is_of_delays(&self, mode: &Mode) -> bool {
         mode.dominant.iter().all(|state| self.delay_states().contains(state))
     }
 
-    /// A requirement on a gain for `order` states: the weights of a plant file, which has no states of delays, with zeros
-    /// for these. They are stable, and the controller knows what enters them.
+    /// Returns a requirement on a gain for `order` states. Weights of a plant file, which states none for delays, get
+    /// zeros for these: they are stable, and the controller knows their inputs. Other requirements stay.
     pub(crate) fn with_delays(&self, requirement: &Requirement, order: usize) -> Requirement {
         let delays = self.delay_states();
         match requirement {
@@ -143,12 +149,12 @@ impl LinearPlant {
         }
     }
 
-    /// Of matrices of the form of [`Self::judged`] the entries of the plant without delays.
+    /// Returns the part of matrices of the form of [`Self::judged`] that belongs to the plant without delays.
     pub(crate) fn of_plant(&self, matrices: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
         self.delays.of_plant(self.undelayed.a.nrows(), delays::JUDGED, matrices)
     }
 
-    /// Takes the matrices of `file`, or linearises its FMU.
+    /// Reads the matrices of `file`, or linearises its FMU.
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
             plant_file::Model::Matrices { a, b, c, d, f_a, states, sampled } => {
@@ -214,7 +220,7 @@ fn modelled(fault: &Fault, entry: FaultEntry) -> Model {
     Model { entry, kind }
 }
 
-/// Returns the model of an actuator or sensor fault.
+/// Returns the model of a fault of an actuator or sensor; other faults are handled before, and have no effect here.
 fn on_signals(fault: &Fault, b: &DMatrix<f64>, d: &DMatrix<f64>) -> Model {
     let enters = match fault.entry_point {
         EntryPoint::Sensor(at) => {
@@ -292,7 +298,8 @@ pub(crate) fn open(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Result<F
     Ok(opened.map_err(|error| file.error(&["plant"], files::sentence(&error)))?)
 }
 
-/// The request for the linear plant at the operating point of the file.
+/// Returns the request for the linear plant at the operating point of the file; its faults are the inputs of faults,
+/// then those of disturbances.
 pub(crate) fn request(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Linearise {
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
@@ -311,7 +318,7 @@ pub(crate) fn request(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Linea
     }
 }
 
-/// The inputs of the FMU that are disturbances.
+/// Returns the inputs of the FMU that are disturbances.
 fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = String> + 'a {
     file.disturbances.iter().filter_map(|disturbance| match &disturbance.entry_point {
         DisturbanceEntry::Input(name) => Some(name.clone()),
@@ -319,8 +326,8 @@ fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = Strin
     })
 }
 
-/// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`. Disturbances that are
-/// inputs of an FMU act by the last columns of F and G in `matrices`.
+/// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`; an error names one that
+/// does not act. Disturbances that are inputs of an FMU act by the last columns of F and G in `matrices`.
 fn disturbances(
     file: &PlantFile<'_>,
     b: &DMatrix<f64>,
@@ -394,7 +401,7 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
     }
 }
 
-/// Returns the faults of the file with units of the FMU, and their entry points.
+/// Returns the faults of the file with units of the FMU, and their models.
 fn faults(
     file: &PlantFile<'_>,
     linearised: &Linearisation,
@@ -425,7 +432,8 @@ fn faults(
     Ok((faults, models))
 }
 
-/// Returns where the fault input `at` of the FMU enters: the states or the measurements.
+/// Returns where the fault input `at` of the FMU enters: the states, the measurements or both. Refuses one that acts on
+/// neither, and one that enters the measurements without `filter`.
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
@@ -456,7 +464,7 @@ fn entry(
     }
 }
 
-/// D without the entries that are rounding beside the row of `c`.
+/// Returns D with zeros for entries that are rounding errors beside the row of `c`.
 pub(crate) fn significant(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
     for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
         let negligible = NOTHING * of_states.amax();

@@ -36,7 +36,7 @@ struct Varied {
 }
 
 impl<'a> ParameterFamily<'a> {
-    /// The family that the plant file asks for, if it does.
+    /// Returns the family that the plant file asks for; None without an FMU, or without `parameters`.
     pub(crate) fn of(file: &'a PlantFile<'a>) -> Result<Option<Self>, crate::Error> {
         let tolerances = &file.robustness.parameters;
         let plant_file::Model::Fmu(table) = &file.model else {
@@ -69,8 +69,8 @@ impl<'a> ParameterFamily<'a> {
         Ok([half(high.a, low.a), half(high.b, low.b), half(high.c, low.c), half(high.d, low.d)])
     }
 
-    /// Linearises the FMU at the operating point of the plant file, with other parameters: the plant without its
-    /// delays; returns also the rates of its states there, and its measurements.
+    /// Linearises the FMU at the operating point of the plant file, with other parameters. Returns the plant without
+    /// its delays, the rates of its states there, and its measurements.
     pub(crate) fn at_operating_point(
         &self,
         deviations: &[f64],
@@ -96,7 +96,7 @@ impl<'a> ParameterFamily<'a> {
         Ok((plant, DVector::from_vec(linearised.rates), measured))
     }
 
-    /// The parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
+    /// Returns the parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
     /// the peaks of S at the commands and at the measurements with respect to the entries.
     pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 4]]) -> Vec<Parameter> {
         let effects: Vec<Vec<f64>> = peaks.iter().map(|entries| self.slopes(entries)).collect();
@@ -187,7 +187,7 @@ impl PlantFamily for ParameterFamily<'_> {
         self.parameters.len()
     }
 
-    /// Linearises the FMU at the operating point of the plant file, with other parameters.
+    /// Linearises the FMU at the operating point of the plant file, with other parameters and its delays.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
         let (undelayed, ..) = self.at_operating_point(deviations)?;
         Ok(delays::of(self.file).approximated(&undelayed, JUDGED)?)
@@ -203,7 +203,7 @@ impl PlantFamily for ParameterFamily<'_> {
         self.directions.iter().map(along).collect()
     }
 
-    /// Beyond its limits a parameter may have no meaning.
+    /// Returns [`STEPS`] equal steps up to the limits: beyond them a parameter may have no meaning.
     fn multiples(&self) -> Vec<f64> {
         (1..=STEPS).map(|step| f64::from(step) / f64::from(STEPS)).collect()
     }

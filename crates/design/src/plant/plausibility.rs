@@ -15,8 +15,9 @@ use plant_file::{FAULTS, PlantFile};
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Checks that the limits of each actuator and the range of each measurement contain its operating point; returns the
-/// warnings.
+
+/// Checks that the limits of each actuator and the range of each measurement contain its operating point; returns a
+/// warning for each actuator at a limit.
 pub(crate) fn check_limits(
     file: &PlantFile<'_>,
     linear: &LinearPlant,

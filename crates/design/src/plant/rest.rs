@@ -10,7 +10,7 @@ use crate::plant::linear::LinearPlant;
 use crate::report::robustness::Number;
 use plant_file::signals::Signal;
 
-/// The equilibrium without actuators.
+/// The equilibrium of a loop in which actuators are gone.
 pub(crate) struct Rest {
     /// Deviations of the commands from the operating point.
     pub(crate) u: DVector<f64>,
@@ -21,7 +21,7 @@ pub(crate) struct Rest {
 }
 
 impl Rest {
-    /// The equilibrium at deviations x and u from the operating point.
+    /// Returns the equilibrium at deviations x and u from the operating point.
     pub(crate) fn of(
         linear: &LinearPlant,
         x: &DVector<f64>,
@@ -70,7 +70,7 @@ pub(crate) fn beyond_limits(
     actuators.iter().zip(commands).enumerate().filter_map(beyond).collect()
 }
 
-/// Describes a mode of the plant that is not stable and that the columns of `b` do not reach.
+/// Describes a mode of the plant that is not stable and that the columns of `b` do not reach; None if there is none.
 pub(crate) fn unreachable_mode(
     linear: &LinearPlant,
     b: &DMatrix<f64>,

@@ -15,7 +15,8 @@ use plant_file::requirements::Bandwidth;
 const SLOWER: f64 = 8.0;
 
 impl FeedbackProblem<'_> {
-    /// The regulator with the cost of the measurements, and of the integrals of references as far as they are slower.
+    /// Returns the regulator with the cost of the measurements, and of the integrals of references with weights that
+    /// make them slower by [`SLOWER`].
     pub(crate) fn by_bandwidth(
         &self,
         bandwidth: &Bandwidth,
@@ -42,7 +43,8 @@ impl FeedbackProblem<'_> {
 }
 
 impl ObserverProblem<'_> {
-    /// The filter for noise where commands and faults enter, and for the walks of the faults.
+    /// Returns the Kalman filter for noise where commands and faults enter, and for random walks of the faults, which
+    /// are slower by [`SLOWER`].
     pub(crate) fn by_bandwidth(
         &self,
         bandwidth: &Bandwidth,
@@ -109,7 +111,7 @@ fn method(bandwidth: &Bandwidth, name: &str, loop_gain: f64, residual: f64) -> S
     )
 }
 
-/// The plant from inputs to outputs, the first states of `a`.
+/// Returns the plant from `b` to `c` with the first states of `a`, as many as `b` has rows.
 fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -> StateSpace {
     let n = b.nrows();
     let (d, a) = (DMatrix::zeros(c.nrows(), b.ncols()), a.view((0, 0), (n, n)).into_owned());

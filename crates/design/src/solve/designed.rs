@@ -13,9 +13,9 @@ use plant_file::estimation::Law;
 pub(crate) struct Designed {
     /// The controller of the plant of the file.
     pub(crate) nominal: Solution,
-    /// The plants that the same controller serves.
+    /// The family of plants that the same controller serves, if the file states one.
     pub(crate) family: Option<Family>,
-    /// The controllers at the other points of the schedule.
+    /// The controllers at the points of the schedule, if the file states one.
     pub(crate) schedule: Option<Scheduled>,
     /// What is unusual in the plant file, with its place.
     pub(crate) warnings: Vec<PlaceError>,

@@ -15,7 +15,9 @@ use crate::plant::linear::LinearPlant;
 use crate::solve::names::{fault_names, state_name};
 use plant_file::signals::signal_names;
 
-/// Checks that the commands reach every mode that is not stable; the error names the mode.
+/// Checks that the commands reach every mode that is not stable; the error names the mode, and stable modes out of
+/// reach are warnings. Returns the rank of the controllability matrix, and the distance from the nearest pair that is
+/// not controllable.
 pub(crate) fn check_controllable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -48,7 +50,8 @@ pub(crate) fn check_controllable(
     Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
 }
 
-/// Checks that the augmented observer exists; the error names the faults and the measurements.
+/// Checks that the augmented observer exists; the error names the faults and the measurements, and stable modes that
+/// the measurements do not show are warnings.
 pub(crate) fn check_detectable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -110,12 +113,13 @@ pub(crate) fn check_detectable(
     Ok(())
 }
 
-/// Selects one mode of each complex pair.
+/// Whether the eigenvalue has no negative imaginary part: selects one mode of each complex pair.
 pub(crate) fn above_or_on_the_real_axis(mode: &Mode) -> bool {
     mode.eigenvalue.im >= 0.0
 }
 
-/// What follows from a mode that no gain moves.
+/// Returns what follows from a mode that no gain moves, as the end of a sentence; empty for a mode that is stable, but
+/// not clearly.
 pub(crate) fn consequence(stable: bool, mode: &Mode, domain: Domain) -> &'static str {
     match stable {
         true => "; it is stable and keeps its eigenvalue",
@@ -124,7 +128,8 @@ pub(crate) fn consequence(stable: bool, mode: &Mode, domain: Domain) -> &'static
     }
 }
 
-/// Returns an error at the entry of the fault in column `column` of F_a.
+/// Returns an error at the entry of the fault in column `column` of F_a; for the rate of a ramp at the entry of all
+/// faults.
 pub(crate) fn at_fault(
     file: &PlantFile<'_>,
     linear: &LinearPlant,

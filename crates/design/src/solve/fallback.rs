@@ -45,8 +45,8 @@ pub(crate) struct Fallback {
     pub(crate) method: String,
 }
 
-/// Designs the fall-back that the plant file asks for. `judge` decides which state feedback is accepted, and
-/// whether with the compensation of the estimated faults.
+/// Designs the fall-back that the plant file asks for; None if it asks for none. `judge` decides which state feedback
+/// is accepted, and whether with the compensation of the estimated faults.
 ///
 /// # Errors
 ///
@@ -74,7 +74,7 @@ pub(crate) struct Cases<'a> {
 }
 
 impl Cases<'_> {
-    /// The cases: the intact plant, then each actuator with the largest loss.
+    /// Returns the cases: None for the intact plant, then each actuator with the largest loss.
     pub(crate) fn all(&self) -> Vec<Option<usize>> {
         std::iter::once(None).chain(self.request.actuators.iter().copied().map(Some)).collect()
     }
@@ -94,7 +94,7 @@ impl Cases<'_> {
         format!("without {name}")
     }
 
-    /// A and B of the states in each case, in the time domain of the design.
+    /// Returns A and B of the states in each case, in the time domain of the design.
     pub(crate) fn vertices(&self) -> Vec<Vertex> {
         let Solution { plant, extended, .. } = self.designed;
         let n = extended.states;
@@ -106,7 +106,8 @@ impl Cases<'_> {
         self.all().into_iter().map(vertex).collect()
     }
 
-    /// The loop of plant, observer and feedback, in which an actuator has lost a fraction of its effect.
+    /// Returns the dynamics of plant, observer and feedback together. `case`: an actuator, and the fraction of its
+    /// effect that it has lost; None for the intact plant.
     pub(crate) fn whole(
         &self,
         gains: &Gains,
@@ -128,7 +129,8 @@ pub(crate) struct SlowCase {
     pub(crate) rate: f64,
 }
 
-/// Judges the loops of plant, observer and fall-back: the slowest case, if it is below the requirement.
+/// Judges the loops of plant, observer and fall-back: returns the slowest case if it is below the requirement, else
+/// None.
 pub(crate) type Judge<'a> = dyn Fn(&Cases<'_>, &Fallback) -> Result<Option<SlowCase>, Error> + 'a;
 
 /// The search for the gains.
@@ -160,7 +162,7 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Why no gain can exist, or why none is searched.
+    /// Returns why no gain can exist, or why none is searched; None if a search makes sense.
     fn obstacle(&self) -> Result<Option<String>, Error> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, whole, .. } = designed;
@@ -187,7 +189,7 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// The gains with which all cases meet `region`, with the compensation of the estimated faults if that is
+    /// Returns the gains with which all cases meet `region`, with the compensation of the estimated faults if that is
     /// possible, or the reason why none were found.
     fn within(&self, region: Region) -> Result<Result<Fallback, String>, Error> {
         let Solution { extended, gains, domain, .. } = self.cases.designed;
@@ -243,8 +245,8 @@ impl Search<'_> {
         Ok(best.unwrap_or_else(|| Err(String::new())))
     }
 
-    /// The fall-back with a state feedback, if the loops with the observer decay at the required rate; with
-    /// the compensation of the estimated faults, if they do so with it, too.
+    /// Returns the fall-back with a state feedback if the loops with the observer decay at the required rate, else why
+    /// not; with the compensation of the estimated faults if the loops decay at this rate with it, too.
     fn verified(
         &self,
         gain: &DMatrix<f64>,
@@ -276,8 +278,8 @@ impl Search<'_> {
     }
 }
 
-/// The first of two results that compensates the estimated faults, or else the first one that was found;
-/// without either the last reason.
+/// Returns the first of two results that compensates the estimated faults, else the first that is a fall-back, else the
+/// reason of the second.
 fn better(
     one: Result<Fallback, String>,
     other: Result<Fallback, String>,
@@ -289,7 +291,7 @@ fn better(
     }
 }
 
-/// The columns of B in a case.
+/// Returns B with the column of the actuator `case` reduced by the fraction `loss`.
 pub(crate) fn remaining(b: &DMatrix<f64>, case: Option<usize>, loss: f64) -> DMatrix<f64> {
     let mut b = b.clone();
     if let Some(actuator) = case {
@@ -309,7 +311,7 @@ fn described(region: Region) -> String {
 }
 
 impl Fallback {
-    /// The gains of the controller in the fall-back.
+    /// Returns the gains of the controller in the fall-back.
     pub(crate) fn gains(&self, designed: &Solution) -> Gains {
         let intact = &designed.gains;
         let k_f = self.k_f.clone().unwrap_or_else(|| &intact.k_f * 0.0);

@@ -125,12 +125,13 @@ fn vertex(
     Ok(Vertex { a, b })
 }
 
-/// The name of the plant at a position: 0 is the nominal one.
+/// Returns the name of the plant at a position: 0 is the nominal plant, 1 the first of `members`.
 pub(crate) fn name(members: &[Member], at: usize) -> &str {
     at.checked_sub(1).map_or(NOMINAL, |at| &members[at].name)
 }
 
-/// The sentence about a family without a common gain.
+/// Returns the sentence about a family without a common gain; `names`: members that have none together, `scaling`: the
+/// size of the largest family with one.
 fn refusal(names: &[&str], scaling: Option<f64>) -> String {
     let names = names.join(", ");
     match scaling {

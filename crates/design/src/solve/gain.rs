@@ -23,7 +23,7 @@ pub(crate) struct GainResult {
     pub(crate) norm: Option<NormReport>,
     /// The noise of a Kalman filter.
     pub(crate) noise: Option<Box<Noise>>,
-    /// Other results of an eigenvalue assignment.
+    /// All results of an eigenvalue assignment; None for other methods.
     pub(crate) choice: Option<Box<GainChoice>>,
 }
 
@@ -75,7 +75,7 @@ pub(crate) struct FeedbackProblem<'a> {
     pub(crate) f_a: &'a DMatrix<f64>,
 }
 
-/// The gain of a method without a choice, without required eigenvalues.
+/// Returns the gain of a method without a choice, without required eigenvalues.
 pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
     GainResult {
         gain,
@@ -137,7 +137,7 @@ impl GainResult {
         Self { gain: map(&self.gain), ..self }
     }
 
-    /// The results among which the loop decides; without others the result alone.
+    /// Returns the results among which the loop decides; without a choice this result alone.
     pub(crate) fn into_choice(mut self) -> GainChoice {
         if let Some(choice) = self.choice.take() {
             return *choice;
@@ -147,7 +147,7 @@ impl GainResult {
     }
 }
 
-/// Checks that the eigenvalues of modes that no gain moves are in the region.
+/// Refuses a region that excludes the eigenvalue of one of the modes `fixed`, which no gain moves.
 pub(crate) fn require(region: Region, fixed: &[Mode], domain: Domain) -> Result<(), Refusal> {
     match fixed.iter().find(|mode| !region.contains(mode.eigenvalue, domain)) {
         Some(mode) => Err(Refusal::Fixed(mode.clone())),

@@ -31,23 +31,23 @@ pub(crate) struct GainProblem<'a> {
     pub(crate) domain: Domain,
 }
 
-/// The search for the shape of a loop.
+/// Where the search for the shape of a loop starts, and what it varies.
 struct Search {
-    /// Pairs of feedback and observer.
+    /// Pairs of feedback and observer gains.
     starts: Vec<[DMatrix<f64>; 2]>,
     /// The rows and columns of their entries that are tuned.
     free: [Vec<(usize, usize)>; 2],
 }
 
 impl GainProblem<'_> {
-    /// Computes the gains of feedback and observer. `common`: the feedback of a family.
+    /// Computes the gains of feedback and observer. `common`: the feedback of a family, which is used if there is one.
     pub(crate) fn solve(
         &self,
         common: Option<GainResult>,
     ) -> Result<(GainResult, GainResult), PlaceError> {
         let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
-        // No command and no state of the plant depends on the filters of controllers of low order before those are in the
-        // loop.
+        // No command and no state of the plant depends on the filters of controllers of low order before those are in
+        // the loop.
         let filters = linear.filter_states(file);
         let (first, count) = (filters.start, filters.len());
         let square =
@@ -104,8 +104,8 @@ impl GainProblem<'_> {
         ))
     }
 
-    /// Returns the gains of feedback and observer together, with a warning if they do not give the loop its shape.
-    /// `gains`: those of the controller.
+    /// Returns the gains of feedback and observer that are best together, with a warning if they do not give the loop
+    /// its shape. `gains`: computes those of the controller from both.
     pub(crate) fn chosen(
         &self,
         common: Option<GainResult>,
@@ -132,7 +132,7 @@ impl GainProblem<'_> {
         Ok((feedback, observer, None))
     }
 
-    /// The gains with which the search for the shape of the loop starts, of feedbacks with all their entries.
+    /// Returns the gains of state feedbacks and observers, at which the search for the shape of the loop starts.
     fn starts(&self, shape: &LoopShape) -> Result<Vec<[DMatrix<f64>; 2]>, PlaceError> {
         let gains = |[feedback, observer]: [Request; 2]| {
             let mut file = self.file.clone();
@@ -143,7 +143,8 @@ impl GainProblem<'_> {
         shape.starts(self.domain).into_iter().map(gains).collect()
     }
 
-    /// The search for the structure of the file.
+    /// Returns where the search starts for the structure of the file, a state feedback or controllers of low order, and
+    /// what it varies.
     fn search(&self, shape: &LoopShape) -> Result<Search, crate::Error> {
         let Self { file, linear, pair, domain, .. } = *self;
         let starts = self.starts(shape)?;

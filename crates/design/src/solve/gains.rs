@@ -141,8 +141,8 @@ struct Assignment {
     movable: Vec<Complex<f64>>,
 }
 
-/// Divides the required eigenvalues: each fixed mode takes the nearest one, the others are assigned to
-/// the movable part.
+/// Divides the required eigenvalues: the one nearest to each fixed mode is that of the mode, the others are assigned to
+/// the movable part. Refuses a fixed mode without a required eigenvalue within [`SAME`].
 fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Assignment, Refusal> {
     let sampling = match (required, domain) {
         (Requirement::Eigenvalues(_), Domain::Sampled { period }) => Some(period),
@@ -183,7 +183,7 @@ fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResul
     }
 }
 
-/// The quality is that of the movable part, so that it is not stated.
+/// Returns the results of an assignment of the movable part, without quality, which would be that of this part alone.
 fn partly_assigned(
     alternatives: &Alternatives,
     required: &[Complex<f64>],

@@ -156,7 +156,8 @@ impl LawProblem<'_> {
         Ok(())
     }
 
-    /// The coordinates that three of the laws need; adds their conditions.
+    /// Returns the coordinates that the fast adaptive, the sliding-mode and the learning law need, and adds the
+    /// conditions for them to `conditions`; the error says in a sentence which one does not hold.
     fn direct_form(&self, conditions: &mut Vec<Check>) -> Result<DirectForm, String> {
         let ramp = |fault: &&plant_file::faults::Fault| fault.dynamics == FaultDynamics::Ramp;
         if let Some(fault) = self.linear.faults.iter().find(ramp) {
@@ -191,7 +192,8 @@ impl LawProblem<'_> {
         Ok(sampled)
     }
 
-    /// rho, checked against the bounds of the faults.
+    /// Returns rho of each fault, stated or by default, and adds to `conditions` that it is above the bound of the
+    /// fault; the error says in a sentence where it is not, or what is missing.
     fn reach(
         &self,
         stated: Option<&Vec<f64>>,
@@ -224,7 +226,7 @@ impl LawProblem<'_> {
         Ok(all)
     }
 
-    /// Checks the error dynamics as they will run.
+    /// Checks that the error dynamics with the gains of the law are stable, and adds this to its conditions.
     fn require_stable(&self, design: &mut DesignedLaw) -> Result<(), String> {
         let mut plant = self.plant.clone();
         if let Some(a_f) = &design.a_f {
@@ -248,7 +250,7 @@ impl LawProblem<'_> {
         Ok(())
     }
 
-    /// A parameter with one number for each fault.
+    /// Returns a parameter with one number for each fault; without `unit` in the unit of the fault.
     fn each(&self, name: &str, unit: Option<&str>, values: &[f64]) -> Vec<Number> {
         let faults = self.linear.faults.iter().zip(values);
         let one = |(fault, value): (&plant_file::faults::Fault, &f64)| Number {

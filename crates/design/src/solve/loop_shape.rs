@@ -19,18 +19,18 @@ use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
 use plant_file::signals::same_unit;
 
-/// |S| below this is not asked for at low frequencies; |T| below this part of its peak at high ones.
+/// Smallest |S| that is asked for at low frequencies, and smallest |T| at high ones, relative to its peak.
 const FLOOR: f64 = 0.01;
-/// Starts that are tuned: those of the lowest gamma.
+/// Number of starts that are tuned: those with the lowest gamma.
 const TUNED: usize = 4;
-/// The tuned loop may decay this part as fast as that of its start.
+/// Smallest decay rate of the tuned loop, relative to that of its start.
 const DECAY: f64 = 0.1;
-/// The same with integral action beside a feedforward: how slowly a set point is followed, no term shows.
+/// The same with integral action beside a feedforward: no term shows how slowly a set point is followed.
 const DECAY_OF_INTEGRALS: f64 = 0.9;
-/// The same of the estimates beside integral action: no term shows how slowly they find a fault that the integrals
-/// compensate.
+/// The same for the estimation errors with integral action: no term shows how slowly the observer estimates a fault
+/// that the integrals compensate.
 const DECAY_OF_ESTIMATES: f64 = 0.5;
-/// Smallest size of a gain, relative to the sizes of its row and its column.
+/// Smallest size of an entry of a gain, relative to the average of its row and its column.
 const SMALLEST: f64 = 0.1;
 /// Part of half the sampling rate up to which the roll-off is asked for.
 const BELOW_NYQUIST: f64 = 0.8;
@@ -140,14 +140,14 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         })
     }
 
-    /// The parameters of two gains: the entries that are tuned.
+    /// Returns the parameters of two gains: the entries that are tuned.
     fn joined(&self, gains: &[DMatrix<f64>; 2]) -> DVector<f64> {
         let entries = gains.iter().zip(&self.free);
         let entries = entries.flat_map(|(gain, free)| free.iter().map(|at| gain[*at]));
         DVector::from_vec(entries.collect())
     }
 
-    /// The gains with these parameters; their other entries are those of `others`.
+    /// Returns the gains with these parameters; their other entries are those of `others`.
     fn divided(&self, parameters: &DVector<f64>, others: &[DMatrix<f64>; 2]) -> [DMatrix<f64>; 2] {
         let mut gains = others.clone();
         let mut parameters = parameters.iter();
@@ -159,7 +159,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         gains
     }
 
-    /// The entry that allows more of what limits gamma at a frequency in rad/s.
+    /// Returns the entry of the plant file that relaxes the term which limits gamma at a frequency in rad/s.
     fn help(&self, transfer: Transfer, frequency: f64) -> &'static str {
         match transfer {
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
@@ -172,7 +172,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         }
     }
 
-    /// The controller with its filter and its integrals, in `units`.
+    /// Returns the controller with its filter and its integrals, in `units`; its inputs are the measurements, then the
+    /// references.
     fn controller(
         &self,
         units: &Units,
@@ -205,7 +206,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         }
     }
 
-    /// The plant of the verdict in units in which its channels are comparable: those of the file where they are equal.
+    /// Returns the plant of the verdict, sampled for a sampled design, in units in which its channels are comparable:
+    /// those of the file if all commands have one unit and all measurements have one, otherwise natural ones.
     fn scaled_plant(&self) -> Result<(Units, StateSpace), Error> {
         let plant = self.linear.judged()?;
         let LinearPlant { actuators, measurements, .. } = self.linear;
@@ -233,7 +235,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         Ok((units, StateSpace { b, c, ..plant }))
     }
 
-    /// S and T at commands and measurements, and K S, with their weights.
+    /// Returns S and T at commands and measurements, K S if `effort` is stated, and the tracking error if references
+    /// are integrated, with their weights.
     fn terms(&self) -> Result<Vec<Term>, Error> {
         let LoopShape { bandwidth, set_point, peak, roll_off, effort, .. } = *self.shape;
         let LinearPlant { actuators, measurements, models, .. } = self.linear;
@@ -274,7 +277,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     }
 }
 
-/// Gamma, with the term and the frequency that limit it.
+/// Returns gamma in words, with the term and the frequency that limit it.
 fn summary(terms: &[Term], peak: &WeightedPeak) -> String {
     let name = match terms[peak.term].transfer {
         Transfer::Sensitivity(Point::Input) => "S at the input",
@@ -296,7 +299,7 @@ fn inverse(units: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_diagonal(&units.diagonal().map(f64::recip))
 }
 
-/// The size of each entry, at least a part of that which its row and its column have on average.
+/// Returns the size of each entry, at least [`SMALLEST`] times the average of its row and its column.
 fn sizes(gain: &DMatrix<f64>) -> DMatrix<f64> {
     let all = gain.norm().max(f64::MIN_POSITIVE);
     DMatrix::from_fn(gain.nrows(), gain.ncols(), |row, column| {

@@ -17,14 +17,14 @@ pub(crate) fn fault_names(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec
     all
 }
 
-/// Returns the name of a state, or of the measurement that a filter state belongs to.
+/// Returns the name of a state, or of the measurement that a filter state belongs to; empty for positions beyond.
 pub(crate) fn state_name(linear: &LinearPlant, state: usize) -> &str {
     let n = linear.states.len();
     let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
     signal.map_or("", |signal| signal.name.as_str())
 }
 
-/// Returns the names of the states of the feedback: states, with integral action the integrals.
+/// Returns the names of the states of the feedback: those of the plant, then with integral action the integrals.
 pub(crate) fn feedback_states(file: &PlantFile<'_>, linear: &LinearPlant) -> Vec<String> {
     let integrals = file.references.iter().filter(|references| references.integral);
     let integrals = integrals.flat_map(|references| &references.signals);
@@ -32,7 +32,7 @@ pub(crate) fn feedback_states(file: &PlantFile<'_>, linear: &LinearPlant) -> Vec
     linear.states.iter().map(|signal| signal.name.clone()).chain(integrals).collect()
 }
 
-/// Returns the names of the states of the observer: states, filters, faults.
+/// Returns the names of the states of the observer: states, filters, faults, and rates of ramps.
 pub(crate) fn observer_states(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
     let plain = (0..extended.plant.a.nrows()).map(|at| state_name(linear, at).to_owned());
     plain.chain(fault_names(linear, extended)).collect()

@@ -20,17 +20,16 @@ use crate::solve::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH}
 use plant_file::channel::{Channel, ChannelWeight};
 use plant_file::requirements::Region;
 
-/// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
-/// ends.
+/// Ratio of the upper to the lower bound between which the least norm of any filter is searched.
 const RANGE: f64 = 1e6;
+/// The same at the end of the search.
 const NARROW: f64 = 1.02;
-/// The bound for which a filter is designed, relative to the least one: the gain grows without limit
-/// towards that.
+/// The bound for which a filter is designed, relative to the least one, near which the gain grows without limit.
 const RELAXED: f64 = 1.1;
 /// The norm of such a filter, relative to its bound, above which it is not used.
 const ROUNDED: f64 = 1.05;
 
-/// The pair of the augmented observer and what its channel needs.
+/// The augmented dynamics, and what the channel of the observer depends on.
 pub(crate) struct ObserverProblem<'a> {
     /// `A_0`.
     pub(crate) a_0: &'a DMatrix<f64>,
@@ -57,7 +56,7 @@ pub(crate) struct NormRequirement<'a> {
 }
 
 impl ObserverProblem<'_> {
-    /// The channel from [rates of the faults; noise] to the weighted errors of the estimates, for the
+    /// Returns the channel from [rates of the faults; noise] to the weighted errors of the estimates, for the
     /// error dynamics A - L C with C = `C_0`, or `C_0` `A_0` for a current estimator:
     ///
     /// ```text
@@ -95,7 +94,7 @@ impl ObserverProblem<'_> {
         Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
     }
 
-    /// The weights over frequency of the channel of `performance`, if there are any.
+    /// Returns the weights over frequency of the channel of `performance`; None if all weights are constant.
     fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
         if !channel.has_states() {
             return Ok(None);
@@ -113,9 +112,12 @@ impl ObserverProblem<'_> {
         Ok(Some(ChannelWeights { input, output }))
     }
 
-    /// Computes the gain of the filter for the bound, or near the least bound that any filter reaches; regions do
-    /// not matter. Only with noise on each measurement: behind a measurement filter there is none in the equation of
-    /// continuous time.
+    /// Computes the gain by the Riccati equation of the filter, for the bound, or without one for [`RELAXED`] times the
+    /// least bound of any filter; the region is not considered.
+    ///
+    /// None without noise, with weights over frequency, and above [`LARGEST_ORDER`] states; if there is no such filter,
+    /// as in continuous time with a measurement filter, after which no noise is left; and if rounding errors raise the
+    /// norm above [`ROUNDED`] times its bound.
     fn riccati(
         &self,
         required: NormRequirement<'_>,
@@ -157,8 +159,8 @@ impl ObserverProblem<'_> {
         Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
     }
 
-    /// Computes a norm below which no gain is, and without a noise channel, if it is larger, one for the disc of
-    /// the region.
+    /// Computes a norm below which no gain is: with noise that of filters of any order; without noise the larger one of
+    /// that and of the bound for gains with all eigenvalues in the disc of the region. None if no bound is known.
     fn lower_bound(
         &self,
         required: NormRequirement<'_>,
@@ -186,9 +188,10 @@ impl ObserverProblem<'_> {
         })
     }
 
-    /// Computes a norm below which no filter is, of any order, from the unfiltered measurements with noise.
+    /// Computes a norm below which no filter of any order is, for the unfiltered measurements with noise; None above
+    /// [`LARGEST_ORDER`] states.
     ///
-    /// The states of a measurement filter contain the measurements before the present sample.
+    /// With a measurement filter the newest measurement is that of the sample before, as for a prediction estimator.
     fn noisy_lower_bound(
         &self,
         required: NormRequirement<'_>,
@@ -219,7 +222,7 @@ impl ObserverProblem<'_> {
         unfiltered.noisy_lower_bound(required, domain)
     }
 
-    /// The error dynamics with a gain of `output`, from w to z of a performance.
+    /// Returns the error dynamics with a `gain` for `output`, from w to z of a performance.
     fn closed(
         &self,
         gain: &DMatrix<f64>,
@@ -236,7 +239,8 @@ impl ObserverProblem<'_> {
         }
     }
 
-    /// A, C and the performance of [`Self::performance`] with the states of its weights, if there are any.
+    /// Returns A, C and the performance of [`Self::performance`], extended by the states of its weights, if there are
+    /// any.
     fn extended(
         &self,
         required: NormRequirement<'_>,
@@ -284,7 +288,7 @@ impl ObserverProblem<'_> {
 }
 
 impl FeedbackProblem<'_> {
-    /// The channel from the faults to the weighted measurements and commands.
+    /// Returns the channel from the faults to the weighted measurements and commands.
     fn performance(&self, required: NormRequirement<'_>) -> Performance {
         let (m, p) = (self.b.ncols(), self.c.nrows());
         let mut feedthrough = DMatrix::zeros(p + m, m);
@@ -298,7 +302,7 @@ impl FeedbackProblem<'_> {
         Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
     }
 
-    /// The weights over frequency of measurements and commands, if there are any.
+    /// Returns the weights over frequency of measurements and commands; None if all weights are constant.
     fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
         if !channel.has_states() {
             return Ok(None);
@@ -309,7 +313,8 @@ impl FeedbackProblem<'_> {
         Ok(Some(ChannelWeights { input, output }))
     }
 
-    /// Computes a norm below which no state feedback is, even if it knows the states of the weights.
+    /// Computes a norm below which no state feedback is, even if it knows the states of the weights; None if none is
+    /// known, and above [`LARGEST_ORDER`] states.
     fn lower_bound(
         &self,
         performance: &Performance,
@@ -364,7 +369,7 @@ impl FeedbackProblem<'_> {
     }
 }
 
-/// The weight if it depends on the frequency, else 1: constant weights are factors of the performance.
+/// Returns the weight if it depends on the frequency, else 1: constant weights are factors of the performance.
 fn over_frequency(one: &ChannelWeight) -> Weight {
     match one.weight.as_constant() {
         None => one.weight.clone(),

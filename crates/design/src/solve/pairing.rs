@@ -19,10 +19,11 @@ pub(crate) struct PairProblem<'a> {
 }
 
 impl PairProblem<'_> {
-    /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`].
+    /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`]; a single pair is
+    /// returned without an examination.
     ///
-    /// `gains`: those of the controller, from the gains of feedback and observer. A measurement filter
-    /// belongs to the plant, except with integral action.
+    /// `gains`: computes those of the controller from the gains of feedback and observer. A measurement filter belongs
+    /// to the plant, with integral action to the controller.
     pub(crate) fn chosen(
         &self,
         feedback: GainResult,

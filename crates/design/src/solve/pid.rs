@@ -16,7 +16,7 @@ use plant_file::loop_shape::LoopShape;
 use plant_file::pid::{MOST_ORDER, Pair, Pid};
 use plant_file::references::References;
 
-/// A start decays at this part of the rate of the state feedback beside it, if that can be had.
+/// Decay rate that a start should reach, relative to that of the state feedback from which it is derived.
 const DECAY: f64 = 0.5;
 
 /// The structure of the feedback: which of its entries the controllers have.
@@ -30,7 +30,7 @@ pub(crate) struct PidProblem<'a> {
     pub(crate) domain: Domain,
 }
 
-/// Where the gains of a controller stand in its row of the feedback, [`K_x`, `K_i`].
+/// The columns of the gains of a controller in its row of the feedback, [`K_x`, `K_i`].
 pub(crate) struct Columns {
     pub(crate) proportional: usize,
     /// Of the rate of the filtered measurement, then of its higher derivatives.
@@ -43,7 +43,7 @@ impl PidProblem<'_> {
         columns(self.pid, self.references, self.linear.states.len(), measurement)
     }
 
-    /// The entries of the feedback that are tuned.
+    /// Returns the entries of the feedback that are tuned, as rows and columns.
     pub(crate) fn free(&self) -> Vec<(usize, usize)> {
         let of = |pair: &Pair| {
             let (pair, columns) = (*pair, self.columns(*pair));
@@ -53,8 +53,8 @@ impl PidProblem<'_> {
         self.pid.pairs.iter().flat_map(of).collect()
     }
 
-    /// The controllers nearest to a state feedback, made stable, and the observer with their filters. The second value is
-    /// the instability of the feedback.
+    /// Returns the controllers that are nearest to a state feedback and stable, if that can be reached, the observer
+    /// with their filters, and the instability of this feedback.
     fn start(
         &self,
         [feedback, observer]: &[DMatrix<f64>; 2],
@@ -74,7 +74,7 @@ impl PidProblem<'_> {
         Ok(([feedback, observer], excess))
     }
 
-    /// The starts that are stable.
+    /// Returns the starts that are stable; an error if there are none.
     pub(crate) fn starts(
         &self,
         file: &PlantFile<'_>,
@@ -119,7 +119,7 @@ impl PidProblem<'_> {
     }
 }
 
-/// The columns of a controller from `measurement`, for a plant whose `states` end with those of the filters.
+/// Returns the columns of the controller from `measurement`, for a plant whose `states` end with those of the filters.
 pub(crate) fn columns(
     pid: &Pid,
     references: &References,
@@ -137,12 +137,12 @@ pub(crate) fn columns(
     }
 }
 
-/// The position of the reference of `measurement`.
+/// Returns the position of the reference of `measurement`.
 pub(crate) fn reference(References { h, .. }: &References, measurement: usize) -> usize {
     h.column(measurement).iter().position(|weight| *weight != 0.0).unwrap_or_default()
 }
 
-/// The entries of an observer gain that are tuned: all but those of the filters, whose states are `filters`.
+/// Returns the entries of an observer gain of this shape that are tuned: all but the rows `filters`.
 pub(crate) fn free_of_observer(
     filters: &Range<usize>,
     (rows, columns): (usize, usize),

@@ -47,7 +47,7 @@ pub(crate) struct Reconfigurations {
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
-    /// None if the controller falls back without this actuator.
+    /// None if the controller uses the fall-back without this actuator.
     pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,
@@ -72,7 +72,8 @@ pub(crate) struct ReconfiguredGains {
     pub(crate) k_s: DMatrix<f64>,
 }
 
-/// The controllers without each of the requested actuators, and without several of them, with the report.
+/// Designs the controllers without each of the requested actuators, and without several of them; no report if the file
+/// asks for none. Where there is no controller, the report has the reason and what the fall-back does.
 pub(crate) fn reconfigurations(
     file: &PlantFile<'_>,
     designed: &Solution,
@@ -123,7 +124,7 @@ pub(crate) fn reconfigurations(
     Ok((Reconfigurations { single, combinations, fallback }, Some(report)))
 }
 
-/// Actuators that are gone.
+/// A case in which actuators are gone.
 struct Without<'a> {
     designed: &'a Solution,
     request: &'a ReconfigurationRequest,
@@ -133,14 +134,14 @@ struct Without<'a> {
 
 /// Feedbacks that meet the same requirement.
 struct Feedbacks {
-    /// At least one; then further ones, which come second.
+    /// At least one in the first list; those of the second are used only if they are better.
     all: [Vec<DMatrix<f64>>; 2],
     /// Those of the standard methods, if there is a choice.
     standard: Vec<DMatrix<f64>>,
 }
 
 impl Without<'_> {
-    /// The matrices and the report, or the reason why there are none.
+    /// Returns the gains and the report, or the reason why there are none.
     fn design(
         &self,
         requirement: &Requirement,
@@ -195,8 +196,8 @@ impl Without<'_> {
         Ok(Ok((ReconfiguredGains { k_x, k_f, k_s }, report)))
     }
 
-    /// The gains of the feedback whose loop has the lowest peaks of S, with the commands at rest. The observer is that
-    /// of the intact plant.
+    /// Returns the gains of the feedback whose loop has the lowest peaks of S, with the equilibrium. The observer is
+    /// that of the intact plant.
     fn chosen(
         &self,
         feedbacks: &Feedbacks,
@@ -223,7 +224,7 @@ impl Without<'_> {
         Ok(first.swap_remove(best))
     }
 
-    /// The loop in which the observer knows that the actuators are gone.
+    /// Returns the loop in which the observer knows that the actuators are gone.
     fn known_loop(&self, k_x: &DMatrix<f64>, k_f: &DMatrix<f64>) -> Result<Loop, Error> {
         let Solution { plant, gains, domain, .. } = self.designed;
         let mut reduced = plant.clone();
@@ -233,7 +234,7 @@ impl Without<'_> {
         Loop::new(commanded(reduced, *domain), controller)
     }
 
-    /// What the fall-back does in this case, for which there are no other gains.
+    /// Returns how the loop with the fall-back behaves in this case; the observer knows that the actuators are gone.
     fn served(&self, fallback: &Fallback) -> Result<ServedByFallback, Error> {
         let none = DMatrix::zeros(fallback.k_x.nrows(), self.designed.gains.k_f.ncols());
         let whole = self.known_loop(&fallback.k_x, fallback.k_f.as_ref().unwrap_or(&none))?;
@@ -250,7 +251,7 @@ impl Without<'_> {
         self.gone.iter().map(|at| actuators[*at].name.clone()).collect()
     }
 
-    /// The actuators that are gone and their commands.
+    /// Returns the actuators that are gone, with the commands at which they are stuck.
     fn stuck(&self) -> Vec<(usize, f64)> {
         self.gone.iter().map(|&at| (at, self.request.stuck_at(at))).collect()
     }
@@ -261,8 +262,8 @@ impl Without<'_> {
         b
     }
 
-    /// The distance of each command from its nearest limit, relative to the largest such distance; 1
-    /// without limits.
+    /// Returns the distance of each command from its nearest limit, relative to the largest such distance and at least
+    /// 0.001; 1 for all if one has no limits.
     fn authority(&self) -> Vec<f64> {
         let distance = |signal: &Signal| {
             let operating = signal.operating.unwrap_or(0.0);
@@ -276,7 +277,8 @@ impl Without<'_> {
         distances.iter().flatten().map(|distance| (distance / largest).max(1e-3)).collect()
     }
 
-    /// Feedbacks of the other actuators that meet the requirement of the plant file, and the method.
+    /// Returns feedbacks of the other actuators that meet the requirement of the plant file, and the method, or the
+    /// reason why there are none.
     fn redesigned(&self, requirement: &Requirement) -> Result<(Feedbacks, String), String> {
         let Solution { linear, plant, extended, domain, .. } = self.designed;
         let n = extended.states;
@@ -328,10 +330,10 @@ impl Without<'_> {
         }
     }
 
-    /// K_f, K_s and the equilibrium that they lead to.
+    /// Returns K_f, K_s and the equilibrium that they lead to.
     ///
-    /// The faults of an actuator that is gone are what it does beside the assumed command; they and the
-    /// assumed command act through its column of B, so both have the same commands as answer.
+    /// The faults of an actuator that is gone are the deviation of its effect from the assumed command. Both act
+    /// through its column of B, so that the other actuators answer them by the same commands.
     fn static_commands(
         &self,
         k_x: &DMatrix<f64>,
@@ -382,11 +384,13 @@ impl Without<'_> {
         faults
             .filter(move |(fault, _)| acts(&fault.entry_point))
             .map(|(_, channel)| (channel.estimate, *channel))
+    /// Returns the states of the fault model that restart: those of the faults of the actuators that are gone.
     }
 
     fn restarted(&self) -> Vec<usize> {
         let faults = self.gone.iter().flat_map(|gone| self.faults_of(*gone));
         faults.flat_map(|(_, channel)| [Some(channel.estimate), channel.rate]).flatten().collect()
+    /// Whether the loss of effectiveness of an actuator is estimated.
     }
 
     fn is_estimated(&self, gone: usize) -> bool {

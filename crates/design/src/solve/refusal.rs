@@ -18,12 +18,12 @@ pub(crate) struct States {
     pub(crate) names: Vec<String>,
     /// What they are, in words.
     pub(crate) meaning: &'static str,
-    /// Those of delays, for which a plant file states no weights.
+    /// The positions of the states of delays and filters, for which a plant file states no weights.
     pub(crate) of_delays: Range<usize>,
 }
 
 impl States {
-    /// The name of the state of a row of weights.
+    /// Returns the name of the state to which a row of weights belongs.
     pub(crate) fn weighted(&self, row: usize) -> &str {
         let later = if row < self.of_delays.start { 0 } else { self.of_delays.len() };
         self.names.get(row + later).map_or("", String::as_str)
@@ -43,7 +43,7 @@ pub(crate) fn feedback_refused(
     refused(file, domain, &file.feedback, refusal, &states)
 }
 
-/// Converts the failure of a gain to an error at the requirement in the file.
+/// Converts the refusal of a gain to an error at the requirement in the file; `states`: those that the gain is for.
 pub(crate) fn refused(
     file: &PlantFile<'_>,
     domain: Domain,
@@ -90,7 +90,7 @@ pub(crate) fn refused(
     }
 }
 
-/// Says that a requirement excludes the eigenvalue of a mode that no gain moves.
+/// Returns a sentence that a requirement excludes the eigenvalue of a mode that no gain moves.
 pub(crate) fn fixed(
     requirement: &Requirement,
     mode: &Mode,

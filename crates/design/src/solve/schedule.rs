@@ -20,9 +20,9 @@ use plant_file::estimation::Law;
 use plant_file::signals::Signal;
 use plant_file::variants::Variable;
 
-/// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
-/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of
-/// degree 4 are nearer to it.
+/// Degree of the loop of interpolated plant and controller in the scheduling variable: that of `B_p` K L `C_p` with a
+/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; written with degree 4 its
+/// coefficients are nearer to it.
 const DEGREE: u32 = 4;
 /// The same for a current estimator with a direct term: B `K_f` `P_f` C L C.
 const DEGREE_OF_DIRECT_TERM: u32 = 6;
@@ -31,7 +31,7 @@ const DEGREE_OF_DIRECT_TERM: u32 = 6;
 pub(crate) struct Scheduled {
     /// The scheduling variable.
     pub(crate) variable: Signal,
-    /// The position of the measurement that it is.
+    /// The position of the scheduling variable among the measurements; None if it is an input.
     pub(crate) measurement: Option<usize>,
     /// Largest rate of the variable, per s.
     pub(crate) rate_bound: Option<f64>,
@@ -49,7 +49,8 @@ struct Point {
 }
 
 impl Scheduled {
-    /// Designs the controller with `law` at each point of the schedule of `file`.
+    /// Designs the controller with `law` at each point of the schedule of `file`, except that of the file's own plant;
+    /// None without a schedule.
     pub(crate) fn of(
         file: &PlantFile<'_>,
         law: &Law,
@@ -82,7 +83,7 @@ impl Scheduled {
         }))
     }
 
-    /// The values of the scheduling variable with their designs; `nominal` is the design of the file.
+    /// Returns the values of the scheduling variable with their designs; `nominal` is the design of the file.
     pub(crate) fn points<'a>(
         &'a self,
         nominal: &'a Solution,
@@ -90,7 +91,7 @@ impl Scheduled {
         self.points.iter().map(move |(at, solution)| (*at, solution.as_ref().unwrap_or(nominal)))
     }
 
-    /// The points besides that of the plant of the file.
+    /// Returns the points besides that of the plant of the file.
     pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &Solution)> {
         self.points.iter().filter_map(|(at, solution)| Some((*at, solution.as_ref()?)))
     }
@@ -108,7 +109,7 @@ impl Point {
         Ok(Self { physical, model: solution.plant.clone(), gains: solution.gains.clone() })
     }
 
-    /// The matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
+    /// Returns the matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
     fn between(&self, other: &Self, t: f64) -> Self {
         let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
         let (plant, next_plant) = (&self.physical, &other.physical);
@@ -145,7 +146,7 @@ impl Point {
         }
     }
 
-    /// The dynamics of plant and controller together.
+    /// Returns the dynamics of plant and controller together.
     fn closed(self, filter: Option<&[f64]>) -> Result<DMatrix<f64>, Error> {
         let domain = self.physical.domain;
         let controller = complete_controller(&self.model, &self.gains, filter, domain)?;
@@ -170,8 +171,8 @@ impl ScheduledLoop {
         })
     }
 
-    /// The intervals between the points. All plants and gains on them are interpolated linearly, so
-    /// that the loop is a polynomial, of degree 4 or 6.
+    /// Returns the intervals between the points. Plants and gains are interpolated linearly on them, so that the loop
+    /// is a polynomial, of degree 4 or 6.
     pub(crate) fn intervals(&self) -> Result<Vec<Interval>, Error> {
         let Gains { p_f, estimator, .. } = &self.points[0].gains;
         let degree = match (p_f, estimator) {
@@ -187,8 +188,8 @@ impl ScheduledLoop {
         (0..self.points.len() - 1).map(interval).collect()
     }
 
-    /// The worst instability of the loop at the values that divide each interval into `count` equal parts, with its
-    /// ends, and the value of the variable there.
+    /// Returns the worst instability of the loop at the ends of `count` equal parts of each interval, and the value of
+    /// the variable there.
     pub(crate) fn worst(&self, count: u32, domain: Domain) -> Result<(f64, f64), Error> {
         let mut worst = (f64::NEG_INFINITY, self.at[0]);
         for k in 0..self.points.len() - 1 {
@@ -203,13 +204,14 @@ impl ScheduledLoop {
         Ok(worst)
     }
 
+    /// Returns the dynamics at the part `t` of interval `k`.
     fn dynamics(&self, k: usize, t: f64) -> Result<DMatrix<f64>, Error> {
         self.points[k].between(&self.points[k + 1], t).closed(self.filter.as_deref())
     }
 }
 
-/// The instability of the loop at each point when a measurement schedules, whose own feedback through
-/// the interpolated operating points ("hidden coupling") the designs at the points do not have.
+/// Returns the instability of the loop at each point if the scheduling variable is a measurement; None if it is not.
+/// Its feedback through the interpolated operating points ("hidden coupling") is not part of the designs at the points.
 ///
 /// With slopes ' of the operating points in the variable theta = `y_j`, A to D the controller with its states z,
 ///
@@ -269,13 +271,14 @@ impl Slopes {
         }
     }
 
-    /// Adds the part of references that rest: r - r_op moves against their operating point r_op = H y_op.
+    /// Adds the effect of constant references: r - r_op changes with their operating point r_op = H y_op.
     ///
     /// ```text
     /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta,   x_hat[k+1] = ... - B N_r H y_op' theta
     /// ```
     ///
-    /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
+    /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, so that its next state has
+    /// this part of u, too.
     fn move_references(&self, design: &Solution, controller: &mut StateSpace, j: usize) {
         let Some(tracking) = &design.tracking else { return };
         let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
@@ -297,9 +300,10 @@ impl Slopes {
         }
     }
 
-    /// `system`, the controller with its filter, scheduled by its measurement `j`. Its states are the
-    /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat,
-    /// and the integrals, which have no operating point.
+    /// Returns `system`, the controller with its filter, scheduled by its measurement `j`.
+    ///
+    /// Its states are the filtered measurements, if there are any, x_hat, the filtered measurements of the model,
+    /// f_hat, and the integrals; the last two have no operating point.
     fn act_on(&self, system: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
         let filtered = if is_filtered { &self.y[..] } else { &[] };
         let slopes = [filtered, &self.x, filtered].concat();

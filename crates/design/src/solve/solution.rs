@@ -50,7 +50,8 @@ pub(crate) struct Solution {
     pub(crate) controllability: Rank,
     pub(crate) distance: Distance,
     pub(crate) detectability: Detectability,
-    /// The part of the faults' effect on the states that the compensation cannot cancel, relative.
+    /// The part of the faults' effect on the states of the plant that the compensation cannot cancel, relative to this
+    /// effect.
     pub(crate) cancellation_residual: f64,
     /// The set points of measurements, if there are any.
     pub(crate) tracking: Option<Tracking>,
@@ -63,7 +64,7 @@ pub(crate) struct Solution {
     pub(crate) instability: f64,
     /// Whether the faults are estimated while they are not compensated.
     pub(crate) monitor: bool,
-    /// The same for the observer error before `t_on`, if the faults are not estimated then.
+    /// The instability of the observer error before `t_on`; None if the faults are estimated from the start.
     pub(crate) instability_before: Option<f64>,
 }
 
@@ -176,7 +177,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     Ok(Solved { solution, family, warnings })
 }
 
-/// Computes one feedback for the plant and the members of its family, if a region is required of them.
+/// Computes one feedback for the plant and the members of its family; None without members, or if no region is
+/// required.
 fn feedback_of_family(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -193,8 +195,8 @@ fn feedback_of_family(
     }
 }
 
-/// Returns the instability of plant and controller: the larger one of the design and of the judgement, whose delays are
-/// approximated better.
+/// Returns the instability of plant and controller; with delays the larger one of the loops with the plants of the
+/// design and of the judgement, which approximates delays better.
 fn instability_of(
     linear: &LinearPlant,
     plant: &FaultyPlant,
@@ -213,7 +215,7 @@ fn instability_of(
     Ok(of_design.max(instability(&closed.dynamics(), domain)?))
 }
 
-/// Returns the instability of the observer error before `t_on`, if the faults are not estimated then.
+/// Returns the instability of the observer error before `t_on`; None if the faults are estimated from the start.
 fn instability_before(
     file: &PlantFile<'_>,
     gains: &Gains,
@@ -226,7 +228,7 @@ fn instability_before(
     instability(&gains.state_error_dynamics(plant), domain).map(Some)
 }
 
-/// An error at the law of the file, with the laws that exist.
+/// Returns an error at the law of the file, which names the laws that exist.
 fn not_existing(
     file: &PlantFile<'_>,
     law: &Law,
@@ -241,13 +243,13 @@ fn not_existing(
     file.error_at(&file.estimation.place, message)
 }
 
-/// The observer of a law with error dynamics of its own.
+/// Returns the observer of a law with error dynamics of its own.
 fn by_law(law: &DesignedLaw) -> GainResult {
     let method = format!("By the law {}, as fast as the requirement on average.", law.law.name());
     unique(law.gains.observer_gain(), method)
 }
 
-/// Returns the model in the observer: sampled for a sampled design.
+/// Returns the time domain of the design and the model in the observer, sampled for a sampled design.
 fn in_domain(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -268,8 +270,8 @@ fn in_domain(
     Ok((domain, plant))
 }
 
-/// Returns the part of the faults' effect on the plant's states that the compensation leaves,
-/// relative.
+/// Returns the part of the faults' effect on the states of the plant that the compensation leaves, relative to this
+/// effect; 0 without an effect.
 fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
     let ExtendedPlant { plant, states, .. } = extended;
     let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
@@ -277,8 +279,8 @@ fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
     Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
 }
 
-/// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
-/// gives them.
+/// Returns the controller with `gains`, its filter and its integrals. With direct feedthrough it subtracts D u from the
+/// measurements.
 fn complete(
     linear: &LinearPlant,
     plant: &FaultyPlant,
@@ -297,7 +299,7 @@ fn complete(
     })
 }
 
-/// The loop of a plant and a controller, in the time domain of the controller.
+/// Returns the loop of a plant and a controller, in the time domain of the controller.
 pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
     let plant = match controller.domain {
         Domain::Continuous => plant.clone(),
@@ -307,7 +309,7 @@ pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop
 }
 
 impl Solution {
-    /// The controller with other gains, its filter and its integrals.
+    /// Returns the controller with other gains, its filter and its integrals.
     pub(crate) fn complete(&self, gains: &Gains) -> Result<CompleteController, Error> {
         complete(&self.linear, &self.plant, gains, self.filter.as_deref(), self.domain)
     }

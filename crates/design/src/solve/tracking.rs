@@ -53,7 +53,8 @@ pub(crate) enum TrackingAction {
     Feedforward(DMatrix<f64>),
 }
 
-/// Checks that the plant can hold each reference at every constant value.
+/// Checks that the plant can hold each reference at every constant value, and that integral action with `h_infinity`
+/// has a required decay rate.
 pub(crate) fn check_references(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -107,7 +108,7 @@ pub(crate) fn check_references(
     Ok(())
 }
 
-/// Checks the same for a member of a family.
+/// Checks that a member of a family can hold each reference at every constant value.
 pub(crate) fn check_member(
     file: &PlantFile<'_>,
     variant: &Variant,
@@ -130,7 +131,8 @@ pub(crate) fn check_member(
     Err(file.error_at(&variant.place, message))
 }
 
-/// The pair, A and B, of the feedback: the plant, with integral action followed by its integrals.
+/// Returns A and B of the feedback: those of the plant, with integral action followed by the integrals. `plant`: A, B
+/// and C.
 pub(crate) fn feedback_pair(
     references: Option<&References>,
     plant: [&DMatrix<f64>; 3],
@@ -143,7 +145,7 @@ pub(crate) fn feedback_pair(
     }
 }
 
-/// The integral action with the gain K = [K_x, K_i] of the feedback; None without.
+/// Returns the integral action with the gain K = [K_x, K_i] of the feedback; None if no references are integrated.
 pub(crate) fn integral_action(
     references: Option<&References>,
     linear: &LinearPlant,
@@ -170,8 +172,9 @@ pub(crate) fn integral_action(
 pub(crate) struct TrackingProblem<'a> {
     pub(crate) file: &'a PlantFile<'a>,
     pub(crate) linear: &'a LinearPlant,
-    /// Of the plant, in the domain of the design.
+    /// A of the plant, in the domain of the design.
     pub(crate) a: &'a DMatrix<f64>,
+    /// B of the plant, in the domain of the design.
     pub(crate) b: &'a DMatrix<f64>,
     pub(crate) gains: &'a Gains,
     /// A + B K of [`feedback_pair`].
@@ -219,7 +222,7 @@ impl TrackingProblem<'_> {
     }
 }
 
-/// The refusal of a feedforward beside integrals.
+/// Returns the refusal of a feedforward beside integrals.
 fn without_feedforward(references: &References, file: &PlantFile<'_>, reason: &str) -> PlaceError {
     let message = format!(
         "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: \
@@ -229,7 +232,7 @@ fn without_feedforward(references: &References, file: &PlantFile<'_>, reason: &s
 }
 
 impl Tracking {
-    /// N_r, m x t, if the references act by a feedforward.
+    /// Returns N_r, m x t, if the references act by a feedforward, alone or beside integrals.
     pub(crate) fn feedforward(&self) -> Option<&DMatrix<f64>> {
         match &self.action {
             TrackingAction::Feedforward(n_r) => Some(n_r),
@@ -237,7 +240,7 @@ impl Tracking {
         }
     }
 
-    /// L_w, t x m, if there is a back-calculation.
+    /// Returns L_w, t x m, if there is a back-calculation.
     pub(crate) fn windup(&self) -> Option<&DMatrix<f64>> {
         match &self.action {
             TrackingAction::Feedforward(_) => None,
@@ -246,7 +249,7 @@ impl Tracking {
     }
 }
 
-/// The decay rate of the slowest eigenvalue, 1/s.
+/// Returns the decay rate of the slowest eigenvalue, 1/s; negative if it grows.
 pub(crate) fn decay(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
     Ok(domain.decay_rate(instability(dynamics, domain)?))
 }
@@ -261,7 +264,7 @@ pub(crate) struct DesignLoop {
     pub(crate) controller: StateSpace,
 }
 
-/// A plant without direct term, from its commands to its measurements.
+/// Returns a plant from its commands to its measurements, without a direct term.
 pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
     let FaultyPlant { a, b, c, .. } = plant;
     let d = DMatrix::zeros(c.nrows(), b.ncols());
@@ -269,6 +272,8 @@ pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
 }
 
 impl DesignLoop {
+    /// Returns the loop of the model `plant` in the observer and the controller with `gains`; `linear`: the plant
+    /// without measurement filter.
     pub(crate) fn of(
         linear: &LinearPlant,
         plant: &FaultyPlant,

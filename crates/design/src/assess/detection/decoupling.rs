@@ -14,7 +14,8 @@ use plant_file::PlantFile;
 const SETTLED: f64 = 15.0;
 /// The most samples of a response that are computed.
 const MOST_SAMPLES: usize = 20_000;
-/// A constant fault leaves no trace if its steady mean is below this part of the largest one.
+/// A constant fault leaves no trace if its steady mean is at most this part of its largest mean, or, with a further
+/// input decoupled, of its steady mean without.
 const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
@@ -28,14 +29,14 @@ pub(super) struct Decoupling {
 }
 
 impl Decoupling {
-    /// The filter that decouples nothing.
+    /// Returns the filter that decouples nothing.
     pub(super) fn without(problem: &Problem) -> Result<Self, Error> {
         let decoupling = attempt(problem, Vec::new())?;
         decoupling
             .ok_or(Error::NotConverged { what: "the filter without unknown inputs", iterations: 0 })
     }
 
-    /// The filter that also decouples `input`; None if there is none.
+    /// Returns the filter that also decouples `input`, exactly or as a random walk; None if there is none.
     pub(super) fn with(
         &self,
         problem: &Problem,
@@ -58,7 +59,7 @@ impl Decoupling {
 fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decoupling>, Error> {
     let mut plant = problem.plant.clone();
     for &(input, _) in inputs.iter().filter(|(_, exact)| !exact) {
-        // It moves by its size within a time constant of the loop.
+        // The random walk moves by the size of the input within a time constant of the loop.
         let size = problem.sizes[input].unwrap_or(1.0);
         let intensity = size * size * problem.rate * plant.domain.step();
         let entry = problem.inputs[input].extended(plant.a.nrows());
@@ -75,7 +76,8 @@ fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decou
 }
 
 impl Problem {
-    /// The filter for all faults: the disturbances are decoupled.
+    /// Returns the filter for all faults, which decouples each disturbance, exactly if possible, otherwise as a random
+    /// walk by its bound. An error names a disturbance that cannot be decoupled.
     pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling, crate::Error> {
         let refuse = |error: Error| {
             let request = file.detection.as_ref();
@@ -123,8 +125,8 @@ impl Problem {
         Ok(decoupling)
     }
 
-    /// The steady mean of the residuals of `base` after each fault of its size; an error names a fault
-    /// without one.
+    /// Returns for each fault the length of the steady mean of the residuals of `base` after a step by its size; an
+    /// error names a fault whose steady mean is negligible.
     pub(super) fn shifts(
         &self,
         file: &PlantFile<'_>,
@@ -149,8 +151,9 @@ impl Problem {
         self.faults.clone().map(shift).collect()
     }
 
-    /// The filter for `fault`: `base` that also decouples each of `others` in turn, exactly or else as a random walk,
-    /// except those whose decoupling leaves no trace of `fault`. `shift`: the steady mean of `fault` in `base`.
+    /// Returns the filter for `fault`: `base` that also decouples each of `others` in turn, exactly or else as a random
+    /// walk, except those whose decoupling leaves no trace of `fault`. `shift`: the length of the steady mean of
+    /// `fault` in `base`.
     pub(super) fn isolating(
         &self,
         base: &Decoupling,
@@ -176,7 +179,7 @@ impl Problem {
         decoupling.filter.effect(&self.inputs[input].extended(decoupling.states))
     }
 
-    /// The mean of the residuals long after a step of an input by its size.
+    /// Returns the mean of the residuals long after a step of an input by its size.
     pub(super) fn steady_mean(
         &self,
         decoupling: &Decoupling,
@@ -186,8 +189,8 @@ impl Problem {
         Ok(mean_of_constant(&self.effect(decoupling, input)?, self.period)? * size)
     }
 
-    /// The means of the residuals in the samples after a step of an input by its size, until they are
-    /// settled.
+    /// Returns the means of the residuals, residuals x samples, after a step of an input by its size, until they are
+    /// settled; at least 2 and at most [`MOST_SAMPLES`] samples.
     pub(super) fn means(
         &self,
         decoupling: &Decoupling,
@@ -199,7 +202,7 @@ impl Problem {
         Ok(mean_after_step(&self.effect(decoupling, input)?, self.period, samples)? * size)
     }
 
-    /// The decay rate in 1/s of the slowest of some filters.
+    /// Returns the decay rate in 1/s of the slowest of some filters.
     pub(super) fn slowest_decay<'a>(
         &self,
         filters: impl Iterator<Item = &'a Decoupling>,

@@ -9,7 +9,8 @@ use crate::assess::detection::{Part, tests};
 use crate::matrix::matrix;
 use crate::solve::solution::Solution;
 
-/// The filters of all parts as one filter.
+/// Returns the section: the filters of all parts as one filter, and their tests. `from`: the time, s, at which the
+/// tests start.
 pub(super) fn section(
     problem: &Problem,
     parts: &[Part],

@@ -44,7 +44,7 @@ pub(super) struct ModelErrors<'a> {
     parameters: Option<&'a ParameterFamily<'a>>,
     /// The random cases of these parameters, as deviations from -1 to 1.
     random: Vec<Vec<f64>>,
-    /// The plants of parameters that were linearised, by the bits of their deviations: each test has the same
+    /// The plants of other parameters that were linearised, by the bits of their deviations: each test needs the same
     /// ones.
     cases: RefCell<HashMap<Vec<u64>, Case>>,
     /// The values of the measurements at the operating point.
@@ -98,9 +98,9 @@ impl<'a> ModelErrors<'a> {
         })
     }
 
-    /// The largest mean of combinations of residuals, as a length in standard deviations, times the factor
-    /// of the plant file: a bound for all plants whose entries are within their tolerances; for parameters
-    /// of an FMU the largest bound of the plants that were tried at the corners and within.
+    /// Returns the largest mean of combinations of residuals, as a length in standard deviations, times the factor of
+    /// the plant file: a bound for all plants whose entries are within their tolerances; for parameters of an FMU the
+    /// largest bound of the plants that were tried at the corners and within.
     pub(super) fn largest_mean(
         &self,
         problem: &Problem,
@@ -127,12 +127,12 @@ impl<'a> ModelErrors<'a> {
         Ok(LargestMean { mean: scale * largest.everywhere, interior_excess: Some(excess) })
     }
 
-    /// The number of random cases of the parameters of an FMU.
+    /// Returns the number of random cases of the parameters of an FMU; None if no parameters vary.
     pub(super) fn random_cases(&self) -> Option<usize> {
         self.parameters.map(|_| self.random.len())
     }
 
-    /// [`Self::with_parameters`], computed once for each point.
+    /// Returns [`Self::with_parameters`], computed once for each point.
     fn case(&self, family: &ParameterFamily<'_>, deviations: &[f64]) -> Result<Case, crate::Error> {
         let key: Vec<u64> = deviations.iter().map(|deviation| deviation.to_bits()).collect();
         if let Some(case) = self.cases.borrow().get(&key) {
@@ -143,8 +143,9 @@ impl<'a> ModelErrors<'a> {
         Ok(case)
     }
 
-    /// The FMU with other parameters. At the operating point of the plant file it is not at rest: what
-    /// accelerates it there, and what it then measures, is a further input that is always 1.
+    /// Returns the FMU with other parameters, and the bounds of its inputs. At the operating point of the plant file it
+    /// is not at rest: a further input that is always 1 has the rates of its states and the changes of its measurements
+    /// there.
     fn with_parameters(
         &self,
         family: &ParameterFamily<'_>,
@@ -160,7 +161,7 @@ impl<'a> ModelErrors<'a> {
         Ok((UncertainPlant { nominal: plant, sizes }, self.bounds.clone().push(1.0)))
     }
 
-    /// The length of the bounds of combinations of residuals for a plant.
+    /// Returns the length of the bounds of combinations of residuals for a plant whose inputs have these `bounds`.
     fn bound_of(
         &self,
         plant: &UncertainPlant,
@@ -191,7 +192,7 @@ impl<'a> ModelErrors<'a> {
     }
 }
 
-/// The linear plant with errors of its entries within the tolerances.
+/// Returns the linear plant without D, with the sizes of the errors of its entries by the tolerances.
 fn uncertain(linear: &LinearPlant, file: &PlantFile<'_>) -> UncertainPlant {
     let mut nominal = linear.state_space();
     let Tolerances { of: [a, b, c, _], .. } =

@@ -4,7 +4,7 @@ use control::Error;
 use control::detection::{Cusum, Delay, WindowTest};
 use nalgebra::DMatrix;
 
-/// The most samples that a delay is followed, beyond those in which the mean settles.
+/// The most samples over which a delay is computed, beyond those in which the mean settles.
 const MOST_SAMPLES: usize = 20_000;
 /// The probability with which the least fault is detected in time.
 const POWER: f64 = 0.95;
@@ -43,8 +43,8 @@ impl TestKind {
         }
     }
 
-    /// Samples between false alarms while a mean without faults has at most the length `bias`: the least
-    /// number, or a lower bound of it.
+    /// Returns a lower bound of the mean number of samples between false alarms while the mean of the residuals without
+    /// faults has at most the length `bias`.
     pub(super) fn between_false_alarms(&self, bias: f64) -> f64 {
         match self {
             Self::Cusum(test) => test.between_false_alarms_with_bias(bias),
@@ -53,7 +53,8 @@ impl TestKind {
         }
     }
 
-    /// The delay of a step that moves the means to these columns, the last of which lasts, times `factor`.
+    /// Returns the delay after a step that moves the means of the residuals to `factor` times the columns of `means`,
+    /// one for each sample; the last one lasts. The delay is computed over `most` samples.
     fn delay(&self, means: &DMatrix<f64>, factor: f64, most: usize) -> Delay {
         let last = means.ncols() - 1;
         match self {
@@ -77,12 +78,13 @@ pub(super) struct Prediction<'a> {
 }
 
 impl Prediction<'_> {
-    /// The delay of a step of `factor` times the size.
+    /// Returns the delay after a step of `factor` times the size.
     pub(super) fn delay(&self, factor: f64) -> Delay {
         self.kind.delay(self.means, factor, self.means.ncols() + MOST_SAMPLES)
     }
 
-    /// The least factor of the size that is detected within `time` s with probability 0.95.
+    /// Returns the least factor of the size, from 0.001 on, that is detected within `time` s with probability 0.95;
+    /// None if 1000 times the size is not.
     pub(super) fn least(&self, time: f64) -> Option<f64> {
         let most = whole(time / self.period).min(2 * MOST_SAMPLES);
         let detects =
@@ -99,7 +101,9 @@ impl Prediction<'_> {
     }
 }
 
-/// The test with the window, a power of two of samples, with the least sum of mean delays of some faults.
+/// Returns the test whose window, a power of two of samples, gives the least sum of mean delays of some faults.
+///
+/// `samples`: between false alarms; a window is shorter than a quarter of them, or 1.
 pub(super) fn best_window(
     residuals: u32,
     samples: f64,
@@ -129,7 +133,7 @@ pub(super) fn best_window(
     best.map_or_else(shortest, |(_, test)| Ok(test))
 }
 
-/// A positive number rounded to a whole one, at most 2^31.
+/// Returns the number rounded to a whole one, from 0 to 2^31.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 pub(super) fn whole(number: f64) -> usize {
     number.round().clamp(0.0, 2_147_483_648.0) as usize

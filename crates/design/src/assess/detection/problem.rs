@@ -11,7 +11,7 @@ use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::detection::DetectionRequest;
 
-/// The process noise that is chosen makes the filter no faster than this part of what it can.
+/// A filter counts as fast enough from this part of the decay rate that it should have.
 const NEARLY: f64 = 0.99;
 
 /// The plant of the residuals, in the time domain of the controller.
@@ -25,6 +25,7 @@ pub(super) struct Problem {
     disturbances: usize,
     /// The faults, as positions from 0.
     pub(super) faults: std::ops::Range<usize>,
+    /// The units of the faults.
     pub(super) units: Vec<Option<String>>,
     /// Time between two tests, s.
     pub(super) period: f64,
@@ -92,13 +93,13 @@ impl Problem {
         Ok(problem)
     }
 
-    /// The position of a fault among the inputs.
+    /// Returns the position of a fault among the inputs.
     pub(super) fn fault_at(&self, fault: usize) -> usize {
         self.disturbances + fault
     }
 
-    /// Takes the stated process noise, or chooses the least one with which the filter without unknown
-    /// inputs forgets as fast as the loop.
+    /// Sets the stated process noise, or else the least one with which the filter without unknown inputs forgets as
+    /// fast as the loop. Refuses a wrong number of stated values, and a plant for which no noise gives a filter.
     fn set_process_noise(
         &mut self,
         file: &PlantFile<'_>,
@@ -141,8 +142,9 @@ impl Problem {
         Ok(())
     }
 
-    /// The least factor of `unit` with which the filter without unknown inputs forgets as fast as the loop; if
-    /// none does, as fast as with any factor.
+    /// Returns the least factor of `unit`, 0 or a power of 4, with which the filter without unknown inputs forgets as
+    /// fast as the loop; if it never does, the least factor with which it forgets about as fast as with any factor.
+    /// None if there is a filter for no factor.
     fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
         let decay = |factor: f64| {
             let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };
@@ -157,16 +159,21 @@ impl Problem {
             }
             slower.push((factor, decay_rate));
         }
-        // Not always that with the most noise: a sampled filter approaches the zeros of the sampled plant.
+        // The fastest filter is not always that with the most noise: a sampled one approaches the zeros of the sampled
+        // plant.
         let fastest = slower.iter().map(|(_, decay_rate)| *decay_rate).fold(0.0, f64::max);
         let (factor, _) =
             slower.into_iter().find(|(_, decay_rate)| *decay_rate >= NEARLY * fastest)?;
         Some(factor)
     }
 
-    /// Process noise by which each fault that acts on the states varies by its size within a time
-    /// constant of the loop; if there is none, or it leaves a mode at rest that does not decay, the commands by
-    /// one too; then all states by the mean of that.
+    /// Returns three process noises to try in turn, with their sources in words. Within a time constant of the loop
+    /// they vary
+    ///
+    /// 1. each fault that acts on the states by its size;
+    /// 2. also each command by one: without, there may be no fault on the states, or a mode that does not decay gets no
+    ///    noise;
+    /// 3. also all states by the mean of these.
     fn unit_process_noises(&self) -> [(&'static str, DMatrix<f64>); 3] {
         let n = self.plant.a.nrows();
         let mut faults = DMatrix::zeros(n, n);
@@ -187,7 +194,7 @@ impl Problem {
         ]
     }
 
-    /// The decay rate in 1/s of the slowest eigenvalue of a filter.
+    /// Returns the decay rate in 1/s of the slowest eigenvalue of a filter.
     pub(super) fn decay(&self, a: &DMatrix<f64>) -> Result<f64, Error> {
         let excess = eigenvalues(a)?.into_iter().map(|value| match self.plant.domain {
             Domain::Continuous => value.re,
@@ -197,7 +204,7 @@ impl Problem {
     }
 }
 
-/// How a fault acts on the plant.
+/// Returns how a fault acts on the plant; a loss of effectiveness acts by the column of its command.
 fn unknown_input(model: &Fault, b: &DMatrix<f64>, c: &DMatrix<f64>) -> UnknownInput {
     let (n, p) = (b.nrows(), c.nrows());
     let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));

@@ -40,7 +40,7 @@ pub(super) fn exact(
     }))
 }
 
-/// What the delays themselves change, as reasons of the verdict.
+/// Returns the reasons of the verdict by the delays themselves; none without delays.
 pub(crate) fn reasons(robustness: &Robustness) -> Vec<(Level, String)> {
     let Some(delays) = &robustness.delays else { return Vec::new() };
     let order = delays.judged_order;

@@ -13,8 +13,8 @@ use crate::solve::solution::Solution;
 use control::blocks::stacked;
 use plant_file::robustness::RobustnessLimits;
 
-/// Returns the effect of each measurement noise on commands and estimated faults, and of all
-/// together.
+/// Returns the root-mean-square values of commands and estimated faults under the noise of each measurement, and under
+/// all noise together.
 pub(super) fn noise(
     designed: &Solution,
     closed_loop: &Loop,
@@ -48,7 +48,7 @@ pub(super) fn noise(
     Ok((matrix("noise", meaning, &values, &affected, &measurements), together))
 }
 
-/// [`noise_gains`], infinite where a direct term passes white noise of continuous time.
+/// Returns [`noise_gains`], infinite where a direct term passes white noise of continuous time.
 fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
     let direct = system.d.clone();
     if system.domain != Domain::Continuous {

@@ -12,10 +12,11 @@ use plant_file::robustness::RobustnessLimits;
 
 /// The largest multiple of the tolerances that is examined, as for the worst case.
 const MOST: f64 = 16.0;
-/// Part of the time for certificates and bounds.
+/// Part of the time for certificates and bounds that the proof may take.
 const PART: f64 = 0.25;
 
 /// Returns the fraction of the tolerances of the entries within which every plant is stable, or why none is proven.
+/// `test`: what the search for the worst plant found.
 pub(super) fn of_entries(
     linear: &LinearPlant,
     physical: &Physical,

@@ -16,8 +16,8 @@ use crate::report::robustness::{ToleranceResult, VaryingEntries};
 use crate::solve::solution::Solution;
 use plant_file::robustness::{MATRICES, RobustnessLimits};
 
-/// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the
-/// random cases that stays stable, and the worst case found.
+/// Examines the loop for plants whose matrices have other entries, within the tolerances. Returns the part of the
+/// random cases that is stable, none if no entry varies, and the worst case found.
 pub(crate) fn by_entries(
     designed: &Solution,
     physical: &Physical,
@@ -51,7 +51,7 @@ pub(super) fn by_parameters(
     Ok(ToleranceResult { parameters, ..tested(designed, limits, &test) })
 }
 
-/// The entries that vary: one item for each factor.
+/// Returns the entries that vary: one item for each entry, and for each group with a common factor.
 fn varying(tolerances: &Tolerances) -> Vec<VaryingEntries> {
     let name = |place: &PlantEntry| {
         format!("{}[{}][{}]", MATRICES[place.matrix], place.row + 1, place.column + 1)
@@ -71,7 +71,7 @@ fn varying(tolerances: &Tolerances) -> Vec<VaryingEntries> {
     single.chain(tolerances.common.iter().filter(varies).map(|group| item(group))).collect()
 }
 
-/// The part of the random cases that is stable; none without cases.
+/// Returns the part of the random cases that is stable; none without cases.
 fn stable(test: &ToleranceTest) -> Option<f64> {
     (test.cases > 0).then(|| f64::from(test.stable) / f64::from(test.cases))
 }

@@ -10,15 +10,16 @@ use nalgebra::DMatrix;
 use crate::init::log::fit::{SHORT, estimation, relative_errors};
 use crate::init::log::read::Log;
 
-/// Numbers of earlier samples that predict the next one, which are tried.
+/// Numbers of earlier samples that predict the next one: those that are tried.
 const PASTS: [usize; 5] = [5, 10, 20, 40, 80];
-/// The largest number of columns of the compressed samples: a bound of the time.
+/// The largest number of columns of the compressed samples, which bounds the computing time; the first of [`PASTS`] may
+/// have more.
 const COLUMNS: usize = 250;
 /// The largest order that is tried unless it is stated.
 const ORDERS: usize = 10;
-/// An order is chosen if the logarithms of its errors are together at most this above the smallest.
+/// The smallest order is chosen whose sum of the logarithms of the errors is at most this above the least one.
 const MARGIN: f64 = 0.2;
-/// D is assumed if it lowers the logarithms of the errors together by more than this.
+/// D is assumed if it lowers the sum of the logarithms of the errors by more than this.
 const FEEDTHROUGH: f64 = 1.0;
 /// Errors below this part of the variance are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -31,9 +32,9 @@ const SMALLEST: f64 = 1e-3;
 pub(super) struct Estimate {
     pub(super) windows: Windows,
     pub(super) model: IdentifiedModel,
-    /// The continuous plant with these samples.
+    /// The continuous plant whose samples the model predicts.
     pub(super) continuous: StateSpace,
-    /// The measurements whose rates are states after the measurements; None if the states have no meaning.
+    /// The measurements whose rates follow the measurements as states; None if the states have no meaning.
     pub(super) rates: Option<Vec<usize>>,
     past: usize,
     feedthrough: bool,
@@ -51,7 +52,7 @@ struct Assumption {
 }
 
 impl Estimate {
-    /// Tries orders and lengths of the past, and estimates with the best.
+    /// Tries lengths of the past and, unless `order` is stated, orders, and estimates the plant with the best ones.
     pub(super) fn new(logs: &[Log], order: Option<usize>) -> Result<Self, String> {
         let assumption = best(logs, order)?;
         let Assumption { past, order, feedthrough, .. } = assumption;
@@ -69,7 +70,7 @@ impl Estimate {
         Ok(Self { windows, model, continuous, rates, past, feedthrough, period })
     }
 
-    /// The tolerance of the entries by the estimates without one block each, or why there is none.
+    /// Returns the tolerance of the entries, from estimates each of which leaves out one block, or why there is none.
     pub(super) fn tolerance(&self, logs: &[Log]) -> Result<f64, String> {
         let sentence = |error: control::Error| error.to_string();
         let blocks = blocks(logs, self.past).map_err(sentence)?;
@@ -100,13 +101,13 @@ impl Estimate {
     }
 }
 
-/// The plant with measurements and rates as states.
+/// Returns the plant with measurements and rates as states.
 fn in_states(plant: &StateSpace, states: &MeasuredStates) -> StateSpace {
     let mut a = &states.change * &plant.a * &states.inverse;
     let (p, n) = plant.c.shape();
     let mut c = DMatrix::zeros(p, n);
     c.fill_with_identity();
-    // Without rounding: the derivative of a measurement is the state of its rate, but for the commands.
+    // Exactly, without rounding errors: A has the rate of a measurement as its derivative.
     for (at, rate) in states.rates.iter().enumerate() {
         a.row_mut(*rate).fill(0.0);
         a[(*rate, p + at)] = 1.0;
@@ -114,14 +115,14 @@ fn in_states(plant: &StateSpace, states: &MeasuredStates) -> StateSpace {
     StateSpace { a, b: &states.change * &plant.b, c, d: plant.d.clone(), domain: plant.domain }
 }
 
-/// Two digits, rounded up.
+/// Returns the value with two digits, rounded up.
 fn rounded_up(value: f64) -> f64 {
     let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
     let digits = (value / unit - 1e-9).ceil();
     format!("{:.1e}", digits * unit).parse().unwrap_or(value)
 }
 
-/// The continuous plant whose samples the model predicts.
+/// Returns the continuous plant whose samples the model predicts; an error if there is none.
 fn continuous_plant(model: &IdentifiedModel, period: f64) -> Result<StateSpace, control::Error> {
     let (a, b) = continuous(&model.a, &model.b, period)?;
     Ok(StateSpace { a, b, c: model.c.clone(), d: model.d.clone(), domain: Domain::Continuous })
@@ -132,14 +133,14 @@ fn sampled_plant(model: &IdentifiedModel, period: f64) -> StateSpace {
     StateSpace { a, b, c, d, domain: Domain::Sampled { period } }
 }
 
-/// The windows of the samples that estimate.
+/// Returns the windows of the samples that are used to estimate.
 fn windows(logs: &[Log], past: usize) -> Result<Windows, control::Error> {
     let one = |log: &Log| Windows::new(&log.record, past, estimation(log));
     let parts = logs.iter().map(one).collect::<Result<Vec<_>, _>>()?;
     Windows::joined(&parts.iter().collect::<Vec<_>>())
 }
 
-/// About [`BLOCKS`] blocks of these windows, one or more of each log.
+/// Divides these windows into about [`BLOCKS`] blocks, at least one for each log.
 fn blocks(logs: &[Log], past: usize) -> Result<Vec<Windows>, control::Error> {
     let all: usize = logs.iter().map(|log| estimation(log).len()).sum();
     let mut blocks = Vec::new();
@@ -154,7 +155,7 @@ fn blocks(logs: &[Log], past: usize) -> Result<Vec<Windows>, control::Error> {
     Ok(blocks)
 }
 
-/// From one period in the longest log to nearly half of the sample rate, in rad/s.
+/// Returns 41 frequencies in rad/s, from one period in the longest log to nearly half of the sample rate.
 fn frequencies(logs: &[Log], period: f64) -> Vec<f64> {
     let longest = logs.iter().map(|log| estimation(log).len()).max().unwrap_or(2);
     #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
@@ -163,7 +164,8 @@ fn frequencies(logs: &[Log], period: f64) -> Vec<f64> {
     (0..=40).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 40.0)).collect()
 }
 
-/// The assumption that predicts best: the smallest order within a margin, without D unless D is needed.
+/// Returns the smallest order that predicts about best, without D unless D is needed; an error if no assumption gives a
+/// continuous plant.
 fn best(logs: &[Log], order: Option<usize>) -> Result<Assumption, String> {
     let [without, with] = [false, true].map(|feedthrough| candidates(logs, order, feedthrough));
     let choose = |candidates: &[Assumption]| {
@@ -184,7 +186,7 @@ fn best(logs: &[Log], order: Option<usize>) -> Result<Assumption, String> {
     }
 }
 
-/// All assumptions for which there is a continuous plant; the reason if there are none.
+/// Returns all assumptions that give a continuous plant; the reason if none does.
 fn candidates(
     logs: &[Log],
     order: Option<usize>,
@@ -222,8 +224,10 @@ fn candidates(
     if all.is_empty() { Err(refusal) } else { Ok(all) }
 }
 
-/// The logarithms of the errors over a short, a middle and the longest horizon, each relative to the mean as a prediction,
-/// than which none is worse: an unstable plant has no prediction over a long one.
+/// Returns the sum of the logarithms of the errors over a short, a middle and the longest horizon.
+///
+/// An error of 1 is that of the mean as a prediction; larger ones count as 1, because an unstable plant cannot be
+/// predicted over a long horizon.
 fn score(logs: &[Log], model: &IdentifiedModel) -> Result<f64, control::Error> {
     let mut score = 0.0;
     for horizon in [SHORT / 4, SHORT, usize::MAX] {

@@ -8,10 +8,10 @@ use nalgebra::DMatrix;
 
 use crate::init::log::read::Log;
 
-/// A horizon, in samples, over which an unstable plant can be predicted, too.
+/// A horizon, in samples, over which even an unstable plant can be predicted.
 pub(super) const SHORT: usize = 20;
 
-/// The largest logarithm of the growth of an error over a simulation.
+/// The logarithm of the growth of an error over a simulation, from which on the simulation is not used.
 const GROWTH: f64 = 1.0;
 
 /// The fit of one measurement, 100 % for predictions without error, 0 for those as good as the mean.
@@ -22,18 +22,18 @@ pub(super) struct Fit {
     pub(super) predicted: f64,
 }
 
-/// The samples of a log that estimate the plant: the first three quarters.
+/// Returns the samples of a log that are used to estimate the plant: the first three quarters.
 pub(super) fn estimation(log: &Log) -> Range<usize> {
     0..log.record.len() / 4 * 3
 }
 
-/// The samples of a log that judge the estimate.
+/// Returns the samples of a log that are used to judge the estimate: the last quarter.
 fn validation(log: &Log) -> Range<usize> {
     estimation(log).end..log.record.len()
 }
 
-/// The mean squared error of predictions `horizon` samples ahead, relative to the variance of the samples, for each
-/// measurement; on the part of the logs that was not used to estimate.
+/// Returns for each measurement the mean squared error of predictions `horizon` samples ahead, relative to the variance
+/// of the samples; on the part of the logs that was not used to estimate.
 pub(super) fn relative_errors(
     logs: &[Log],
     model: &IdentifiedModel,
@@ -60,7 +60,7 @@ fn centred(samples: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(samples.nrows(), samples.ncols(), |i, j| samples[(i, j)] - means[i])
 }
 
-/// The fit of each measurement.
+/// Returns the fit of each measurement.
 pub(super) fn fits(logs: &[Log], model: &IdentifiedModel) -> Result<Vec<Fit>, control::Error> {
     let percent = |error: &f64| 100.0 * (1.0 - error.sqrt());
     let predicted = relative_errors(logs, model, SHORT)?;

@@ -1,4 +1,4 @@
-//! Judges logs and estimates: what is refused, and of what the user is warned.
+//! Judges logs and estimates: refuses logs, and warns about estimates.
 
 use control::eigen::eigenvalues;
 use control::identification::Windows;
@@ -19,11 +19,12 @@ const EXCITATION: f64 = 1e-4;
 const POOR_FIT: f64 = 60.0;
 /// A tolerance above which a model is doubtful.
 const LARGE_TOLERANCE: f64 = 0.3;
-/// |eigenvalue| times sample time above which a mode is too fast for the samples, and below which they are too dense.
+/// |eigenvalue| times sample time above which a mode is too fast for the samples.
 const FAST: f64 = 2.5;
+/// The same of the fastest mode, below which the samples are too dense.
 const SLOW: f64 = 0.02;
 
-/// The reason for which no plant can be identified from these logs.
+/// Refuses logs from which no plant can be identified: with too few rows, or with a signal that does not change.
 pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
     for log in logs {
         let count = log.record.len();
@@ -64,7 +65,7 @@ fn unmoved<'a>(
     })
 }
 
-/// What may make the plant useless.
+/// Returns warnings of what may make the plant useless.
 pub(super) fn warnings(
     logs: &[Log],
     estimate: &Estimate,
@@ -105,7 +106,7 @@ pub(super) fn warnings(
     warnings
 }
 
-/// Whether the commands excite as many directions as the order needs.
+/// Returns a warning if the commands excite fewer directions than the order needs.
 fn excitation(logs: &[Log], estimate: &Estimate) -> Option<String> {
     let order = estimate.continuous.a.nrows();
     let parts = logs.iter().map(|log| Windows::new(&log.record, 2 * order, estimation(log)));
@@ -121,7 +122,7 @@ fn excitation(logs: &[Log], estimate: &Estimate) -> Option<String> {
     })
 }
 
-/// Whether the modes are within the range that the samples show.
+/// Returns a warning if the fastest mode is too fast or too slow for the samples.
 fn sampling(estimate: &Estimate, period: f64) -> Option<String> {
     let values = eigenvalues(&estimate.continuous.a).ok()?;
     let fastest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);

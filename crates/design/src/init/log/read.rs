@@ -24,8 +24,8 @@ pub(super) struct Log {
     pub(super) record: Record,
 }
 
-/// Whether the file is a table of signals over time: Parquet, results of Dymola or OpenModelica, or CSV with a column `time`
-/// or `t`.
+/// Whether the file is a table of signals over time, by its `ending`: Parquet, a MAT file with results of Dymola or
+/// OpenModelica, or CSV with a column `time` or `t`.
 pub(in crate::init) fn is_log(path: &Path, ending: &str) -> bool {
     match ending {
         "parquet" => true,
@@ -45,7 +45,7 @@ fn is_time(cell: &str) -> bool {
     ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
 }
 
-/// Reads all logs; the first one decides which columns are used.
+/// Reads all logs; an error if one has another sample time than the first.
 pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, Error> {
     let mut logs: Vec<Log> = Vec::new();
     for path in paths {
@@ -99,7 +99,7 @@ impl Log {
     }
 }
 
-/// The columns of a log but the time.
+/// The columns of a log, of which one is the time.
 struct Columns<'a>(&'a Table);
 
 impl Columns<'_> {
@@ -109,11 +109,12 @@ impl Columns<'_> {
         Named { unit: column.unit.clone().or(name.unit), ..name }
     }
 
+    /// Returns the positions of all columns but the time.
     fn all(&self) -> impl Iterator<Item = usize> {
         (0..self.0.columns().len()).filter(|position| *position != self.0.time())
     }
 
-    /// The positions of commands and measurements.
+    /// Returns the positions of commands and of measurements; an error if there are none, or if a column is both.
     fn choose(&self, options: &LogOptions) -> Result<(Vec<usize>, Vec<usize>), String> {
         let inputs = if options.inputs.is_empty() {
             self.numbered("u")
@@ -155,7 +156,7 @@ impl Columns<'_> {
         self.all().map(|position| self.name(position).name).collect::<Vec<_>>().join(", ")
     }
 
-    /// The columns with this name, alone or with a number.
+    /// Returns the columns whose name is this letter, alone or with a number.
     fn numbered(&self, letter: &str) -> Vec<usize> {
         let is_numbered = |position: &usize| {
             let name = self.name(*position).name;
@@ -165,7 +166,8 @@ impl Columns<'_> {
         self.all().filter(is_numbered).collect()
     }
 
-    /// The positions of the columns that `option` names; an error names a column that is missing or stated twice.
+    /// Returns the positions of the columns that `option` names; an error names a column that is missing or stated
+    /// twice.
     fn positions(&self, option: &str, names: &[String]) -> Result<Vec<usize>, String> {
         let one = |name: &String| {
             let is_it = |position: &usize| {
@@ -185,7 +187,7 @@ impl Columns<'_> {
     }
 }
 
-/// The sample time.
+/// Returns the sample time; an error if times do not increase, or not by equal steps.
 fn period(times: &[f64]) -> Result<f64, String> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);

@@ -14,7 +14,7 @@ use plant_file::requirements::Region;
 
 /// Relative width of a norm.
 pub(crate) const WIDTH: f64 = 1e-4;
-/// Largest order for which bounds are proven and the norm without the region is computed.
+/// Largest number of states for which bounds are proven and the norm without the region is computed.
 pub(crate) const LARGEST_ORDER: usize = 30;
 /// A bound that is larger than the norm by more than this factor is not stated.
 const LOOSE: f64 = 1.01;
@@ -35,7 +35,7 @@ pub(crate) struct Search<'a> {
     pub(crate) unweighted: Performance,
     pub(crate) required: NormRequirement<'a>,
     pub(crate) domain: Domain,
-    /// The gain of a filter by a Riccati equation.
+    /// The gain of a filter by a Riccati equation, if there is one.
     pub(crate) filter: Option<DMatrix<f64>>,
     /// A norm below which no gain is.
     pub(crate) lower_bound: Option<LowerBound>,
@@ -55,7 +55,7 @@ impl LowerBound {
 }
 
 impl Search<'_> {
-    /// The closed loop of a gain with weights.
+    /// Returns the closed loop of a gain with weights.
     fn weighted(&self, gain: &DMatrix<f64>) -> StateSpace {
         let system = (self.system)(gain, &self.performance);
         self.weights.map_or_else(|| system.clone(), |weights| weights.around(&system))
@@ -64,11 +64,15 @@ impl Search<'_> {
     fn weighted_norm(&self, gain: &DMatrix<f64>) -> Result<f64, Error> {
         Ok(h_infinity(&self.weighted(gain), WIDTH)?.upper)
     }
+
     /// Returns the gain with its norm and bounds of it.
     ///
-    /// For the least norm the gain for the region alone is computed, too, and the better one is
-    /// chosen: one Lyapunov matrix for norm and region is sufficient, not necessary. A filter by the
-    /// Riccati equation is used if its eigenvalues are in the region and its norm keeps the bound.
+    /// A filter by the Riccati equation is used if its eigenvalues are in the region and its norm keeps the bound,
+    /// otherwise a gain by linear matrix inequalities.
+    ///
+    /// # Errors
+    ///
+    /// The required bound is below the lower bound; the requirements contradict each other; a numerical method failed.
     pub(crate) fn result(&self, channel: &str) -> Result<GainResult, Refusal> {
         if let (Some(bound), Some(least)) = (self.required.bound, self.lower_bound)
             && least.norm > bound
@@ -98,6 +102,9 @@ impl Search<'_> {
     }
 
     /// Computes the gain by linear matrix inequalities.
+    ///
+    /// For the least norm with constant weights the gain for the region alone is computed, too, and the one with the
+    /// smaller norm is used: one Lyapunov matrix for norm and region is sufficient, not necessary.
     fn by_inequalities(&self, channel: &str) -> Result<GainResult, Refusal> {
         let region = self.required.region.stated();
         let outcome = (self.synthesise)(&region, Some(&self.performance))?;
@@ -166,7 +173,8 @@ impl Search<'_> {
         })
     }
 
-    /// Says what norm a gain reaches that need not keep the region.
+    /// Returns a sentence about the norm that a gain reaches that need not keep the region; None without a region,
+    /// above [`LARGEST_ORDER`] states, and if no gain is found.
     fn without_region(&self) -> Result<Option<String>, Error> {
         let order = self.performance.output.ncols();
         if self.required.region == Region::default() || order > LARGEST_ORDER {
@@ -198,7 +206,7 @@ fn weights_over_frequency(channel: &Channel, domain: Domain) -> Vec<NormWeight> 
     over_frequency.map(reported).collect()
 }
 
-/// Says the norm and its bounds.
+/// Returns the norm and its bounds in words.
 fn sentence(report: &NormReport) -> String {
     let NormReport { norm, unweighted, gain, lower_bound, lower_bound_for, gap, .. } = report;
     let plain = unweighted

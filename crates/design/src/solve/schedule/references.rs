@@ -1,4 +1,4 @@
-//! The references of a scheduled controller between the points.
+//! Examines the references of a scheduled controller between the points of its schedule.
 
 use control::tracking::{InterpolatedWindup, interpolated_windup};
 use control::{Domain, Error};
@@ -11,7 +11,7 @@ use crate::solve::tracking::REACHED;
 use plant_file::PlantFile;
 use plant_file::references::References;
 
-/// Values of the scheduling variable in each interval, besides its ends.
+/// Number of values of the scheduling variable within each interval at which a feedforward is checked.
 const CHECKED: u32 = 19;
 
 /// Examines what the references rely on between the points of a schedule.
@@ -38,7 +38,7 @@ pub(crate) fn examine(
 
 type DesignAt<'a> = (f64, &'a Solution);
 
-/// Examines the back-calculation between two points.
+/// Examines the back-calculation between two points: an error if it is not stable, a warning if that is not decided.
 fn windup(
     file: &PlantFile<'_>,
     scheduled: &Scheduled,
@@ -85,7 +85,8 @@ fn windup(
     }
 }
 
-/// The warning that references without integral action are exact at the points only.
+/// Returns the warning that references without integral action are exact at the points only; None if they are exact
+/// between them, too.
 ///
 /// Between them the constant H y is G N_r r, G = H C (I - A - B K_x)^-1 B, in continuous time H C (-A - B K_x)^-1 B,
 /// with all matrices interpolated.
@@ -126,7 +127,7 @@ fn missed(
     Ok(Some(file.error_at(&references.action_places[0], message)))
 }
 
-/// The largest part of a step of a reference that is missing at rest.
+/// Returns the largest relative error of a reference at rest after a step.
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();

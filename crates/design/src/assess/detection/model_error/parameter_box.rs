@@ -2,9 +2,9 @@
 
 use std::cell::RefCell;
 
-/// With so many parameters or fewer, all corners are tried.
+/// Up to this number of parameters, all corners are tried.
 const ALL_CORNERS: usize = 6;
-/// With more, each parameter in turn goes to its worse limit, so many times at most.
+/// With more parameters, each in turn goes to its worse limit, in at most this number of rounds.
 const ROUNDS: usize = 10;
 /// The steps of the search about the largest value, as parts of the distance from the centre to a limit.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
@@ -12,22 +12,22 @@ const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
 /// The largest values that were found in the box of deviations -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LargestValue {
-    /// At the corners, at the centre and at the centres of the faces.
+    /// At the points that were tried before those of the interior: corners, centre and centres of faces.
     pub(super) corners: f64,
-    /// At these and at all points of the interior that were tried.
+    /// At all points that were tried.
     pub(super) everywhere: f64,
 }
 
 /// Searches the largest value of a function of `count` deviations.
 ///
-/// Tried are the centre, the centres of the faces, all corners (with more than six parameters the one that is
-/// reached by moving one parameter after the other), the points `random` of the interior, and from the largest of
-/// all a search along the axes. The result is a lower bound of the largest value: all values in between were not
-/// tried.
+/// Up to six parameters it tries the centre, the centres of the faces and all corners; with more it starts at the
+/// centre and moves one parameter after the other to a limit. Then it tries the points `random` of the interior, and
+/// searches along the axes from the point with the largest value. The result is a lower bound of the largest value,
+/// because values between these points are unknown.
 ///
 /// # Errors
 ///
-/// Those of `value`.
+/// The first error of `value`.
 pub(super) fn largest<E>(
     count: usize,
     random: &[Vec<f64>],
