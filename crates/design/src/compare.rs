@@ -35,7 +35,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     let base = design_by(&file, &Law::Augmented)?;
     let Solution { linear, extended, plant, gains, domain, .. } = &base.nominal;
     let problem = LawProblem { linear, extended, plant, gains, domain: *domain };
-    let (mut laws, mut own_identity) = (Vec::new(), String::new());
+    let (mut laws, mut plant_identity) = (Vec::new(), String::new());
     for law in Law::ALL {
         let stated = file.estimation.law.name() == law.name();
         let law = if stated { file.estimation.law.clone() } else { law };
@@ -61,7 +61,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
             let steps = Steps::new(&|_| {});
             let assessment = Assessment::new(&file, family.as_ref(), &designed, &steps);
             let report = reporting::report(assessment)?;
-            own_identity = identity(&report);
+            plant_identity = identity(&report);
             result.result = Some(LawFigures {
                 disk_margin: report.robustness.as_ref().and_then(|robustness| {
                     let points = robustness.points.iter().map(|point| point.together.alpha);
@@ -74,5 +74,5 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
         laws.push(result);
     }
     let model = file.fmu().map(Path::to_owned);
-    Ok(Comparison { plant_file: file.name(), laws, identity: own_identity, model })
+    Ok(Comparison { plant_file: file.name(), laws, identity: plant_identity, model })
 }

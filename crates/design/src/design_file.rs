@@ -205,7 +205,7 @@ impl Solution {
 
     /// Returns the faults, then the rates of ramps: one entry per column of F_a.
     fn fault_entries(&self) -> Vec<Fault> {
-        let unnamed = |name| Fault {
+        let named = |name| Fault {
             name,
             unit: None,
             description: String::new(),
@@ -213,7 +213,7 @@ impl Solution {
             least_command: None,
         };
         let names = fault_names(&self.linear, &self.extended);
-        let mut all: Vec<_> = names.into_iter().map(unnamed).collect();
+        let mut all: Vec<_> = names.into_iter().map(named).collect();
         for (fault, channel) in self.linear.faults.iter().zip(&self.extended.channels) {
             let entry = &mut all[channel.estimate];
             entry.unit.clone_from(&fault.unit);

@@ -58,9 +58,9 @@ impl DesignedFmu {
         write(&documentation.join("index.html"), page(&description, &fragment).as_bytes())?;
         write(&documentation.join("plant.toml"), content.plant.as_bytes())?;
         let folder = unpacked.folder();
-        let described = folder.join(terminals::PATH);
-        if described.is_file() {
-            write(&described, terminals::render(&description).as_bytes())?;
+        let terminals_file = folder.join(terminals::PATH);
+        if terminals_file.is_file() {
+            write(&terminals_file, terminals::render(&description).as_bytes())?;
         }
         for entry in fs::read_dir(folder).map_err(Error::file("read", folder))? {
             let path = entry.map_err(Error::file("read", folder))?.path();

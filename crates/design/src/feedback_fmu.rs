@@ -33,8 +33,8 @@ pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> 
     // The states of the measurement filter are the last ones.
     let n = design.states.len() - design.filter.as_ref().map_or(0, Vec::len);
     let states = &design.states[..n];
-    let integral = design.h.as_ref().map(|h| (h, &design.measurements[..]));
-    let measured = integral.map_or(&[][..], |(_, measurements)| measurements);
+    // Integrals act on the measurements themselves.
+    let measured = if design.h.is_some() { &design.measurements[..] } else { &[] };
     let estimated = |signal: Option<&Signal>, name: &str, at: usize, count: usize| Measurement {
         name: channel(name, at, count),
         unit: signal.and_then(|signal| signal.unit.clone()),
@@ -65,7 +65,7 @@ pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> 
         k_x,
         l_x: filled(n, count, unit),
         l_f: filled(q, count, |_, _| 0.0),
-        h: integral.map(|(h, _)| {
+        h: design.h.as_ref().map(|h| {
             filled(h.rows, count, |i, j| if j < before { 0.0 } else { h.row(i)[j - before] })
         }),
         states: states.to_vec(),

@@ -13,7 +13,7 @@ use files::{Source, Table};
 use crate::Error;
 use crate::assess::bandwidths;
 use crate::budget::{Budget, TimeLimits};
-use draft::{Draft, Settings};
+use draft::{Bandwidths, Draft, Settings};
 use plant_file::PlantFile;
 
 pub use log::LogOptions;
@@ -116,11 +116,12 @@ fn attempts(draft: &Draft) -> Vec<Settings> {
     sets.flat_map(filters).collect()
 }
 
-/// The bandwidths that the design of a plant file without requirements has.
-fn bandwidths(path: &Path, text: &str, budget: &Budget) -> Result<Option<(f64, f64)>, Error> {
+/// Returns the bandwidths that the design of a plant file without requirements has.
+fn bandwidths(path: &Path, text: &str, budget: &Budget) -> Result<Option<Bandwidths>, Error> {
     let source = Source::new(path, text.to_owned());
     let parsed = source.parse()?;
     let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
     let file = bandwidths::chosen(&file, budget)?;
-    Ok(file.feedback.bandwidth().zip(file.observer.bandwidth()))
+    let both = file.feedback.bandwidth().zip(file.observer.bandwidth());
+    Ok(both.map(|(feedback, observer)| Bandwidths { feedback, observer }))
 }

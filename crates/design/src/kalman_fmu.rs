@@ -77,12 +77,12 @@ pub(crate) fn kalman_design(
     let n = linear.states.len();
     let (of_observer, q) = (extended.plant.a.nrows(), extended.plant.f_a.ncols());
     // Without the filter of the measurements.
-    let picked: Vec<usize> = (0..n).chain(of_observer..of_observer + q).collect();
+    let positions: Vec<usize> = (0..n).chain(of_observer..of_observer + q).collect();
     // The dynamics of the observer's error have the faults with the other sign.
     let sign = |at: usize| if at < n { 1.0 } else { -1.0 };
     let part = |m: &DMatrix<f64>| {
-        let picked = m.select_rows(&picked).select_columns(&picked);
-        matrix(&DMatrix::from_fn(n + q, n + q, |i, j| picked[(i, j)] * (scale * sign(i) * sign(j))))
+        let block = m.select_rows(&positions).select_columns(&positions);
+        matrix(&DMatrix::from_fn(n + q, n + q, |i, j| block[(i, j)] * (scale * sign(i) * sign(j))))
     };
     let faults = file.faults.iter().zip(&linear.faults).zip(&extended.channels);
     let faults = faults.map(|((stated, fault), channel)| CarriedFault {

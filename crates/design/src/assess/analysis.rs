@@ -168,12 +168,12 @@ impl<'a> Loops<'a> {
         let mut bounds = Vec::new();
         for (column, fault) in self.faults() {
             for (at, gains) in gains.iter().enumerate() {
-                let Ok([jumping, gliding, uncancelled]) = gains else { continue };
-                let of_fault = jumping[column];
+                let Ok([from_faults, from_rates, from_rest]) = gains else { continue };
+                let of_fault = from_faults[column];
                 // A constant fault that leaves a lasting error has no bound by its rate.
                 let leaks = self.designed.law.leaks();
-                let of_rate = if leaks { f64::INFINITY } else { gliding[column] };
-                let left = uncancelled[column];
+                let of_rate = if leaks { f64::INFINITY } else { from_rates[column] };
+                let left = from_rest[column];
                 let constant = !leaks && self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
                 let by_rate = match (fault.rate_bound, fault.bound) {
                     (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),

@@ -121,9 +121,9 @@ fn ultimate(designed: &Solution) -> Result<Ultimate, String> {
     let rate = largest(rates).ok_or_else(|| "it needs `rate_bound` for every fault".to_owned())?;
     let dynamics = designed.gains.error_dynamics(&designed.plant);
     let (order, q) = (dynamics.nrows(), designed.plant.f_a.ncols());
-    let mut enters = nalgebra::DMatrix::zeros(order, q);
-    enters.view_mut((order - q, 0), (q, q)).fill_with_identity();
-    let bound = verified(ultimate_bound(&dynamics, &enters, rate))?;
+    let mut rate_input = nalgebra::DMatrix::zeros(order, q);
+    rate_input.view_mut((order - q, 0), (q, q)).fill_with_identity();
+    let bound = verified(ultimate_bound(&dynamics, &rate_input, rate))?;
     let peaks = bound.peaks.iter().copied().collect();
     Ok(Ultimate { rate, radius: bound.radius, peaks, margin: bound.margin })
 }

@@ -54,7 +54,7 @@ fn existence(designed: &Solution) -> [Check; 3] {
     let Solution { controllability, distance, detectability, .. } = designed;
     // For a large system no lower bound is searched.
     let proven = |distance: &Distance| Some(distance.lower).filter(|lower| *lower > 0.0);
-    let away = |what: &str, distance: &Distance| match proven(distance) {
+    let with_distance = |what: &str, distance: &Distance| match proven(distance) {
         Some(lower) => format!("{what}; distance from losing it, relative: {lower:.2e}"),
         None => format!(
             "{what}; distance from losing it, relative: at most {:.2e}, no lower bound is known",
@@ -62,25 +62,26 @@ fn existence(designed: &Solution) -> [Check; 3] {
         ),
     };
     let observability = &detectability.observability;
-    let reached = format!("rank {} of {}", controllability.rank, controllability.n);
-    let shown = format!("rank {} of {}", observability.rank, observability.n);
+    let controllable = format!("rank {} of {}", controllability.rank, controllability.n);
+    let observable = format!("rank {} of {}", observability.rank, observability.n);
     let fixed = "; the other modes are stable and keep their eigenvalues";
     [
         if controllability.is_full() {
-            check("(A, B) is controllable", true, proven(distance), away(&reached, distance))
+            let explanation = with_distance(&controllable, distance);
+            check("(A, B) is controllable", true, proven(distance), explanation)
         } else {
-            check("(A, B) is stabilisable", true, None, reached + fixed)
+            check("(A, B) is stabilisable", true, None, controllable + fixed)
         },
         if observability.is_full() {
-            check("(A, C) is observable", true, None, shown)
+            check("(A, C) is observable", true, None, observable)
         } else {
-            check("(A, C) is detectable", detectability.is_detectable(), None, shown + fixed)
+            check("(A, C) is detectable", detectability.is_detectable(), None, observable + fixed)
         },
         check(
             "the augmented observer exists",
             detectability.hidden.is_empty() && detectability.is_detectable(),
             proven(&detectability.distance),
-            away(
+            with_distance(
                 "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",
                 &detectability.distance,
             ),

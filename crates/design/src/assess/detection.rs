@@ -253,7 +253,7 @@ fn report(
     let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
     let faults = faults.collect::<Result<Vec<_>, _>>()?;
     warn(&reported, &confused, warnings);
-    hidden(&reported, &faults, warnings);
+    warn_of_hidden(&reported, &faults, warnings);
     let rate: f64 = reported.iter().map(|test| 1.0 / test.false_alarm_interval).sum();
     Ok(Report {
         method: match request.method {
@@ -375,11 +375,11 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
     }
 }
 
-/// Names the faults of their size that errors of the model hide.
-fn hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
+/// Warns of faults whose stated size errors of the model may hide.
+fn warn_of_hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
     for fault in faults.iter().filter(|fault| fault.delay.is_none()) {
-        let blind = tests.iter().find(|test| test.name == fault.test && test.model_error > 0.0);
-        if let Some(test) = blind {
+        let hides = |test: &&Test| test.name == fault.test && test.model_error > 0.0;
+        if let Some(test) = tests.iter().find(hides) {
             warnings.push(format!(
                 "{} of {} moves the mean of its residuals by {:.3} standard deviations, errors of the model by \
                  up to {:.3}: it may stay undetected; smaller tolerances in [robustness] or smaller `commands` \

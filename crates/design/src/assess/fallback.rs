@@ -66,15 +66,16 @@ pub(crate) fn report(
     let reference = noise(designed, &intact)?;
     let stuck_at =
         |actuator| file.reconfiguration.as_ref().map_or(0.0, |table| table.stuck_at(actuator));
-    let of = Examination { cases: plants, gains, reference };
-    let plants = &of.cases;
+    let examination = Examination { cases: plants, gains, reference };
+    let plants = &examination.cases;
     let cases = plants.all().into_iter().enumerate();
-    let cases =
-        cases.map(|(at, case)| of.case(at, case.map(|actuator| (actuator, stuck_at(actuator)))));
+    let cases = cases.map(|(at, case)| {
+        examination.case(at, case.map(|actuator| (actuator, stuck_at(actuator))))
+    });
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let loops = plants.all().into_iter().map(|case| {
         let lossy = case.map(|actuator| (actuator, request.loss));
-        plants.whole(&of.gains, lossy)
+        plants.whole(&examination.gains, lossy)
     });
     let loops = loops.collect::<Result<Vec<_>, Error>>()?;
     let whole_left_out = budget.is_over();

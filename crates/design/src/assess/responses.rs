@@ -120,8 +120,8 @@ impl<'a> ShownLoop<'a> {
                 // x(t_k + time) from x(t_k), with command and fault constant since t_k.
                 let (phi, gamma) = designed.linear.held(&b, time)?;
                 let mut states = gamma.columns(0, m) * &commands;
-                let mut own_states = states.columns_mut(0, n);
-                own_states += phi;
+                let mut of_states = states.columns_mut(0, n);
+                of_states += phi;
                 add_outputs(&mut system, &states, &gamma.columns(m, q).into_owned());
             }
         }
@@ -228,8 +228,7 @@ fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
     if points.len() <= 4 * parts {
         return points.to_vec();
     }
-    let begin = points.partition_point(|point| point.0 <= 0.0);
-    let (before, rest) = points.split_at(begin);
+    let (before, rest) = points.split_at(points.partition_point(|point| point.0 <= 0.0));
     #[expect(clippy::cast_precision_loss, reason = "at most 1000")]
     let width = (rest[rest.len() - 1].0 / rest[0].0).ln() / parts as f64;
     let part = |point: &(f64, f64)| ((point.0 / rest[0].0).ln() / width).floor();

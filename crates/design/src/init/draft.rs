@@ -63,8 +63,14 @@ pub(super) struct Settings {
     pub(super) faulty: Vec<usize>,
     /// Rate of the measurement filter, 1/s.
     pub(super) filter: Option<f64>,
-    /// Of feedback and observer, rad/s.
-    pub(super) bandwidths: Option<(f64, f64)>,
+    pub(super) bandwidths: Option<Bandwidths>,
+}
+
+/// The bandwidths of feedback and observer, rad/s.
+#[derive(Clone, Copy)]
+pub(super) struct Bandwidths {
+    pub(super) feedback: f64,
+    pub(super) observer: f64,
 }
 
 impl Draft {
@@ -96,7 +102,7 @@ impl Draft {
                 let _ = writeln!(text, "#   {}", line.trim_end());
             }
         }
-        if let Some((feedback, observer)) = settings.bandwidths {
+        if let Some(Bandwidths { feedback, observer }) = settings.bandwidths {
             text += "\n# rad/s. A larger bandwidth is faster, and asks for larger commands and better sensors.\n";
             line(&mut text, "feedback.bandwidth", feedback);
             line(&mut text, "observer.bandwidth", observer);

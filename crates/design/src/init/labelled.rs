@@ -62,8 +62,8 @@ const EXPECTED: &str = "expected a table of the matrices: the first line names s
                         each further line the state whose derivative it is, or the measurement";
 
 fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Draft, String> {
-    let named_by = |name: &str| rows.iter().position(|(row, _)| row.name == name);
-    let of_states: Vec<_> = columns.iter().filter_map(|column| named_by(&column.name)).collect();
+    let row_of = |name: &str| rows.iter().position(|(row, _)| row.name == name);
+    let of_states: Vec<_> = columns.iter().filter_map(|column| row_of(&column.name)).collect();
     let of_outputs: Vec<_> = (0..rows.len()).filter(|row| !of_states.contains(row)).collect();
     let (n, m, p) = (of_states.len(), columns.len() - of_states.len(), of_outputs.len());
     if n == 0 || m == 0 || p == 0 {
@@ -71,7 +71,7 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
             "found {n} states, {m} commands and {p} measurements; {EXPECTED}, or a log of signals with a column `time`"
         ));
     }
-    let is_state = |at: &usize| named_by(&columns[*at].name).is_some();
+    let is_state = |at: &usize| row_of(&columns[*at].name).is_some();
     let (states, commands): (Vec<_>, Vec<_>) = (0..columns.len()).partition(is_state);
     let block = |of_rows: &[usize], of_columns: &[usize]| {
         DMatrix::from_fn(of_rows.len(), of_columns.len(), |i, j| rows[of_rows[i]].1[of_columns[j]])

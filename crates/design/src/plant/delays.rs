@@ -54,8 +54,9 @@ pub(crate) fn of(file: &PlantFile<'_>) -> Delays {
     Delays { inputs: all(&file.actuators), outputs: all(&file.measurements) }
 }
 
-/// The matrices of a plant with the states of its delays; F and G are those of its fault inputs, which are not delayed.
-pub(crate) struct Delayed {
+/// The matrices of a plant with the states of its delays and filters; F and G are those of its fault inputs, which are
+/// not delayed.
+pub(crate) struct DelayedPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
     pub(crate) c: DMatrix<f64>,
@@ -70,12 +71,12 @@ pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,
     [f, g]: [&DMatrix<f64>; 2],
-) -> Result<Delayed, PlaceError> {
+) -> Result<DelayedPlant, PlaceError> {
     let (m, q) = (plant.b.ncols(), f.ncols());
     let StateSpace { a, b, c, d, .. } = with_delays(file, plant, [f, g])?;
     let part = |both: &DMatrix<f64>| (both.columns(0, m).into_owned(), both.columns(m, q).into());
     let ((b, f), (d, g)) = (part(&b), part(&d));
-    Ok(Delayed { a, b, c, d, f, g })
+    Ok(DelayedPlant { a, b, c, d, f, g })
 }
 
 /// Same as [`delayed`], as one system with the fault inputs after the commands.

@@ -83,7 +83,7 @@ pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, 
         d: d.clone(),
         domain: plant.domain,
     };
-    enter(pid, &mut extended.a, c, plant.domain)?;
+    set_filters(pid, &mut extended.a, c, plant.domain)?;
     Ok(extended)
 }
 
@@ -100,11 +100,16 @@ pub(crate) fn sample(
     let first = plant.a.nrows() - count;
     plant.b.rows_mut(first, count).fill(0.0);
     plant.f_a.rows_mut(first, count).fill(0.0);
-    enter(pid, &mut plant.a, &c.columns(0, first).into_owned(), domain)
+    set_filters(pid, &mut plant.a, &c.columns(0, first).into_owned(), domain)
 }
 
 /// Sets the rows of the filters, the last ones of A; `c` has the columns of the plant alone.
-fn enter(pid: &Pid, a: &mut DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -> Result<(), Error> {
+fn set_filters(
+    pid: &Pid,
+    a: &mut DMatrix<f64>,
+    c: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<(), Error> {
     let (f, g) = filter(pid, domain)?;
     let order = pid.order;
     let n = c.ncols();

@@ -12,7 +12,7 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant::delays::{self, Delayed, delayed};
+use crate::plant::delays::{self, DelayedPlant, delayed};
 use files::PlaceError;
 use plant_file::PlantFile;
 use plant_file::detection::{Disturbance, DisturbanceEntry};
@@ -25,7 +25,7 @@ use plant_file::signals::Signal;
 pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Part of the largest entry of a row of C below which an entry of D counts as zero.
-const NOTHING: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
 /// known in its samples only.
@@ -168,7 +168,7 @@ impl LinearPlant {
                 }
                 let f = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
                 let g = DMatrix::zeros(c.nrows(), f.ncols());
-                let Delayed { a, b, c, d, f, .. } = delayed(file, &undelayed, [&f, &g])?;
+                let DelayedPlant { a, b, c, d, f, .. } = delayed(file, &undelayed, [&f, &g])?;
                 let model = |fault: &Fault| match fault.entry_point {
                     EntryPoint::Column(at) => modelled(fault, FaultEntry::Actuator(column(&f, at))),
                     _ => on_signals(fault, &b, &d),
@@ -259,7 +259,7 @@ fn linearised(
     let delays = delays::of(file);
     let matrices = delayed(file, &undelayed, [f, g])?;
     let (faults, models) = faults(file, &linearised, &matrices)?;
-    let Delayed { a, b, c, d, .. } = &matrices;
+    let DelayedPlant { a, b, c, d, .. } = &matrices;
     let states: Vec<_> = linearised.states.iter().map(known).collect();
     let actuators = merged(&file.actuators, &linearised.inputs);
     let measurements = merged(&file.measurements, &linearised.outputs);
@@ -332,7 +332,7 @@ fn disturbances(
     file: &PlantFile<'_>,
     b: &DMatrix<f64>,
     d: &DMatrix<f64>,
-    matrices: Option<&Delayed>,
+    matrices: Option<&DelayedPlant>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
     let columns = matrices.map_or(0, |matrices| matrices.f.ncols());
     let first = columns - disturbance_inputs(file).count().min(columns);
@@ -405,9 +405,9 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
 fn faults(
     file: &PlantFile<'_>,
     linearised: &Linearisation,
-    matrices: &Delayed,
+    matrices: &DelayedPlant,
 ) -> Result<(Vec<Fault>, Vec<Model>), crate::Error> {
-    let Delayed { b, d, .. } = matrices;
+    let DelayedPlant { b, d, .. } = matrices;
     let mut inputs = 0..;
     let mut faults = file.faults.clone();
     let mut models = Vec::with_capacity(faults.len());
@@ -437,7 +437,7 @@ fn faults(
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
-    matrices: &Delayed,
+    matrices: &DelayedPlant,
     at: usize,
 ) -> Result<FaultEntry, crate::Error> {
     let (states, measurements) = (column(&matrices.f, at), column(&matrices.g, at));
@@ -467,7 +467,7 @@ fn entry(
 /// Returns D with zeros for entries that are rounding errors beside the row of `c`.
 pub(crate) fn significant(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
     for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
-        let negligible = NOTHING * of_states.amax();
+        let negligible = NEGLIGIBLE * of_states.amax();
         row.apply(|entry| {
             if entry.abs() <= negligible {
                 *entry = 0.0;

@@ -23,12 +23,13 @@ pub(crate) struct ParameterFamily<'a> {
     table: &'a PlantFmu,
     fmu: Fmu,
     request: Linearise,
-    parameters: Vec<Varied>,
+    parameters: Vec<FmuParameter>,
     /// Half of the change of A, B, C and D from the lowest to the highest value of each parameter.
     directions: Vec<[DMatrix<f64>; 4]>,
 }
 
-struct Varied {
+/// A parameter of the FMU that varies.
+struct FmuParameter {
     name: String,
     unit: Option<String>,
     nominal: f64,
@@ -48,7 +49,7 @@ impl<'a> ParameterFamily<'a> {
         let fmu = linear::open(file, table)?;
         let parameters = tolerances
             .iter()
-            .map(|tolerance| varied(file, table, &fmu, tolerance))
+            .map(|tolerance| resolve(file, table, &fmu, tolerance))
             .collect::<Result<Vec<_>, _>>()?;
         let request = linear::request(file, table);
         let directions = Vec::new();
@@ -100,7 +101,7 @@ impl<'a> ParameterFamily<'a> {
     /// the peaks of S at the commands and at the measurements with respect to the entries.
     pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 4]]) -> Vec<Parameter> {
         let effects: Vec<Vec<f64>> = peaks.iter().map(|entries| self.slopes(entries)).collect();
-        let one = |(at, parameter): (usize, &Varied)| Parameter {
+        let one = |(at, parameter): (usize, &FmuParameter)| Parameter {
             name: parameter.name.clone(),
             unit: parameter.unit.clone(),
             value: parameter.nominal,
@@ -112,7 +113,9 @@ impl<'a> ParameterFamily<'a> {
     }
 }
 
-impl Varied {
+impl FmuParameter {
+    /// Returns the value at a deviation from -1, the lower limit, to 1, the upper one; it is linear on either side of
+    /// 0.
     fn value(&self, deviation: f64) -> f64 {
         let [low, high] = self.limits;
         let end = if deviation < 0.0 { low } else { high };
@@ -120,13 +123,14 @@ impl Varied {
     }
 }
 
-/// Resolves a parameter: its value at the operating point, and its limits.
-fn varied(
+/// Finds a parameter in the FMU, with its value at the operating point and its limits. Refuses a variable that is no
+/// real parameter, and limits that do not contain the value or exceed `min` and `max`.
+fn resolve(
     file: &PlantFile<'_>,
     table: &PlantFmu,
     fmu: &Fmu,
     parameter: &ParameterTolerance,
-) -> Result<Varied, crate::Error> {
+) -> Result<FmuParameter, crate::Error> {
     let ParameterTolerance { name, tolerance, place } = parameter;
     let refused = |message: String| crate::Error::from(file.error_at(place, message));
     let description = fmu.description();
@@ -156,8 +160,8 @@ fn varied(
             return Err(refused(message));
         }
         Tolerance::Relative(fraction) => {
-            let reach = fraction * nominal.abs();
-            [nominal - reach, nominal + reach]
+            let half_width = fraction * nominal.abs();
+            [nominal - half_width, nominal + half_width]
         }
         Tolerance::Limits(limits) => limits,
     };
@@ -177,7 +181,7 @@ fn varied(
         );
         return Err(refused(message));
     }
-    Ok(Varied { name: name.clone(), unit: real.unit.clone(), nominal, limits })
+    Ok(FmuParameter { name: name.clone(), unit: real.unit.clone(), nominal, limits })
 }
 
 impl PlantFamily for ParameterFamily<'_> {
@@ -197,10 +201,10 @@ impl PlantFamily for ParameterFamily<'_> {
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
         let n = self.directions.first().map_or(0, |[a, ..]| a.nrows());
         let entries = &delays::of(self.file).of_plant(n, JUDGED, entries);
-        let along = |direction: &[DMatrix<f64>; 4]| {
+        let slope = |direction: &[DMatrix<f64>; 4]| {
             direction.iter().zip(entries).map(|(change, slopes)| change.dot(slopes)).sum()
         };
-        self.directions.iter().map(along).collect()
+        self.directions.iter().map(slope).collect()
     }
 
     /// Returns [`STEPS`] equal steps up to the limits: beyond them a parameter may have no meaning.

@@ -23,7 +23,7 @@ pub(crate) fn check_limits(
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, PlaceError> {
     let mut warnings = Vec::new();
-    let about = |what: &str, signal: &Signal, value: f64| {
+    let operating_point = |what: &str, signal: &Signal, value: f64| {
         let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
         format!("the operating point of the {what} `{}`, {value}{unit}", signal.name)
     };
@@ -32,17 +32,17 @@ pub(crate) fn check_limits(
             continue;
         };
         let value = actuator.operating.unwrap_or(0.0);
-        let about = about("actuator", actuator, value);
+        let point = operating_point("actuator", actuator, value);
         if value < low || value > high {
             let message = format!(
-                "{about}, is outside of its limits {low} and {high}; expected limits around it, or \
+                "{point}, is outside of its limits {low} and {high}; expected limits around it, or \
                  another `operating` or `operating_point`"
             );
             return Err(file.error_at(place, message));
         }
         if value <= low || value >= high {
             let effect = "is at a limit, so that the controller acts in one direction only";
-            warnings.push(file.error_at(place, format!("{about}, {effect}")));
+            warnings.push(file.error_at(place, format!("{point}, {effect}")));
         }
     }
     for signal in &linear.measurements {
@@ -54,7 +54,7 @@ pub(crate) fn check_limits(
             let message = format!(
                 "{}, is outside of its range from {low} to {high}; expected a range that contains it, or another \
                  `operating` or `operating_point`",
-                about("measurement", signal, value)
+                operating_point("measurement", signal, value)
             );
             return Err(file.error_at(place, message));
         }
@@ -159,9 +159,8 @@ fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
         let parts = parts.rows(0, order).into_owned();
         let coefficients = upper.solve_upper_triangular(&parts).unwrap_or(parts);
         let least = NEGLIGIBLE * coefficients.amax();
-        let taking_part = (0..order).filter(|&at| coefficients[at].abs() > least);
-        dependences
-            .push(Dependence { column, of: taking_part.map(|at| independent[at]).collect() });
+        let others = (0..order).filter(|&at| coefficients[at].abs() > least);
+        dependences.push(Dependence { column, of: others.map(|at| independent[at]).collect() });
     }
     dependences
 }

@@ -5,7 +5,7 @@ use files::PlaceError;
 use crate::solve::family::Family;
 use crate::solve::schedule::Scheduled;
 use crate::solve::schedule::references::examine;
-use crate::solve::solution::{Solution, Solved, solve};
+use crate::solve::solution::{Solution, SolveResult, solve};
 use plant_file::PlantFile;
 use plant_file::estimation::Law;
 
@@ -28,7 +28,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
 
 /// Designs the controller for `file` with another law for the estimates of the faults.
 pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<Designed, crate::Error> {
-    let Solved { solution: nominal, family, mut warnings } = solve(file, law)?;
+    let SolveResult { solution: nominal, family, mut warnings } = solve(file, law)?;
     let schedule = Scheduled::of(file, law, &nominal.linear)?;
     if let Some(schedule) = &schedule {
         warnings.extend(examine(file, schedule, &nominal)?);

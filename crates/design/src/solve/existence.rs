@@ -78,10 +78,10 @@ pub(crate) fn check_detectable(
         warnings.push(error);
     }
     let fault_names = fault_names(linear, extended);
-    if let Some(&unseen) = detectability.invisible_faults().first() {
-        let name = &fault_names[unseen];
+    if let Some(&invisible) = detectability.invisible_faults().first() {
+        let name = &fault_names[invisible];
         let message = format!("fault `{name}` cannot be seen from the measurements {measurements}");
-        return Err(at_fault(file, linear, unseen, message).into());
+        return Err(at_fault(file, linear, invisible, message).into());
     }
     // The eigenvalue of a constant signal.
     let constant = match linear.domain {

@@ -12,7 +12,7 @@ use plant_file::requirements::Request;
 use crate::plant::linear::LinearPlant;
 use crate::solve::gain::{FeedbackProblem, GainResult};
 use crate::solve::gains::{feedback, observer};
-use crate::solve::loop_shape::{LoopProblem, Shaped};
+use crate::solve::loop_shape::{LoopProblem, ShapedGains};
 use crate::solve::names::observer_states;
 use crate::solve::norm_gains::ObserverProblem;
 use crate::solve::pairing::PairProblem;
@@ -119,7 +119,7 @@ impl GainProblem<'_> {
                 file.references.as_ref().filter(|one| one.integral && !one.feedforward);
             let problem =
                 LoopProblem { shape, linear, plant, filter, domain, references, free, gains };
-            let Shaped { feedback, observer, warning } = problem.tuned(&starts)?;
+            let ShapedGains { feedback, observer, warning } = problem.tuned(&starts)?;
             return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
         }
         let (feedback, observer) = self.solve(common)?;

@@ -51,8 +51,8 @@ pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains +
     pub(crate) gains: G,
 }
 
-/// The tuned gains, and why gamma is above 1, if it is.
-pub(crate) struct Shaped {
+/// The tuned gains, and a warning if gamma is above 1.
+pub(crate) struct ShapedGains {
     pub(crate) feedback: GainResult,
     pub(crate) observer: GainResult,
     pub(crate) warning: Option<String>,
@@ -66,8 +66,9 @@ struct Units {
 }
 
 impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
-    /// Tunes the gains from the best of `starts`, pairs of feedback and observer.
-    pub(crate) fn tuned(&self, starts: &[[DMatrix<f64>; 2]]) -> Result<Shaped, Error> {
+    /// Tunes the gains from the best of `starts`, pairs of feedback and observer, and returns the result with the
+    /// lowest gamma. An error if no start can be examined.
+    pub(crate) fn tuned(&self, starts: &[[DMatrix<f64>; 2]]) -> Result<ShapedGains, Error> {
         let (units, plant) = self.scaled_plant()?;
         let ending = lmi::ending();
         let is_over = || ending.as_ref().is_some_and(|ending| ending());
@@ -95,7 +96,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             let mut tuning = Tuning {
                 plant: plant.clone(),
                 controller: &controller,
-                references: self.followed(&units),
+                references: self.scaled_h(&units),
                 terms: terms.clone(),
                 instability: 0.0,
                 is_allowed: &is_allowed,
@@ -130,7 +131,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let [feedback, observer] = self.divided(&parameters, &starts[0]);
         let summary = summary(&terms, &peak);
         let method = format!("Loop shaping: {summary}.");
-        Ok(Shaped {
+        Ok(ShapedGains {
             feedback: unique(feedback, method.clone()),
             observer: unique(observer, method),
             warning: (peak.gamma > 1.0).then(|| {
@@ -198,8 +199,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         })
     }
 
-    /// H in `units`.
-    fn followed(&self, units: &Units) -> DMatrix<f64> {
+    /// Returns H in `units`; without rows if no references are integrated.
+    fn scaled_h(&self, units: &Units) -> DMatrix<f64> {
         match self.references {
             Some(References { h, .. }) => &units.references * h * inverse(&units.measurements),
             None => DMatrix::zeros(0, units.measurements.nrows()),

@@ -208,11 +208,11 @@ impl ObserverProblem<'_> {
         let first = order - self.faults - filter.len();
         let states: Vec<_> =
             (0..order).filter(|at| !(first..first + filter.len()).contains(at)).collect();
-        let kept_columns = self.a_0.select_columns(&states);
+        let columns = self.a_0.select_columns(&states);
         let rates = DVector::from_column_slice(filter).map(|rate| 1.0 / rate);
         let unfiltered = ObserverProblem {
-            a_0: &kept_columns.select_rows(&states),
-            c_0: &(DMatrix::from_diagonal(&rates) * kept_columns.rows(first, filter.len())),
+            a_0: &columns.select_rows(&states),
+            c_0: &(DMatrix::from_diagonal(&rates) * columns.rows(first, filter.len())),
             b: &self.b.rows(0, first).into_owned(),
             channels: self.channels,
             faults: self.faults,

@@ -354,13 +354,13 @@ impl Without<'_> {
             let b_g: DVector<f64> = linear.b.column(actuator).into();
             let unit = equilibrium(&at_rest, &actuators, &output, &b_g)?;
             let answer = &unit.u - k_x * &unit.x;
-            for (at, channel) in self.faults_of(actuator) {
+            for channel in self.faults_of(actuator) {
                 // The intact gain has the mean of the modelled fault over a sample.
                 let intact = modelled.row(actuator);
                 let columns = [Some(channel.estimate), channel.rate];
                 for column in columns.into_iter().flatten() {
                     let part = intact[column] / intact[channel.estimate];
-                    let part = if at == column { 1.0 } else { part };
+                    let part = if column == channel.estimate { 1.0 } else { part };
                     k_f.set_column(column, &(&answer * part));
                 }
             }
@@ -373,26 +373,24 @@ impl Without<'_> {
         Ok((k_f, k_s, Rest::of(linear, &x, u, is_kept)))
     }
 
-    /// The faults of an actuator: their first column, and their channels.
-    fn faults_of(&self, gone: usize) -> impl Iterator<Item = (usize, FaultChannel)> + '_ {
+    /// Returns the channels of the faults of an actuator.
+    fn faults_of(&self, gone: usize) -> impl Iterator<Item = FaultChannel> + '_ {
         let Solution { linear, extended, .. } = self.designed;
         let acts = move |point: &EntryPoint| match point {
             EntryPoint::Actuator(actuator) | EntryPoint::Loss { actuator, .. } => *actuator == gone,
             _ => false,
         };
         let faults = linear.faults.iter().zip(&extended.channels);
-        faults
-            .filter(move |(fault, _)| acts(&fault.entry_point))
-            .map(|(_, channel)| (channel.estimate, *channel))
-    /// Returns the states of the fault model that restart: those of the faults of the actuators that are gone.
+        faults.filter(move |(fault, _)| acts(&fault.entry_point)).map(|(_, channel)| *channel)
     }
 
+    /// Returns the states of the fault model that restart: those of the faults of the actuators that are gone.
     fn restarted(&self) -> Vec<usize> {
         let faults = self.gone.iter().flat_map(|gone| self.faults_of(*gone));
-        faults.flat_map(|(_, channel)| [Some(channel.estimate), channel.rate]).flatten().collect()
-    /// Whether the loss of effectiveness of an actuator is estimated.
+        faults.flat_map(|channel| [Some(channel.estimate), channel.rate]).flatten().collect()
     }
 
+    /// Whether the loss of effectiveness of an actuator is estimated.
     fn is_estimated(&self, gone: usize) -> bool {
         self.designed.linear.faults.iter().any(|fault| {
             matches!(fault.entry_point, EntryPoint::Loss { actuator, .. } if actuator == gone)

@@ -25,8 +25,8 @@ pub(crate) struct States {
 impl States {
     /// Returns the name of the state to which a row of weights belongs.
     pub(crate) fn weighted(&self, row: usize) -> &str {
-        let later = if row < self.of_delays.start { 0 } else { self.of_delays.len() };
-        self.names.get(row + later).map_or("", String::as_str)
+        let skipped = if row < self.of_delays.start { 0 } else { self.of_delays.len() };
+        self.names.get(row + skipped).map_or("", String::as_str)
     }
 }
 

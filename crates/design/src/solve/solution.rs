@@ -69,7 +69,7 @@ pub(crate) struct Solution {
 }
 
 /// The controller of the plant of a file, and what it was solved with.
-pub(crate) struct Solved {
+pub(crate) struct SolveResult {
     pub(crate) solution: Solution,
     /// The plants that the controller serves besides the one of the file.
     pub(crate) family: Option<Family>,
@@ -78,7 +78,7 @@ pub(crate) struct Solved {
 }
 
 /// Solves for the controller of the plant of `file` with `law` for the estimates of the faults.
-pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Error> {
+pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<SolveResult, crate::Error> {
     crate::threads::start()?;
     let linear = LinearPlant::of(file)?;
     feedthrough::check(file, &linear)?;
@@ -102,9 +102,9 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let (domain, mut plant) = in_domain(file, &linear, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
-    let part =
-        (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
-    let pair = feedback_pair(references, [&part.0, &part.1, c], domain)?;
+    let a_x = plant.a.view((0, 0), (states, states)).into_owned();
+    let b_x = plant.b.rows(0, states).into_owned();
+    let pair = feedback_pair(references, [&a_x, &b_x, c], domain)?;
     let members = family::members(file, &linear, &mut warnings)?;
     let (common, certificate) = feedback_of_family(file, &linear, &members, domain)?.unzip();
     let problem = GainProblem {
@@ -117,7 +117,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     };
     let n = plant.a.nrows();
     let k_f = sampled::compensation_gain(&extended, domain)?;
-    let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
+    let controller_gains = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
         estimator: file.estimator(),
         k_x: feedback.columns(0, states).into_owned().resize_horizontally(n, 0.0),
         k_f: k_f.clone(),
@@ -127,9 +127,10 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         integral: integral_action(references, &linear, &extended, feedback),
     };
     let filter = sampled::filter(&extended, domain);
-    let (feedback, observer, warning) = problem.chosen(common, filter.as_deref(), with)?;
+    let (feedback, observer, warning) =
+        problem.chosen(common, filter.as_deref(), controller_gains)?;
     warnings.extend(warning);
-    let gains = with(&feedback.gain, &observer.gain);
+    let gains = controller_gains(&feedback.gain, &observer.gain);
     let problem =
         LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
     let designed =
@@ -144,8 +145,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let problem = TrackingProblem {
         file,
         linear: &linear,
-        a: &part.0,
-        b: &part.1,
+        a: &a_x,
+        b: &b_x,
         gains: &gains,
         feedback: &controlled,
         domain,
@@ -174,7 +175,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         whole,
     };
     let family = (!members.is_empty()).then_some(Family { members, feedback: certificate });
-    Ok(Solved { solution, family, warnings })
+    Ok(SolveResult { solution, family, warnings })
 }
 
 /// Computes one feedback for the plant and the members of its family; None without members, or if no region is

@@ -21,22 +21,22 @@ pub(super) fn of_entries(
     linear: &LinearPlant,
     physical: &Physical,
     limits: &RobustnessLimits,
-    tested: &ToleranceResult,
+    test: &ToleranceResult,
     budget: &Budget,
 ) -> Result<ToleranceProof, String> {
-    if !tested.parameters.is_empty() {
+    if !test.parameters.is_empty() {
         return Err(
             "not examined: the parameters of an FMU enter its matrices nonlinearly".to_owned()
         );
     }
-    if !tested.is_examined() {
+    if !test.is_examined() {
         return Err("not examined: no entry of the plant varies".to_owned());
     }
     let budget = budget.part(PART, "the proof for the tolerances");
     if budget.is_over() {
         return Err(budget.reason());
     }
-    let most = tested.first_unstable.min(MOST);
+    let most = test.first_unstable.min(MOST);
     let tolerances = tolerances(linear, JUDGED, limits).placed;
     let family =
         EntryFamily::new(&physical.plant, &tolerances).map_err(|error| error.to_string())?;

@@ -34,7 +34,7 @@ pub(crate) fn by_entries(
     let entries = u32::try_from(stated.entries().count()).unwrap_or(u32::MAX);
     let stable = stable(&test).filter(|_| entries > 0);
     let varying = varying(&stated);
-    Ok(ToleranceResult { entries, varying, stable, ..tested(designed, limits, &test) })
+    Ok(ToleranceResult { entries, varying, stable, ..tolerance_result(designed, limits, &test) })
 }
 
 /// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
@@ -48,7 +48,7 @@ pub(super) fn by_parameters(
     let seed = u64::from(limits.seed);
     let test = tolerance_test(family, &physical.controller, limits.cases, seed)?;
     let parameters = family.report(&test.deviations, slopes);
-    Ok(ToleranceResult { parameters, ..tested(designed, limits, &test) })
+    Ok(ToleranceResult { parameters, ..tolerance_result(designed, limits, &test) })
 }
 
 /// Returns the entries that vary: one item for each entry, and for each group with a common factor.
@@ -76,7 +76,11 @@ fn stable(test: &ToleranceTest) -> Option<f64> {
     (test.cases > 0).then(|| f64::from(test.stable) / f64::from(test.cases))
 }
 
-fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) -> ToleranceResult {
+fn tolerance_result(
+    designed: &Solution,
+    limits: &RobustnessLimits,
+    test: &ToleranceTest,
+) -> ToleranceResult {
     let linear = &designed.linear;
     let StateSpace { a, b, c, d, .. } = test.worst.clone();
     let worst = linear.of_plant(&[a, b, c, d]);

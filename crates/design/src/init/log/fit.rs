@@ -64,7 +64,7 @@ fn centred(samples: &DMatrix<f64>) -> DMatrix<f64> {
 pub(super) fn fits(logs: &[Log], model: &IdentifiedModel) -> Result<Vec<Fit>, control::Error> {
     let percent = |error: &f64| 100.0 * (1.0 - error.sqrt());
     let predicted = relative_errors(logs, model, SHORT)?;
-    let simulated = if is_simulated(logs, model)? {
+    let simulated = if can_be_simulated(logs, model)? {
         let errors = relative_errors(logs, model, usize::MAX)?;
         errors.iter().map(|error| Some(percent(error))).collect()
     } else {
@@ -75,8 +75,8 @@ pub(super) fn fits(logs: &[Log], model: &IdentifiedModel) -> Result<Vec<Fit>, co
     Ok(predicted.iter().zip(simulated).map(one).collect())
 }
 
-/// Whether errors of a state do not grow over the longest simulation.
-fn is_simulated(logs: &[Log], model: &IdentifiedModel) -> Result<bool, control::Error> {
+/// Whether an error of a state grows by less than a factor e over the longest simulation.
+fn can_be_simulated(logs: &[Log], model: &IdentifiedModel) -> Result<bool, control::Error> {
     let values = eigenvalues(&model.a)?;
     let radius = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
     let longest = logs.iter().map(|log| validation(log).len()).max().unwrap_or_default();

@@ -33,13 +33,13 @@ pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
         }
     }
     let Log { inputs, outputs, .. } = &logs[0];
-    let commands = unmoved(inputs, logs, |log| &log.record.inputs);
+    let commands = constant_signal(inputs, logs, |log| &log.record.inputs);
     if let Some((name, value)) = commands {
         return Err(format!(
             "command {name} is {value} throughout; expected a log in which it changes: its effect cannot be identified"
         ));
     }
-    let measurements = unmoved(outputs, logs, |log| &log.record.outputs);
+    let measurements = constant_signal(outputs, logs, |log| &log.record.outputs);
     if let Some((name, value)) = measurements {
         return Err(format!(
             "measurement {name} is {value} throughout; expected a log in which it moves, or --outputs without it"
@@ -48,8 +48,9 @@ pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
     Ok(())
 }
 
-/// The first signal that does not change among the samples that estimate, with its smallest value.
-fn unmoved<'a>(
+/// Returns the first signal that does not change in the samples that are used to estimate, with its value; None if all
+/// do.
+fn constant_signal<'a>(
     signals: &'a [Named],
     logs: &[Log],
     rows: impl Fn(&Log) -> &DMatrix<f64>,

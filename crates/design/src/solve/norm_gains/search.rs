@@ -89,7 +89,7 @@ impl Search<'_> {
             )));
         }
         let mut chosen = match &self.filter {
-            Some(gain) if self.usable(gain)? => {
+            Some(gain) if self.is_usable(gain)? => {
                 let method = format!("{channel}, by the Riccati equation of the filter.");
                 unique(gain.clone(), method)
             }
@@ -137,7 +137,7 @@ impl Search<'_> {
     }
 
     /// Whether the eigenvalues with a gain are in the region and its norm keeps the bound.
-    fn usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
+    fn is_usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
         let all = eigenvalues(&(self.system)(gain, &self.performance).a)?;
         let inside = |value| self.required.region.contains(value, self.domain);
         let bound = self.required.bound.unwrap_or(f64::INFINITY);

@@ -34,50 +34,51 @@ pub(super) fn largest<E>(
     value: impl Fn(&[f64]) -> Result<f64, E>,
 ) -> Result<LargestValue, E> {
     let best = RefCell::new((f64::NEG_INFINITY, vec![0.0; count]));
-    let rises = |at: Vec<f64>| {
+    // Tries a point; returns whether its value is the largest.
+    let improves = |at: Vec<f64>| {
         let height = value(&at)?;
         let mut best = best.borrow_mut();
-        let rises = height > best.0;
-        if rises {
+        let is_largest = height > best.0;
+        if is_largest {
             *best = (height, at);
         }
-        Ok(rises)
+        Ok(is_largest)
     };
-    rises(vec![0.0; count])?;
+    improves(vec![0.0; count])?;
     if count <= ALL_CORNERS {
         for axis in 0..count {
             for end in [-1.0, 1.0] {
                 let mut face = vec![0.0; count];
                 face[axis] = end;
-                rises(face)?;
+                improves(face)?;
             }
         }
         for corner in 0..1_u32 << count {
             let sign = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-            rises((0..count).map(sign).collect())?;
+            improves((0..count).map(sign).collect())?;
         }
     } else {
         for _ in 0..ROUNDS {
-            let mut rose = false;
+            let mut is_improved = false;
             for (axis, end) in (0..count).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
                 let mut other = best.borrow().1.clone();
                 other[axis] = end;
-                rose |= rises(other)?;
+                is_improved |= improves(other)?;
             }
-            if !rose {
+            if !is_improved {
                 break;
             }
         }
     }
     let corners = best.borrow().0;
     for case in random {
-        rises(case.clone())?;
+        improves(case.clone())?;
     }
     for step in STEPS {
         for (axis, step) in (0..count).flat_map(|axis| [(axis, -step), (axis, step)]) {
             let mut other = best.borrow().1.clone();
             other[axis] = (other[axis] + step).clamp(-1.0, 1.0);
-            rises(other)?;
+            improves(other)?;
         }
     }
     Ok(LargestValue { corners, everywhere: best.into_inner().0 })
