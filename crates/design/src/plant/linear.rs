@@ -387,7 +387,7 @@ fn linearisation(
     Ok((format!("{} ({name})", fmu.description().model_name), linearised))
 }
 
-/// Returns the entry of the file that names this variable of the FMU.
+/// Returns the entry of the file that names this variable of the FMU; that of the faults for any other variable.
 fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) -> &'static str {
     let among = |signals: &[Signal]| signals.iter().any(|signal| signal.name == name);
     if operating_point.iter().any(|(variable, _)| variable == name) {
@@ -396,6 +396,8 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
         "actuators"
     } else if among(&file.measurements) {
         "measurements"
+    } else if disturbance_inputs(file).any(|input| input == name) {
+        "disturbances"
     } else {
         "faults"
     }
