@@ -244,6 +244,19 @@ def test_a_log_that_shows_no_plant_is_refused_with_the_reason(aso_ftc, tmp_path,
     assert not (tmp_path / "plant.toml").exists()
 
 
+def test_logs_of_different_columns_are_refused(aso_ftc, tmp_path):
+    times, u, y = log(TANKS, rows=400, noise=0.02)
+    first = write(tmp_path / "one.csv", columns(times, u, y))
+    for k, (signals, names) in enumerate([
+        (columns(times, u[:, :1], y), "u1, y1, y2"),
+        ({"time": times, "u2": u[:, 1], "u1": u[:, 0], "y1": y[:, 0], "y2": y[:, 1]}, "u2, u1, y1, y2"),
+    ]):
+        other = write(tmp_path / f"other{k}.csv", signals)
+        done = aso_ftc("design", "--init", first, other, "--out", tmp_path / "plant.toml")
+        message = f"expected the columns u1, u2, y1, y2 as in the first log, found {names}"
+        assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
 def test_logs_of_different_sample_times_are_refused(aso_ftc, tmp_path):
     times, u, y = log(TANKS, rows=400, noise=0.02)
     paths = [write(tmp_path / "one.csv", columns(times, u, y)), write(tmp_path / "two.csv", columns(2 * times, u, y))]

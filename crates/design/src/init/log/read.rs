@@ -45,13 +45,22 @@ fn is_time(cell: &str) -> bool {
     ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
 }
 
-/// Reads all logs; an error if one has another sample time than the first.
+/// Reads all logs; an error if one has other columns or another sample time than the first.
 pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, Error> {
     let mut logs: Vec<Log> = Vec::new();
     for path in paths {
         let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
         let table = Table::open(path).map_err(|error| Error::Invalid(files::sentence(&error)))?;
         let log = Log::read(&table, options).map_err(invalid)?;
+        if let Some(first) = logs.first()
+            && log.names() != first.names()
+        {
+            let (expected, names) = (first.names(), log.names());
+            return Err(invalid(format!(
+                "expected the columns {expected} as in the first log, found {names}; the same columns in the same \
+                 order are needed, or --inputs and --outputs"
+            )));
+        }
         if let Some(first) = logs.first()
             && (log.period / first.period - 1.0).abs() > 1e-3
         {
@@ -66,6 +75,12 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
 }
 
 impl Log {
+    /// Returns the names of the commands, then of the measurements.
+    fn names(&self) -> String {
+        let names = self.inputs.iter().chain(&self.outputs).map(|signal| signal.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    }
+
     fn read(table: &Table, options: &LogOptions) -> Result<Self, String> {
         let columns = Columns(table);
         let (inputs, outputs) = columns.choose(options)?;
