@@ -129,8 +129,7 @@ pub(crate) struct SlowCase {
     pub(crate) rate: f64,
 }
 
-/// Judges the loops of plant, observer and fall-back: returns the slowest case if it is below the requirement, else
-/// None.
+/// Judges the loops of plant, observer and fall-back: returns the slowest case if it is below the requirement.
 pub(crate) type Judge<'a> = dyn Fn(&Cases<'_>, &Fallback) -> Result<Option<SlowCase>, Error> + 'a;
 
 /// The search for the gains.

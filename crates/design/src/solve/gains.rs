@@ -135,9 +135,9 @@ pub(crate) fn observer(
 
 /// Required eigenvalues in the plane of the domain.
 struct Assignment {
-    /// All, those of fixed modes included.
+    /// The eigenvalues of the movable part, then those of fixed modes.
     required: Vec<Complex<f64>>,
-    /// Those of the movable part.
+    /// The eigenvalues of the movable part.
     movable: Vec<Complex<f64>>,
 }
 

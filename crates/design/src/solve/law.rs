@@ -27,11 +27,11 @@ const APART: f64 = 1.25;
 /// What a law is designed from.
 pub(crate) struct LawProblem<'a> {
     pub(crate) linear: &'a LinearPlant,
-    /// In continuous time.
+    /// The plant with fault models and measurement filter, in continuous time unless it is known in its samples only.
     pub(crate) extended: &'a ExtendedPlant,
-    /// In `domain`.
+    /// The model in the observer, in `domain`.
     pub(crate) plant: &'a FaultyPlant,
-    /// Those of the augmented observer.
+    /// The gains of the augmented observer.
     pub(crate) gains: &'a Gains,
     pub(crate) domain: Domain,
 }

@@ -22,7 +22,7 @@ use plant_file::requirements::Region;
 
 /// Ratio of the upper to the lower bound between which the least norm of any filter is searched.
 const RANGE: f64 = 1e6;
-/// The same at the end of the search.
+/// Ratio of these bounds at which the search ends.
 const NARROW: f64 = 1.02;
 /// The bound for which a filter is designed, relative to the least one, near which the gain grows without limit.
 const RELAXED: f64 = 1.1;

@@ -33,7 +33,7 @@ pub(crate) struct PidProblem<'a> {
 /// The columns of the gains of a controller in its row of the feedback, [`K_x`, `K_i`].
 pub(crate) struct Columns {
     pub(crate) proportional: usize,
-    /// Of the rate of the filtered measurement, then of its higher derivatives.
+    /// The columns of the rate of the filtered measurement, then of its higher derivatives.
     pub(crate) derivatives: Range<usize>,
     pub(crate) integral: usize,
 }

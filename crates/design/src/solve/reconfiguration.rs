@@ -136,7 +136,7 @@ struct Without<'a> {
 struct Feedbacks {
     /// At least one in the first list; those of the second are used only if they are better.
     all: [Vec<DMatrix<f64>>; 2],
-    /// Those of the standard methods, if there is a choice.
+    /// The feedbacks of the standard methods, if there is a choice.
     standard: Vec<DMatrix<f64>>,
 }
 

@@ -21,7 +21,7 @@ const POOR_FIT: f64 = 60.0;
 const LARGE_TOLERANCE: f64 = 0.3;
 /// |eigenvalue| times sample time above which a mode is too fast for the samples.
 const FAST: f64 = 2.5;
-/// The same of the fastest mode, below which the samples are too dense.
+/// |eigenvalue| of the fastest mode times sample time, below which the samples are too dense.
 const SLOW: f64 = 0.02;
 
 /// Refuses logs from which no plant can be identified: with too few rows, or with a signal that does not change.
