@@ -251,17 +251,19 @@ impl<'a> Entry<'a> {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] if the value is not a finite number.
+    /// [`PlaceError`] if the value is not a finite number, or is an integer in another base (`0x10`).
     pub fn number(&self) -> Result<f64, PlaceError> {
         let text = match self.value {
-            DeValue::Integer(integer) => integer.as_str(),
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
+            DeValue::Integer(integer) => {
+                return Err(self.error(format!("expected a decimal number, found {integer}")));
+            }
             DeValue::Float(float) => float.as_str(),
             _ => return Err(self.expected("a number")),
         };
         match text.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
-            Ok(_) => Err(self.error(format!("expected a finite number, found {text}"))),
-            Err(_) => Err(self.error(format!("expected a decimal number, found {text}"))),
+            _ => Err(self.error(format!("expected a finite number, found {text}"))),
         }
     }
 
@@ -347,5 +349,31 @@ impl<'a> Entry<'a> {
     /// [`PlaceError`] if the value is not a list of finite numbers.
     pub fn numbers(&self) -> Result<Vec<f64>, PlaceError> {
         self.list()?.iter().map(Entry::number).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_decimal_and_finite() {
+        let source =
+            Source::new(Path::new("a.toml"), "v = [7, -1e3, 0b10, 0o17, 0x1e5, inf]".to_owned());
+        let parsed = source.parse().unwrap();
+        let values = Table::whole(&source, &parsed).get("v").unwrap().list().unwrap();
+        let numbers = values.iter().map(|value| value.number().map_err(|error| error.message));
+        let refused = |text: &str| Err(text.to_owned());
+        assert_eq!(
+            numbers.collect::<Vec<_>>(),
+            [
+                Ok(7.0),
+                Ok(-1000.0),
+                refused("v[3]: expected a decimal number, found 0b10"),
+                refused("v[4]: expected a decimal number, found 0o17"),
+                refused("v[5]: expected a decimal number, found 0x1e5"),
+                refused("v[6]: expected a finite number, found inf"),
+            ]
+        );
     }
 }
