@@ -15,13 +15,15 @@ impl fmt::Display for OutputConflict {
 
 impl std::error::Error for OutputConflict {}
 
-/// Checks that no output is an input or another output: not the same file by another path, by a
-/// link, or by a name in other case. Each path comes with the option or argument that names it.
-/// Pipes and devices may be named twice.
+/// Checks that no output is an input or another output. Each path comes with the option or argument
+/// that names it.
+///
+/// Two paths are the same file if they lead to one place, also by a link, or differ in case only. An
+/// output that is a pipe or a device is not checked.
 ///
 /// # Errors
 ///
-/// [`OutputConflict`], which names both.
+/// [`OutputConflict`] for the first output that is an input or an earlier output. It names both.
 pub fn check_distinct(
     inputs: &[(&str, &Path)],
     outputs: &[(&str, &Path)],
@@ -45,17 +47,18 @@ pub fn check_distinct(
     Ok(())
 }
 
-/// Whether the path leads to a pipe or a device.
+/// Whether the path leads to a pipe or a device; false if nothing is there.
 fn is_stream(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
+/// Whether both paths lead to one file, ignoring case; the files need not exist.
 fn same_file(one: &Path, other: &Path) -> bool {
     let name = |path: &Path| resolved(path).to_string_lossy().to_lowercase();
     name(one) == name(other) || same_by_link(one, other)
 }
 
-/// The path without links and relative parts; the file itself need not exist.
+/// Returns the absolute path without relative parts and without links in the part that exists.
 fn resolved(path: &Path) -> PathBuf {
     if let Ok(canonical) = fs::canonicalize(path) {
         return canonical;
@@ -67,12 +70,13 @@ fn resolved(path: &Path) -> PathBuf {
     }
 }
 
+/// Whether both paths are names of one existing file, by hard links.
 #[cfg(unix)]
 fn same_by_link(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
-    let number =
+    let file_id =
         |path: &Path| fs::metadata(path).map(|metadata| (metadata.dev(), metadata.ino())).ok();
-    number(one).is_some_and(|first| number(other) == Some(first))
+    file_id(one).is_some_and(|first| file_id(other) == Some(first))
 }
 
 #[cfg(not(unix))]

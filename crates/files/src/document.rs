@@ -1,8 +1,8 @@
 //! Reads TOML and keeps the place of every value, so that errors can point at it.
 //!
-//! Deserialising into structs with `serde` would lose name and place of a value before later checks,
-//! which compare several values or compute with them. The few lines that show an error replace a
-//! crate such as `miette` or `annotate-snippets`, because an error has one place and one message.
+//! Structs of `serde` would lose the name and the place of a value before later checks, which compare
+//! several values or compute with them. An error has one place and one message, so a few lines show it
+//! without a crate such as `miette` or `annotate-snippets`.
 
 use std::fmt;
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub struct Source {
 /// A range of bytes in a [`Source`].
 pub type Place = Range<usize>;
 
-/// An error that shows the line of the file and underlines the place.
+/// An error at a place in a file; its text shows the line and underlines the place.
 #[derive(Clone, Debug)]
 pub struct PlaceError {
     path: PathBuf,
@@ -53,13 +53,13 @@ impl PlaceError {
         self.column
     }
 
-    /// Returns the line of the file.
+    /// Returns the text of the line.
     #[must_use]
     pub fn shown(&self) -> &str {
         &self.shown
     }
 
-    /// The error of `cause` at this place: both messages.
+    /// Returns the error with `cause` and a semicolon before its message.
     #[must_use]
     pub fn after(mut self, cause: &str) -> Self {
         self.message = format!("{cause}; {}", self.message);
@@ -109,7 +109,7 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] at the first syntax error.
+    /// [`PlaceError`] at the first syntax error, or at the end of the text if the error has no place.
     pub fn parse(&self) -> Result<Spanned<DeTable<'_>>, PlaceError> {
         DeTable::parse(&self.text).map_err(|error| {
             let end = self.text.len();
@@ -117,7 +117,12 @@ impl Source {
         })
     }
 
-    /// Returns an error that points at `place`.
+    /// Returns an error that points at `place`: at its first line, and at the last line if it is beyond the
+    /// text.
+    ///
+    /// # Panics
+    ///
+    /// If `place` starts or ends within a character.
     #[must_use]
     pub fn error(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         let start = place.start.min(self.text.len());
@@ -136,23 +141,24 @@ impl Source {
     }
 }
 
-/// A table of the file. Its name is as in messages; empty for the whole file.
+/// A table of the file, or the whole file.
 #[derive(Clone)]
 pub struct Table<'a> {
     /// The file.
     pub source: &'a Source,
+    /// The name in messages, such as `table` or `list[1]`; empty for the whole file.
     name: String,
-    /// The place of the table in the text.
+    /// The place of the table in the text; the start of the text for the whole file.
     pub place: Place,
     entries: &'a DeTable<'a>,
 }
 
-/// A value of the file. Its name is as in messages.
+/// A value of the file.
 #[derive(Clone)]
 pub struct Entry<'a> {
     /// The file.
     pub source: &'a Source,
-    /// The name: `table.key` or `list[1]`.
+    /// The name in messages: `table.key` or `list[1]`.
     pub name: String,
     /// The place of the value in the text.
     pub place: Place,
@@ -166,27 +172,28 @@ impl<'a> Table<'a> {
         Self { source, name: String::new(), place: 0..0, entries: parsed.get_ref() }
     }
 
+    /// Returns the name of the entry `key` in messages.
     fn path(&self, key: &str) -> String {
         if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
 
-    /// Returns an error at the first entry that is not in `known`, with the most similar known
-    /// name.
+    /// Checks that the keys of all entries are in `known`.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the unknown entry.
+    /// [`PlaceError`] at the alphabetically first key that is not in `known`. It names the most similar
+    /// known key, or all of them if none has an edit distance of at most 3.
     pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
         let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else {
             return Ok(());
         };
         let name_of_entry = key.get_ref();
-        let near = known.iter().min_by_key(|name| strsim::damerau_levenshtein(name, name_of_entry));
-        let near = near.filter(|name| strsim::damerau_levenshtein(name, name_of_entry) <= 3);
-        let advice = match near {
-            Some(name) => format!("did you mean `{name}`?"),
-            None => format!("expected one of {}", known.join(", ")),
+        let distances =
+            known.iter().map(|name| (strsim::damerau_levenshtein(name, name_of_entry), name));
+        let advice = match distances.min_by_key(|(distance, _)| *distance) {
+            Some((..=3, name)) => format!("did you mean `{name}`?"),
+            _ => format!("expected one of {}", known.join(", ")),
         };
         let message = format!("unknown entry `{}`; {advice}", self.path(name_of_entry));
         Err(self.source.error(&key.span(), message))
@@ -204,11 +211,11 @@ impl<'a> Table<'a> {
         Entry { source, name, place: value.span(), value: value.get_ref() }
     }
 
-    /// Returns the entry `key`; if it is missing, the error message explains it by `meaning`.
+    /// Returns the entry `key`.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the table if the entry is missing.
+    /// [`PlaceError`] that points at the table if the entry is missing; `meaning` ends the message.
     pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
         self.get(key).ok_or_else(|| {
             let message = format!("`{}` is missing: {meaning}", self.path(key));
@@ -216,7 +223,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Returns all entries with their keys.
+    /// Returns all entries with their keys, in the order of the keys.
     pub fn entries(&self) -> impl Iterator<Item = (&'a str, Entry<'a>)> {
         self.entries.iter().map(|(key, value)| {
             let key = key.get_ref().as_ref();
@@ -232,11 +239,12 @@ impl<'a> Entry<'a> {
         self.source.error(&self.place, format!("{}: {message}", self.name))
     }
 
+    /// Returns the error that the value is not `what`.
     fn expected(&self, what: &str) -> PlaceError {
         self.error(format!("expected {what}, found {}", self.kind()))
     }
 
-    /// Describes the value with an article, for messages.
+    /// Returns a description of the value for messages: `the text "a"`, `a list`, `true`.
     fn kind(&self) -> String {
         match self.value {
             DeValue::String(text) => format!("the text {text:?}"),
@@ -308,7 +316,7 @@ impl<'a> Entry<'a> {
         Ok(Table { source, name, place, entries })
     }
 
-    /// Reads a list.
+    /// Reads a list; its members are called `list[1]`, `list[2]` and so on.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
 //! Input files whose errors point at the place, and atomic output files.
 //!
-//! [`document`] reads TOML: each value knows its name and its place in the text. [`whole`] writes a
+//! [`document`] reads TOML: each value has its name and its place in the text. [`whole`] writes a
 //! file beside its target and renames it. [`check_distinct`] refuses an output that is an
-//! input. [`sentence`] joins an error and its causes.
+//! input or another output. [`sentence()`] joins an error and its causes.
 #![forbid(unsafe_code)]
 
 mod distinct;

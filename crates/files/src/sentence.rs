@@ -2,8 +2,7 @@
 
 use std::error::Error;
 
-/// Joins an error and its causes to one sentence. Leaves out a cause that an error above it already
-/// quotes.
+/// Joins an error and its causes with colons. Leaves out a cause whose text an earlier part contains.
 ///
 /// # Example
 ///
@@ -13,14 +12,14 @@ use std::error::Error;
 /// ```
 #[must_use]
 pub fn sentence(error: &dyn Error) -> String {
-    let mut said = error.to_string();
+    let mut joined = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
         let text = error.to_string();
-        if !said.contains(&text) {
-            said = format!("{said}: {text}");
+        if !joined.contains(&text) {
+            joined = format!("{joined}: {text}");
         }
         cause = error.source();
     }
-    said
+    joined
 }

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io, process};
 
-/// A written file that does not have its final name yet; dropping it removes the file.
+/// A written file under a temporary name. [`Pending::commit`] gives it its final name; dropping it without
+/// that removes the file.
 pub struct Pending {
     partial: PathBuf,
     path: PathBuf,
@@ -24,11 +25,11 @@ impl Pending {
         Ok(pending)
     }
 
-    /// Renames the file to its final name.
+    /// Renames the file to its final name; replaces a file of that name.
     ///
     /// # Errors
     ///
-    /// [`io::Error`] if the file cannot be renamed.
+    /// [`io::Error`] if the file cannot be renamed; it is then removed.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -36,8 +37,7 @@ impl Pending {
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        // Fails after a commit, when the temporary file no longer exists; other failures are
-        // ignored.
+        // Fails after a commit, when the temporary file no longer exists.
         let _ = fs::remove_file(&self.partial);
     }
 }
