@@ -4,13 +4,13 @@ use proc_macro2::{Span, TokenStream};
 use quote::quote;
 use syn::{Expr, Ident, LitStr};
 
-/// The variable of the loop over dimension `k`, from 0.
+/// The loop variable of dimension `k`, counted from 0.
 fn index(k: usize) -> Ident {
     Ident::new(&format!("index_{k}"), Span::mixed_site())
 }
 
-/// The expression for the name of the element at the present indices: `x[1]`, `A[1,2]`, `der(x[1])`; of
-/// the variable itself if it has no dimensions.
+/// The expression for the name of the element at the indices of the loops: `x[1]`, `A[1,2]`, and `der(x[1])`
+/// if `name` is `der(x)`; `name` itself without dimensions.
 pub(crate) fn element_name(name: &str, dimensions: usize) -> TokenStream {
     if dimensions == 0 {
         return quote!(#name);
@@ -29,13 +29,13 @@ pub(crate) fn element_name(name: &str, dimensions: usize) -> TokenStream {
     quote!(::std::format!(#places, #head, #(#numbers,)* #tail))
 }
 
-/// The indices behind a field: `[i][j]`.
+/// The indices that select the element of a field: `[i][j]`; nothing without dimensions.
 pub(crate) fn element(dimensions: usize) -> TokenStream {
     let indices = (0..dimensions).map(index);
     quote!(#([#indices])*)
 }
 
-/// Loops over all elements in row-major order around `body`; `body` alone without dimensions.
+/// Loops that run `body` for each element, in row-major order; `body` alone without dimensions.
 pub(crate) fn for_each(extents: &[&Expr], body: TokenStream) -> TokenStream {
     extents.iter().enumerate().rev().fold(body, |body, (k, extent)| {
         let index = index(k);
@@ -43,7 +43,8 @@ pub(crate) fn for_each(extents: &[&Expr], body: TokenStream) -> TokenStream {
     })
 }
 
-/// The array whose elements have the default value of their type.
+/// The expression for an array whose elements have the default value of their type; for one such value
+/// without dimensions.
 pub(crate) fn default_value(dimensions: usize) -> TokenStream {
     let element = quote!(::core::default::Default::default());
     (0..dimensions).fold(element, |inner, _| quote!(::core::array::from_fn(|_| #inner)))

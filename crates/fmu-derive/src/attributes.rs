@@ -7,7 +7,7 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Error, Expr, Field, Ident, LitStr, Result, Token, parenthesized, token};
 
-/// All names of attributes, for messages.
+/// The names of all attributes, for messages.
 const KNOWN: &str = "input, output, parameter, tunable, calculated_parameter, local, constant, skip, \
     state, derivative_of, reinit, start, exact, approximate, discrete, min, max, nominal, unit, \
     display_unit, quantity, enumeration, name, depends, initially, derivatives";
@@ -41,7 +41,7 @@ impl Role {
         })
     }
 
-    /// Whether the model computes the variable in steps and events.
+    /// Whether the model computes the variable in steps and events: an output or a local variable.
     pub(crate) fn is_computed(self) -> bool {
         matches!(self, Self::Output | Self::Local)
     }
@@ -58,7 +58,7 @@ pub(crate) struct Items {
 #[derive(Default)]
 pub(crate) struct Attributes {
     pub(crate) role: Option<(Role, Span)>,
-    /// Attributes without a value, other than the role.
+    /// Attributes without a value, except the role.
     pub(crate) flags: Vec<Ident>,
     /// Attributes with a number or an expression.
     pub(crate) values: Vec<(Ident, Expr)>,
@@ -66,16 +66,20 @@ pub(crate) struct Attributes {
     pub(crate) texts: Vec<(Ident, LitStr)>,
     pub(crate) derivative_of: Option<Ident>,
     pub(crate) enumeration: Option<Items>,
-    /// `None`: not stated.
+    /// `None` if it is not stated.
     pub(crate) depends: Option<Vec<Ident>>,
     pub(crate) initially: Option<Vec<Ident>>,
     pub(crate) derivatives: Vec<Ident>,
-    /// All names, with repetitions.
+    /// The names of all attributes that were read.
     names: Vec<String>,
 }
 
 impl Attributes {
     /// Reads all attributes `#[fmu(...)]` of the field; `None` if it has none.
+    ///
+    /// # Errors
+    ///
+    /// The first attribute that is unknown, repeated, malformed or a second role.
     pub(crate) fn of(field: &Field) -> Result<Option<Self>> {
         let mut attributes = None;
         for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("fmu")) {
@@ -98,16 +102,17 @@ impl Attributes {
         self.flags.iter().find(|flag| *flag == name).map(Ident::span)
     }
 
-    /// The value of the attribute `name`.
+    /// The value of the attribute `name`, if it is stated.
     pub(crate) fn value(&self, name: &str) -> Option<&Expr> {
         self.values.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
-    /// The text of the attribute `name`.
+    /// The text of the attribute `name`, if it is stated.
     pub(crate) fn text(&self, name: &str) -> Option<&LitStr> {
         self.texts.iter().find(|(known, _)| known == name).map(|(_, text)| text)
     }
 
+    /// Reads one attribute in the parentheses.
     fn read(&mut self, meta: &ParseNestedMeta<'_>) -> Result<()> {
         let Some(name) = meta.path.get_ident() else {
             return Err(meta.error(format!("unknown attribute, expected one of: {KNOWN}")));
@@ -118,7 +123,7 @@ impl Attributes {
         }
         self.names.push(text.clone());
         if let Some(role) = Role::parse(&text) {
-            if let Some((_, _)) = self.role {
+            if self.role.is_some() {
                 return Err(meta.error("a variable has one role, and this is the second one"));
             }
             self.role = Some((role, name.span()));
@@ -148,7 +153,7 @@ impl Attributes {
     }
 }
 
-/// A field, as identifier or as text.
+/// Parses the name of a field, an identifier or a text.
 fn field_name(input: ParseStream<'_>) -> Result<Ident> {
     if input.peek(LitStr) {
         let text: LitStr = input.parse()?;
@@ -157,7 +162,7 @@ fn field_name(input: ParseStream<'_>) -> Result<Ident> {
     input.parse()
 }
 
-/// Fields in parentheses.
+/// Parses names of fields in parentheses.
 fn names(meta: &ParseNestedMeta<'_>) -> Result<Vec<Ident>> {
     let content;
     parenthesized!(content in meta.input);
@@ -165,7 +170,7 @@ fn names(meta: &ParseNestedMeta<'_>) -> Result<Vec<Ident>> {
     Ok(names.into_iter().collect())
 }
 
-/// `("Name", item = value, ...)`.
+/// Parses `("Name", item = value, ...)`; an item is an identifier or a text.
 fn items(meta: &ParseNestedMeta<'_>, span: Span) -> Result<Items> {
     if !meta.input.peek(token::Paren) {
         return Err(meta.error("expected enumeration(\"Name\", item = 0, ...)"));

@@ -14,10 +14,10 @@ use crate::field::{Base, Variable};
 pub(crate) fn check(variables: &mut [Variable<'_>]) -> Result<()> {
     let mut errors = Vec::new();
     errors.extend(mark_states(variables));
-    errors.extend(repeated_names(variables));
+    errors.extend(check_names(variables));
     for variable in &*variables {
-        errors.extend(alone(variable));
-        errors.extend(references(variables, variable));
+        errors.extend(check_attributes(variable));
+        errors.extend(check_references(variables, variable));
     }
     let all = errors.into_iter().reduce(|mut all, error| {
         all.combine(error);
@@ -26,6 +26,7 @@ pub(crate) fn check(variables: &mut [Variable<'_>]) -> Result<()> {
     all.map_or(Ok(()), Err)
 }
 
+/// Returns the variable of the field called `field`.
 pub(crate) fn find<'a, 'b>(
     variables: &'b [Variable<'a>],
     field: &Ident,
@@ -33,6 +34,7 @@ pub(crate) fn find<'a, 'b>(
     variables.iter().find(|variable| variable.field == field)
 }
 
+/// Sets `is_state` of each variable whose derivative is another field, and checks these pairs.
 fn mark_states(variables: &mut [Variable<'_>]) -> Vec<Error> {
     let mut errors = Vec::new();
     let mut states: Vec<Ident> = Vec::new();
@@ -70,7 +72,8 @@ fn mark_states(variables: &mut [Variable<'_>]) -> Vec<Error> {
     errors
 }
 
-fn repeated_names(variables: &[Variable<'_>]) -> Vec<Error> {
+/// Checks that names are unique, not empty and not `time`.
+fn check_names(variables: &[Variable<'_>]) -> Vec<Error> {
     let mut errors = Vec::new();
     for (k, variable) in variables.iter().enumerate() {
         let place = || match variable.attributes.text("name") {
@@ -92,7 +95,7 @@ fn repeated_names(variables: &[Variable<'_>]) -> Vec<Error> {
 }
 
 /// Checks the attributes of one variable.
-fn alone(variable: &Variable<'_>) -> Vec<Error> {
+fn check_attributes(variable: &Variable<'_>) -> Vec<Error> {
     let attributes = &variable.attributes;
     let (role, mut errors) = (variable.role(), Vec::new());
     let mut require = |holds: bool, span: Span, message: &str| {
@@ -102,7 +105,7 @@ fn alone(variable: &Variable<'_>) -> Vec<Error> {
     };
     let is_real = variable.base.is_float();
     let is_number = is_real
-        || variable.base.is_narrow()
+        || variable.base.is_fmi3_number()
         || variable.base == Base::Integer && attributes.enumeration.is_none();
     for name in ["unit", "display_unit"] {
         if let Some(text) = attributes.text(name) {
@@ -162,8 +165,8 @@ fn alone(variable: &Variable<'_>) -> Vec<Error> {
     errors
 }
 
-/// Checks the fields that the attributes of a variable name.
-fn references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error> {
+/// Checks the fields that `depends` and `initially` name, and that the variable may have `derivatives`.
+fn check_references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error> {
     let attributes = &variable.attributes;
     let mut errors = Vec::new();
     let lists = attributes.depends.iter().chain(&attributes.initially);
@@ -192,12 +195,13 @@ fn references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error>
     errors
 }
 
+/// The place of the attribute `name`, or of the macro if it is not stated.
 fn span_of(variable: &Variable<'_>, name: &str) -> Span {
     let value = variable.attributes.values.iter().find(|(known, _)| known == name);
     value.map_or_else(Span::call_site, |(known, _)| known.span())
 }
 
-/// The value of a number that is written out, possibly with a minus.
+/// The value of a literal number, also with a minus; `None` for any other expression.
 fn number(value: &Expr) -> Option<f64> {
     match value {
         Expr::Lit(ExprLit { lit: Lit::Float(number), .. }) => number.base10_parse().ok(),

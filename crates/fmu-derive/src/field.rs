@@ -15,7 +15,7 @@ pub(crate) enum Base {
     Integer,
     Boolean,
     String,
-    /// A type that FMI 2.0 does not have; the name is the constructor of `fmu::Variable`.
+    /// A type that FMI 2.0 does not have, by the name of its constructor in `fmu::Variable`.
     Typed(&'static str),
 }
 
@@ -26,12 +26,12 @@ impl Base {
     }
 
     /// Whether it is a number of a type that FMI 2.0 does not have.
-    pub(crate) fn is_narrow(self) -> bool {
+    pub(crate) fn is_fmi3_number(self) -> bool {
         matches!(self, Base::Typed(name) if name != "binary")
     }
 }
 
-/// A field with the attribute `#[fmu(...)]`.
+/// A field with the attribute `#[fmu(...)]`, except `#[fmu(skip)]`.
 pub(crate) struct Variable<'a> {
     pub(crate) field: &'a Ident,
     pub(crate) name: String,
@@ -55,12 +55,12 @@ impl Variable<'_> {
     }
 }
 
-/// What a field is for the table of variables.
+/// The kind of a field of the struct.
 pub(crate) enum Part<'a> {
     Variable(Box<Variable<'a>>),
-    /// The field with the messages of the model.
+    /// A field of type `Log` without attribute: the messages of the model.
     Log(&'a Ident),
-    /// A field that the importer does not see, with its start value.
+    /// A field with `#[fmu(skip)]`, which the importer does not see, and its start value.
     Skipped {
         field: &'a Ident,
         start: Option<Expr>,
@@ -68,6 +68,11 @@ pub(crate) enum Part<'a> {
 }
 
 /// Reads a field.
+///
+/// # Errors
+///
+/// A field without name, with invalid attributes, without attribute unless its type is `Log`, or of a type
+/// that no variable has.
 pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
     let Some(ident) = &field.ident else {
         return Err(Error::new(field.span(), "expected a field with a name"));
@@ -102,9 +107,10 @@ pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
 /// The name of a field without `r#`.
 fn plain(ident: &Ident) -> String {
     let name = ident.to_string();
-    name.strip_prefix("r#").map_or(name.clone(), str::to_owned)
+    name.strip_prefix("r#").unwrap_or(&name).to_owned()
 }
 
+/// The last name in the path of a type: `Log` of `fmu::Log`; `None` if the type is no path.
 fn last_segment(path: &Type) -> Option<String> {
     match path {
         Type::Path(path) => path.path.segments.last().map(|segment| segment.ident.to_string()),
@@ -117,31 +123,32 @@ fn is_log(path: &Type) -> bool {
     last_segment(path).is_some_and(|name| name == "Log")
 }
 
-/// The base type of a field, and the extents of an array.
-fn base(of: &Type) -> Result<(Base, Vec<&Expr>)> {
-    if let Type::Array(TypeArray { elem, len, .. }) = of {
+/// The base type of a field, and the extents of an array, the outermost first.
+fn base(field_type: &Type) -> Result<(Base, Vec<&Expr>)> {
+    if let Type::Array(TypeArray { elem, len, .. }) = field_type {
         let (base, mut extents) = base(elem)?;
         extents.insert(0, len);
         return Ok((base, extents));
     }
-    let base = match last_segment(of).as_deref() {
-        Some("f64") => Base::Real,
-        Some("i32") => Base::Integer,
-        Some("bool") => Base::Boolean,
-        Some("String") => Base::String,
-        Some("Vec") if is_bytes(of) => Base::Typed("binary"),
-        Some(name) if of_fmi_3(name).is_some() => Base::Typed(of_fmi_3(name).unwrap_or_default()),
-        _ => {
+    let name = last_segment(field_type).unwrap_or_default();
+    let base = match name.as_str() {
+        "f64" => Base::Real,
+        "i32" => Base::Integer,
+        "bool" => Base::Boolean,
+        "String" => Base::String,
+        "Vec" if is_bytes(field_type) => Base::Typed("binary"),
+        other => {
             let message = "no variable has this type: expected f64, i32, bool, String; for FMI 3.0 only \
                            f32, i8, u8, i16, u16, u32, i64, u64, Vec<u8>; an array of them, or #[fmu(skip)] for a field that is no variable";
-            return Err(Error::new(of.span(), message));
+            let constructor = fmi3_constructor(other);
+            Base::Typed(constructor.ok_or_else(|| Error::new(field_type.span(), message))?)
         }
     };
     Ok((base, Vec::new()))
 }
 
-/// The constructor of variables with a type that FMI 2.0 does not have.
-fn of_fmi_3(name: &str) -> Option<&'static str> {
+/// The constructor of variables of the number type `name`; `None` if it is no type that only FMI 3.0 has.
+fn fmi3_constructor(name: &str) -> Option<&'static str> {
     const TYPES: [(&str, &str); 8] = [
         ("f32", "float32"),
         ("i8", "int8"),
@@ -156,8 +163,8 @@ fn of_fmi_3(name: &str) -> Option<&'static str> {
 }
 
 /// Whether the type, a `Vec`, is `Vec<u8>`.
-fn is_bytes(of: &Type) -> bool {
-    let Type::Path(path) = of else { return false };
+fn is_bytes(vector: &Type) -> bool {
+    let Type::Path(path) = vector else { return false };
     let last = path.path.segments.last().map(|segment| &segment.arguments);
     let Some(PathArguments::AngleBracketed(list)) = last else { return false };
     match list.args.first() {
@@ -166,7 +173,7 @@ fn is_bytes(of: &Type) -> bool {
     }
 }
 
-/// The first paragraph of the doc comment, in one line.
+/// The first paragraph of the doc comment, in one line; empty without doc comment.
 fn description(field: &Field) -> String {
     let mut lines = Vec::new();
     for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("doc")) {

@@ -39,16 +39,17 @@ impl Parse for Arguments {
     }
 }
 
+/// Adds the items that `block` does not have.
 pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<TokenStream> {
-    let is_model = block.trait_.as_ref().and_then(|(path, _)| path.segments.last());
-    if is_model.is_none_or(|segment| segment.ident != "Model") {
+    let trait_name = block.trait_.as_ref().and_then(|(path, _)| path.segments.last());
+    if trait_name.is_none_or(|segment| segment.ident != "Model") {
         return Err(Error::new_spanned(&block.self_ty, "expected `impl Model for` a struct"));
     }
     let present: Vec<String> = block.items.iter().filter_map(name).collect();
-    for (item, source) in items(arguments) {
+    for (item, argument) in items(arguments) {
         if !name(&item).is_some_and(|name| present.contains(&name)) {
             block.items.push(item);
-        } else if let Some(argument) = source {
+        } else if let Some(argument) = argument {
             let message = "the block has the function that this argument is for";
             return Err(Error::new(argument.span(), message));
         }
@@ -56,7 +57,7 @@ pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<Token
     Ok(quote!(#block))
 }
 
-/// The name of an item.
+/// The name of a constant or a function; `None` for other items.
 fn name(item: &ImplItem) -> Option<String> {
     match item {
         ImplItem::Const(item) => Some(item.ident.to_string()),
@@ -65,7 +66,7 @@ fn name(item: &ImplItem) -> Option<String> {
     }
 }
 
-/// The items, each with an argument that it is made from.
+/// All items that can be added, each with the first argument that it uses, if there is one.
 fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
     let is_indicators = |(name, _): &&(Ident, Expr)| name == "event_indicators";
     let indicators = arguments.0.iter().find(is_indicators);

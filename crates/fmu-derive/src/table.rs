@@ -9,7 +9,7 @@ use crate::attributes::Role;
 use crate::check::{check, find};
 use crate::field::{Base, Part, Variable, read};
 
-/// The parts of a struct.
+/// The fields of a struct by their kinds.
 struct Model<'a> {
     variables: Vec<Variable<'a>>,
     logs: Vec<&'a Ident>,
@@ -17,6 +17,7 @@ struct Model<'a> {
     starts: Vec<(&'a Ident, Option<Expr>)>,
 }
 
+/// Generates the implementation for the struct `input`.
 pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
     let Data::Struct(data) = &input.data else {
         return Err(Error::new(input.ident.span(), "expected a struct: the state of the FMU"));
@@ -58,9 +59,14 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
     })
 }
 
+/// Reads all fields.
+///
+/// # Errors
+///
+/// A second field of type `Log`, or the mistakes of all fields.
 fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
     let mut model = Model { variables: Vec::new(), logs: Vec::new(), starts: Vec::new() };
-    let mut failed: Option<Error> = None;
+    let mut errors: Option<Error> = None;
     for field in &fields.named {
         match read(field) {
             Ok(Part::Variable(variable)) => {
@@ -73,16 +79,16 @@ fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
                 model.logs.push(field);
             }
             Ok(Part::Skipped { field, start }) => model.starts.push((field, start)),
-            Err(error) => match &mut failed {
+            Err(error) => match &mut errors {
                 Some(all) => all.combine(error),
-                None => failed = Some(error),
+                None => errors = Some(error),
             },
         }
     }
     if let [_, second, ..] = model.logs[..] {
         return Err(Error::new(second.span(), "a model has one field of the type Log"));
     }
-    failed.map_or(Ok(model), Err)
+    errors.map_or(Ok(model), Err)
 }
 
 /// Generates `Default` if a field has a start value.
@@ -91,8 +97,8 @@ fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     let fields = model.starts.iter().map(|(field, start)| {
         let variable = find(&model.variables, field);
         if let Some(value) = start {
-            // A literal takes the type of such a field; it would be an i32 or f64 for `into`.
-            if variable.is_some_and(|variable| variable.base.is_narrow()) {
+            // For `into` a literal would be an i32 or f64, which not every type of FMI 3.0 converts.
+            if variable.is_some_and(|variable| variable.base.is_fmi3_number()) {
                 return quote!(#field: #value);
             }
             return quote!(#field: ::core::convert::Into::into(#value));
@@ -110,7 +116,7 @@ fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     })
 }
 
-/// Generates the statements that add a variable, or those of an array, to the table.
+/// Generates the statements that add a variable, or each element of an array, to the table.
 fn row(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
     let (field, description) = (variable.field, &variable.description);
     let constructor = constructor(variable);
@@ -128,6 +134,7 @@ fn row(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
     array::for_each(&variable.extents, add)
 }
 
+/// The name of the constructor in `fmu::Variable`.
 fn constructor(variable: &Variable<'_>) -> TokenStream {
     match variable.base {
         Base::Real => quote!(real),
@@ -142,7 +149,7 @@ fn constructor(variable: &Variable<'_>) -> TokenStream {
     }
 }
 
-/// The argument with the enumeration, with a comma behind it.
+/// The argument with the enumeration, followed by a comma; `None` if the variable has none.
 fn enumeration(variable: &Variable<'_>) -> Option<TokenStream> {
     let enumeration = variable.attributes.enumeration.as_ref()?;
     let name = &enumeration.name;
@@ -150,17 +157,17 @@ fn enumeration(variable: &Variable<'_>) -> Option<TokenStream> {
     Some(quote!(::fmu::Enumeration::new(#name, [#(#items),*]),))
 }
 
-/// Calls of the methods of `fmu::Variable`.
+/// The calls of methods of `fmu::Variable` that set the attributes.
 fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
     let attributes = &variable.attributes;
     let mut calls = role(variable);
     if attributes.flag("discrete").is_some() {
         calls.extend(quote!(.discrete()));
     }
-    let free = variable.role().is_computed();
+    let computed = variable.role().is_computed();
     if attributes.flag("approximate").is_some() {
         calls.extend(quote!(.approximate()));
-    } else if free && (variable.is_state || attributes.value("start").is_some())
+    } else if computed && (variable.is_state || attributes.value("start").is_some())
         || attributes.flag("exact").is_some()
     {
         calls.extend(quote!(.exact()));
@@ -187,6 +194,7 @@ fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStrea
     calls
 }
 
+/// The call that sets the role; nothing for a local variable.
 fn role(variable: &Variable<'_>) -> TokenStream {
     match variable.role() {
         Role::Local | Role::Skip => quote!(),
@@ -215,12 +223,13 @@ fn name_list<'a>(
     quote!({ #names names })
 }
 
-/// The dependencies of an output or a derivative.
+/// The calls that set the dependencies: of an output or a derivative at communication points, and of any
+/// variable with `initially` at initialization.
 fn dependencies(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
     let attributes = &variable.attributes;
     let mut calls = TokenStream::new();
     let depends = variable.role() == Role::Output || variable.is_derivative();
-    // A state depends on itself alone, which the exporter knows.
+    // Without `depends`, a state depends on itself only, which the exporter knows.
     if depends && !(variable.is_state && attributes.depends.is_none()) {
         let all = || {
             let known = |other: &&Variable<'_>| other.is_state || other.role() == Role::Input;
