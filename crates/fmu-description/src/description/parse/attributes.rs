@@ -150,11 +150,11 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Reads the `xs:double` of a limit. An infinite one of FMI 3.0 limits nothing.
-    pub(super) fn bound(&self, name: &'static str) -> Result<Option<f64>> {
+    /// Reads the `xs:double` of a limit in FMI 3.0; `default` if it is missing, `None` if it is infinite.
+    pub(super) fn bound(&self, name: &'static str, default: Option<f64>) -> Result<Option<f64>> {
         match self.attribute(name).map(|text| text.trim_matches(WHITE_SPACE)) {
             Some("INF" | "-INF") => Ok(None),
-            _ => self.number(name),
+            _ => Ok(self.number(name)?.or(default)),
         }
     }
 

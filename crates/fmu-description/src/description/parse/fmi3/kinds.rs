@@ -100,8 +100,8 @@ fn real(element: Node<'_>, precision: Precision, defaults: Option<&RealType>) ->
         quantity: element.text("quantity").or(defaults.quantity),
         unit: element.text("unit").or(defaults.unit),
         display_unit: element.text("displayUnit").or(defaults.display_unit),
-        min: round(element.bound("min")?).or(defaults.min),
-        max: round(element.bound("max")?).or(defaults.max),
+        min: round(element.bound("min", defaults.min)?),
+        max: round(element.bound("max", defaults.max)?),
         nominal: round(element.number("nominal")?).or(defaults.nominal),
         ..RealType::default()
     })

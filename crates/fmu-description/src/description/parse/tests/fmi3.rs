@@ -124,9 +124,14 @@ fn a_variable_has_the_defaults_of_its_causality_and_type() {
             "{element} {causality}"
         );
     }
-    let variable = variable(r#"<Float64 name="x" valueReference="1" declaredType="Length"/>"#);
-    let real = variable.kind.as_real().unwrap();
-    assert_eq!((real.min, real.max, real.unit.as_deref()), (Some(0.0), None, Some("m")));
+    let limits = |min: &str| {
+        let text = format!(r#"<Float64 name="x" valueReference="1" declaredType="Length"{min}/>"#);
+        let variable = variable(&text);
+        let real = variable.kind.as_real().unwrap();
+        (real.min, real.max, real.unit.clone())
+    };
+    assert_eq!(limits(""), (Some(0.0), None, Some("m".to_owned())));
+    assert_eq!(limits(r#" min="-INF""#).0, None, "not the limit of the type");
 }
 
 #[test]
