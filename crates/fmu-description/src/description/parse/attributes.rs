@@ -255,13 +255,13 @@ impl<'a> Node<'a> {
         Some(value)
     }
 
-    /// Reads one of `words`, also in another case; any other word counts as missing.
+    /// Reads one of `words`, the spellings of a `T`, as [`Node::one_of`] does.
     pub(super) fn word<T: FromStr>(&self, name: &'static str, words: &[&'static str]) -> Option<T> {
-        let stated = self.attribute(name)?.parse().ok();
-        stated.or_else(|| self.one_of(name, words)?.parse().ok())
+        self.one_of(name, words)?.parse().ok()
     }
 
-    /// The same for words that have no type.
+    /// Reads one of `words`. Warns of a word in another case or with white space around it, and of any other
+    /// word, which counts as missing.
     pub(super) fn one_of(&self, name: &str, words: &[&'static str]) -> Option<&'static str> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);

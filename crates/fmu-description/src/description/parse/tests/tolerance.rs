@@ -93,8 +93,11 @@ fn words_in_another_case_are_read_and_unknown_words_count_as_missing() {
     };
     let (variable, assumed) = read("causality='Output'");
     assert_eq!((variable.causality, assumed.as_str()), (Causality::Output, "read as output"));
-    let (variable, _) = read("causality='inout'");
-    assert_eq!(variable.causality, Causality::Local);
+    // The second word is one of FMI 3.0 only.
+    for word in ["inout", "structuralParameter"] {
+        let (variable, _) = read(&format!("causality='{word}'"));
+        assert_eq!(variable.causality, Causality::Local);
+    }
     assert_eq!(read("variability='often'").0.variability, Variability::Continuous);
     assert_eq!(read("initial=' exact '").0.initial, Some(Initial::Exact));
     assert_eq!(read("initial='first'").0.initial, None);
