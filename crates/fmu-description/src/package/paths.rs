@@ -4,7 +4,7 @@ use crate::description::Version;
 
 /// Characters that Windows does not allow in a file name.
 const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
-/// Device names of Windows, which no file may have, with any extension.
+/// Names of the devices of Windows that have no number.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
 const FOLDERS: [&str; 6] =
@@ -45,6 +45,12 @@ pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     None
 }
 
+/// Whether Windows reserves the name, in lower case without extension, for a device.
+fn is_device(stem: &str) -> bool {
+    let port = stem.strip_prefix("com").or_else(|| stem.strip_prefix("lpt"));
+    DEVICES.contains(&stem) || port.is_some_and(|port| matches!(port.as_bytes(), [b'1'..=b'9']))
+}
+
 /// Returns the violated rule if an FMU that is written must not contain `path`.
 pub(super) fn unsuitable(path: &str, version: Version) -> Option<&'static str> {
     if let Some(rule) = unsafe_to_unpack(path) {
@@ -55,7 +61,7 @@ pub(super) fn unsuitable(path: &str, version: Version) -> Option<&'static str> {
     }
     let breaks_windows = |part: &str| {
         let stem = part.split('.').next().unwrap_or(part).to_ascii_lowercase();
-        part.ends_with(['.', ' ']) || DEVICES.contains(&stem.as_str())
+        part.ends_with(['.', ' ']) || is_device(&stem)
     };
     if path.split('/').any(breaks_windows) {
         return Some("names that Windows allows: no trailing dot or blank, no device");

@@ -300,7 +300,9 @@ fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<St
         return None;
     }
     let manifest = start(&folder.join(BUS_MANIFEST)).ok().and_then(|xml| xml::read(&xml).ok());
-    let is_bus = |(name, value): &(String, String)| name == "isBusSimulationFMU" && value == "true";
+    let is_bus = |(name, value): &(String, String)| {
+        name == "isBusSimulationFMU" && matches!(value.as_str(), "true" | "1")
+    };
     description.is_bus_simulation =
         manifest.is_some_and(|manifest| manifest.attributes.iter().any(is_bus));
     let read = match start(&folder.join(terminals::PATH)) {

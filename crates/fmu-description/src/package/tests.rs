@@ -147,6 +147,7 @@ fn entries_that_an_fmu_must_not_have_are_not_written() {
         "resources/a?",
         "resources/a.",
         "resources/nul.txt",
+        "resources/COM1",
         "resources/",
         "resources",
         "icons/a.png",

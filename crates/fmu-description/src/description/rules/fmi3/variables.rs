@@ -154,9 +154,13 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
                 problems.text(TYPED, &format!("start of {who}"), start);
             }
         }
-        (Kind::Binary(binary), None) => {
-            let length = binary.start.as_ref().and_then(|start| u64::try_from(start.len()).ok());
-            let fits = length.zip(binary.max_size).is_none_or(|(length, most)| length <= most);
+        (Kind::Binary(binary), starts) => {
+            let starts = match starts {
+                Some(Elements::Binary(starts)) => starts.as_slice(),
+                _ => binary.start.as_slice(),
+            };
+            let longest = starts.iter().filter_map(|start| u64::try_from(start.len()).ok()).max();
+            let fits = longest.zip(binary.max_size).is_none_or(|(length, most)| length <= most);
             problems
                 .demand(fits, TYPED, || format!("{who}: the start value is longer than maxSize"));
         }

@@ -1,7 +1,7 @@
 //! FMI 3.0.2.
 
 use super::*;
-use crate::description::{Dimension, Elements, IntervalVariability};
+use crate::description::{BinaryType, Dimension, Elements, IntervalVariability};
 
 /// The problems of the sample after `change`; there must be exactly one, in `section`.
 fn only_problem(section: &str, change: impl FnOnce(&mut ModelDescription)) -> String {
@@ -143,6 +143,11 @@ fn start_values_are_there_and_are_numbers_of_the_type() {
     problem_of("blob", "2.4.7.5", "longer than maxSize", |variable| match &mut variable.kind {
         Kind::Binary(variable) => variable.max_size = Some(2),
         other => panic!("{other:?}"),
+    });
+    problem_of("blob", "2.4.7.5", "longer than maxSize", |variable| {
+        variable.dimensions = vec![Dimension::Fixed(2)];
+        variable.start_elements = Some(Elements::Binary(vec![vec![1, 2], vec![1, 2, 3]]));
+        variable.kind = Kind::Binary(BinaryType { max_size: Some(2), ..BinaryType::default() });
     });
 }
 
