@@ -3,7 +3,7 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// Declares types that have no documentation but their names.
+/// Declares types of a header, documented by their names.
 macro_rules! c_types {
     ($($name:ident = $type:ty;)*) => {
         $(#[doc = concat!("`", stringify!($name), "`.")] pub type $name = $type;)*
@@ -11,7 +11,7 @@ macro_rules! c_types {
 }
 pub(crate) use c_types;
 
-/// Declares an enumeration of a header. The names of its values have a prefix there.
+/// Declares an enumeration of a header: without `$prefix`, with which the names of its values start in C.
 macro_rules! c_enumeration {
     ($(#[$meta:meta])* $name:ident: $type:ty, $prefix:literal { $($variant:ident = $value:literal,)* }) => {
         $(#[$meta])*
@@ -22,7 +22,7 @@ macro_rules! c_enumeration {
         }
 
         impl $name {
-            /// Converts a C value; `None` if the header does not have it.
+            /// Converts a C value; `None` if no name of the header has it.
             #[must_use]
             pub fn from_c(value: $type) -> Option<Self> {
                 match value {
@@ -67,9 +67,9 @@ pub type fmi2StatusKind = c_int;
 pub const MODEL_EXCHANGE: fmi2Type = 0;
 /// `fmi2CoSimulation`.
 pub const CO_SIMULATION: fmi2Type = 1;
-/// The result of `fmi2GetTypesPlatform` for the default types.
+/// The result of `fmi2GetTypesPlatform`: the types of this module.
 pub const TYPES_PLATFORM: &std::ffi::CStr = c"default";
-/// `fmi2GetVersion`.
+/// The result of `fmi2GetVersion`, for every 2.0.x.
 pub const VERSION: &std::ffi::CStr = c"2.0";
 
 c_enumeration! {
@@ -137,14 +137,13 @@ pub struct fmi2CallbackFunctions {
 /// Callback that receives text from `fmuDescribe`: context, bytes (not terminated), length.
 pub type DescribeSink = unsafe extern "C" fn(*mut c_void, *const c_char, usize);
 
-/// Name of the function that renders the model description of FMI 2.0 of a library. It and
-/// [`DESCRIBE_3`] are the only ones beyond the standard.
+/// Name of the function of a library that renders its model description in FMI 2.0. Only this function
+/// and [`DESCRIBE_3`] are not functions of the standard.
 ///
 /// `int fmuDescribe(const char *resources, void *context, void (*sink)(void *context, const char
 /// *text, size_t length))` passes the XML to `sink` and returns 0, or passes an error message and
 /// returns 1.
 pub const DESCRIBE: &str = "fmuDescribe";
 
-/// Name of the function that renders the model description of FMI 3.0; the signature is the one of
-/// [`DESCRIBE`].
+/// Name of the function that renders the model description in FMI 3.0, with the signature of [`DESCRIBE`].
 pub const DESCRIBE_3: &str = "fmuDescribe3";

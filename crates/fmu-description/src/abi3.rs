@@ -1,7 +1,7 @@
 //! The C types of `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h` (FMI 3.0.2).
 //!
-//! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here: a byte of the other side that is neither
-//! 0 nor 1 would not be a valid `bool`. Both are passed in the same way by the C ABIs of all platforms.
+//! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here, because the other side may pass a byte that
+//! is neither 0 nor 1, which is no valid `bool`. The C ABIs of all platforms pass both types in the same way.
 #![expect(non_camel_case_types, reason = "the names of the C headers")]
 
 use std::ffi::{c_char, c_int, c_void};
@@ -30,7 +30,7 @@ c_types! {
 pub type fmi3Boolean = u8;
 /// `fmi3String`: zero-terminated UTF-8.
 pub type fmi3String = *const fmi3Char;
-/// `fmi3Binary`: bytes with a length that is given apart from them.
+/// `fmi3Binary`: bytes whose length is a separate argument.
 pub type fmi3Binary = *const fmi3Byte;
 /// `fmi3Clock`: 0 is inactive, 1 is active.
 pub type fmi3Clock = u8;

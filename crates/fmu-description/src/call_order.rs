@@ -24,7 +24,7 @@ macro_rules! states {
             /// Every state, in the order of the tables.
             pub const EVERY: [State; [$(stringify!($name)),*].len()] = [$(State::$name),*];
 
-            /// Returns the set that contains only this state.
+            /// Returns the set that contains only this state. The union of sets is `|`.
             pub const fn bit(self) -> u16 {
                 1 << self as u16
             }
@@ -43,7 +43,7 @@ states! {
     ContinuousTimeMode,
     /// Co-simulation: after `fmi2ExitInitializationMode` or a completed step.
     StepComplete,
-    /// Co-simulation: while `fmi2DoStep` runs.
+    /// Co-simulation: while `fmi2DoStep` runs, also after it returned `fmi2Pending`.
     StepInProgress,
     /// Co-simulation: after `fmi2DoStep` returned `fmi2Discard`.
     StepFailed,
@@ -73,7 +73,7 @@ const F: u16 = State::StepFailed.bit();
 const K: u16 = State::StepCanceled.bit();
 const T: u16 = State::Terminated.bit();
 const E: u16 = State::Error.bit();
-/// Every state except during a step and after `fmi2Fatal`.
+/// Every state of FMI 2.0 except during a step and after `fmi2Fatal`.
 const ALL: u16 = I | M | V | N | C | F | K | T | E;
 /// The states in which values may be read.
 const READ: u16 = ALL & !I;
@@ -171,8 +171,9 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     }
 }
 
-/// Returns the set of states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4,
-/// 4 and 5 of section 3.2.3. Inputs may also be set before initialization mode, as importers do.
+/// Returns the set of states in which a variable may be set ([`State::bit`]): conditions 1, 3 and 6 of
+/// section 4.2.4, 4 and 5 of section 3.2.3. The set also has inputs before initialization mode, because
+/// importers set them there. `is_state` is true for a continuous state.
 #[must_use]
 pub fn settable(
     causality: Causality,

@@ -16,18 +16,18 @@ const C: u16 = State::StepComplete.bit();
 const U: u16 = State::IntermediateUpdateMode.bit();
 const R: u16 = State::ReconfigurationMode.bit();
 const T: u16 = State::Terminated.bit();
-/// The super state "FMU State Settable" in model exchange and in co-simulation.
+/// The super state "FMU State Settable" in model exchange, and as `CS` in co-simulation.
 const ME: u16 = I | G | M | V | N | R | T;
 const CS: u16 = I | G | M | V | C | R | T;
-/// The states in which values of every type may be set in model exchange and in co-simulation, and
-/// continuous ones.
+/// The states in which values of every type may be set in model exchange and in co-simulation. In one more
+/// state of each, floating-point values may be set.
 const SET_ME: u16 = I | G | M | V | R;
 const SET_CS: u16 = I | G | M | V | C | R;
 /// The states in which values may be read in model exchange and in co-simulation.
 const GET_ME: u16 = I | M | V | N | T;
 const GET_CS: u16 = I | M | V | C | U | T;
 /// The states in which the number of states or event indicators may be read. Section 2.3 names
-/// `Instantiated` and Event Mode only; the others do no harm.
+/// `Instantiated` and Event Mode only; reading it in the others is harmless.
 const COUNT: u16 = I | M | V | N | T;
 
 // A row: functions: states in model exchange, states in co-simulation.
@@ -72,9 +72,8 @@ functions! {
     }
 }
 
-/// Whether a call of `function` that fails may leave the instance unchanged: whether it may return
-/// `fmi3Discard` (section 2.2.4), "handling of min/max violation" and "numerical problems during model
-/// evaluation".
+/// Whether `function` may return `fmi3Discard`, which leaves the instance unchanged (section 2.2.4, "handling
+/// of min/max violation" and "numerical problems during model evaluation").
 #[must_use]
 pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     use Function as F;
@@ -103,14 +102,14 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     }
 }
 
-/// Returns the set of states in which a variable may be set (sections 2.3.2 to 2.3.5, 3.2.1, 4.2.1).
-/// `is_state`: `Some(reinit)` for a continuous state.
+/// Returns the set of states in which a variable may be set ([`State::bit`]; sections 2.3.2 to 2.3.5, 3.2.1,
+/// 4.2.1). `reinit` is the attribute `reinit` of a continuous state, `None` for other variables.
 #[must_use]
 pub fn settable(
     causality: Causality,
     variability: Variability,
     initial: Option<Initial>,
-    is_state: Option<bool>,
+    reinit: Option<bool>,
 ) -> u16 {
     if causality == Causality::StructuralParameter {
         return if variability == Variability::Tunable { G | R } else { G };
@@ -126,7 +125,7 @@ pub fn settable(
         (Causality::Parameter, Variability::Tunable) => V | C,
         _ => 0,
     };
-    let as_state = match is_state {
+    let as_state = match reinit {
         Some(true) => N,
         Some(false) => N | V,
         None => 0,

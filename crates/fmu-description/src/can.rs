@@ -17,7 +17,7 @@ const BUS_ERROR: u32 = 0x31;
 const CONFIGURATION: u32 = 0x40;
 /// Parameter of a configuration: the bit rate of classical CAN.
 const BIT_RATE: u8 = 1;
-/// Length of code and length of an operation.
+/// Number of bytes of the code and the length, with which an operation starts.
 const HEADER: usize = 8;
 
 /// An operation.
@@ -50,13 +50,13 @@ pub struct Frame {
     pub identifier: u32,
     /// Whether the identifier has 29 bits instead of 11.
     pub extended: bool,
-    /// What the frame is.
+    /// The kind of the frame.
     pub kind: FrameKind,
     /// The bytes, at most 8; at most 64 for CAN FD.
     pub data: Vec<u8>,
 }
 
-/// What a frame is.
+/// The kind of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrameKind {
     /// A data frame.
@@ -73,25 +73,27 @@ pub enum FrameKind {
 }
 
 impl Operation {
-    /// Returns the operations in `bytes` that this type has. One that ends beyond `bytes` ends the sequence.
+    /// Reads the operations in `bytes`, in order.
+    ///
+    /// An operation that this type does not have, or whose arguments are too short, is skipped. One that ends beyond
+    /// `bytes`, or states a length below 8, ends the sequence.
     pub fn read(bytes: &[u8]) -> impl Iterator<Item = Operation> {
         let mut rest = bytes;
-        let arguments = move || {
+        let next = move || {
             let (code, length) = (number(rest, 0)?, number(rest, 4)?);
             let length = usize::try_from(length).ok().filter(|&length| length >= HEADER)?;
             let (operation, following) = rest.split_at_checked(length)?;
             rest = following;
             Some((code, &operation[HEADER..]))
         };
-        std::iter::from_fn(arguments).filter_map(|(code, arguments)| operation(code, arguments))
+        std::iter::from_fn(next).filter_map(|(code, arguments)| operation(code, arguments))
     }
 
-    /// Appends the bytes of the operation. Those of a bus error say that the CRC was wrong, and that another node was
-    /// the sender.
+    /// Appends the bytes of the operation. A bus error states a wrong CRC, and that another node was the sender.
     ///
     /// # Panics
     ///
-    /// If the frame has more than 65,535 bytes.
+    /// If the frame has more than 65,535 bytes of data.
     pub fn append_to(&self, bytes: &mut Vec<u8>) {
         let (code, arguments) = match self {
             Operation::Transmit(frame) => {
@@ -105,7 +107,7 @@ impl Operation {
             Operation::Configure { bit_rate } => {
                 (CONFIGURATION, [&[BIT_RATE][..], &bit_rate.to_le_bytes()].concat())
             }
-            // Error code, error flag, whether the node is the sender.
+            // After the identifier: error code, error flag, whether the node is the sender.
             Operation::BusError { identifier } => {
                 (BUS_ERROR, [&identifier.to_le_bytes()[..], &[4, 1, 0]].concat())
             }
@@ -117,7 +119,7 @@ impl Operation {
 }
 
 impl Frame {
-    /// Returns the arguments of an operation after the identifier.
+    /// Returns the arguments of the operation that transmits the frame, without the identifier.
     fn arguments(&self) -> Vec<u8> {
         let mut arguments = vec![u8::from(self.extended)];
         match self.kind {
@@ -134,7 +136,7 @@ impl Frame {
     }
 }
 
-/// Returns the operation with these arguments.
+/// Returns the operation with these arguments; `None` if they are too short or if [`Operation`] does not have it.
 fn operation(code: u32, arguments: &[u8]) -> Option<Operation> {
     if code == CONFIGURATION {
         let bit_rate = number(arguments, 1).filter(|_| arguments[0] == BIT_RATE)?;
@@ -160,6 +162,7 @@ fn operation(code: u32, arguments: &[u8]) -> Option<Operation> {
     Some(Operation::Transmit(Frame { identifier, extended: flag(4)?, kind, data }))
 }
 
+/// Returns the little-endian number in the 4 bytes from `at`.
 fn number(bytes: &[u8], at: usize) -> Option<u32> {
     let four = bytes.get(at..at + 4)?;
     Some(u32::from_le_bytes([four[0], four[1], four[2], four[3]]))

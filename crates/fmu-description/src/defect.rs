@@ -1,4 +1,4 @@
-//! What a reader finds wrong in an XML file: errors, which end the reading, and warnings.
+//! Defects of an XML file: errors, which end the reading, and warnings.
 
 use std::fmt;
 
@@ -24,11 +24,11 @@ impl fmt::Display for Position {
     }
 }
 
-/// The error of parsing a text that is not the model description of an FMU.
+/// The error of reading an XML file of FMI or SSP.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParseError {
-    /// The file is not text that the reader can decode.
+    /// The text of the file cannot be decoded.
     #[error("expected XML in UTF-8, or in the encoding that it declares, found {actual}")]
     Encoding {
         /// The encoding, or the position of the first invalid byte.
@@ -55,7 +55,7 @@ pub enum ParseError {
         /// The position.
         at: Position,
     },
-    /// The file has more nesting or more attributes than the limit.
+    /// The file exceeds a limit: nesting, elements, attributes, variables or bytes of aliases.
     #[error("{at}: expected at most {limit} {what}, found more{help}")]
     Limit {
         /// The position.

@@ -1,6 +1,5 @@
 //! The content of `modelDescription.xml` as plain data, for exporters and importers: one structure for
-//! FMI 1.0 (co-simulation, section 3 of its specification), FMI 2.0.5 (section 2.2) and FMI 3.0.2
-//! (section 2.4).
+//! FMI 1.0, FMI 2.0.5 (section 2.2) and FMI 3.0.2 (section 2.4).
 
 mod guid;
 mod interface;
@@ -40,12 +39,13 @@ use crate::unit::Unit;
 /// `fmiModelDescription`, the root element.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModelDescription {
-    /// `fmiVersion`: `"1.0"`, `"2.0"` for every 2.0.x, `"3.0"` for every 3.0.x.
+    /// `fmiVersion`: `"1.0"`, `"2.0"` for every 2.0.x, `"3.0"` for every 3.x.
     pub fmi_version: String,
     /// `modelName`.
     pub model_name: String,
     /// `guid`, in FMI 3.0 `instantiationToken`: the string that must be equal in the XML and in the
-    /// binary. It is a hash of the serialised description, which therefore does not contain it.
+    /// binary. The crate `fmu` sets it to [`ModelDescription::content_guid`], which is why the serialised
+    /// form does not contain it.
     #[serde(skip)]
     pub guid: String,
     /// `description`.
@@ -86,7 +86,7 @@ pub struct ModelDescription {
     /// `ScheduledExecution` (FMI 3.0), if the FMU has this interface.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<1, _, _>")]
     pub scheduled_execution: Option<ScheduledExecution>,
-    /// The terminals of FMI 3.0, which a file of their own describes.
+    /// The terminals of FMI 3.0, from `terminalsAndIcons.xml`.
     #[serde(skip)]
     pub terminals: Vec<Terminal>,
     /// `isBusSimulationFMU` in the manifest of FMI-LS-BUS 1.0: whether the FMU is a bus to which others are connected.
@@ -95,14 +95,14 @@ pub struct ModelDescription {
 }
 
 impl ModelDescription {
-    /// Finds the variable called `name`.
+    /// Finds the first variable called `name`.
     #[must_use]
     pub fn variable(&self, name: &str) -> Option<&ScalarVariable> {
         self.variables.iter().find(|variable| variable.name == name)
     }
 
-    /// Returns how the FMU makes steps: its co-simulation or, without it, its scheduled execution, whose steps are of
-    /// any size and end at the ticks of its clocks.
+    /// Returns the interface for communication steps: `co_simulation` or, without it, the flags of
+    /// `scheduled_execution` with variable step size and event mode. `None` if the FMU has neither.
     #[must_use]
     pub fn stepped(&self) -> Option<CoSimulation> {
         let scheduled = || {
@@ -124,7 +124,7 @@ impl ModelDescription {
     }
 
     /// Returns the variable with a 1-based index, as `structure`, `derivative`, `previous` and `clocks`
-    /// have it.
+    /// have it; `None` for 0 and beyond the last variable.
     #[must_use]
     pub fn at(&self, index: u32) -> Option<&ScalarVariable> {
         self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)

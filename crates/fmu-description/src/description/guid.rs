@@ -6,12 +6,12 @@ use sha2::{Digest, Sha256};
 
 use super::ModelDescription;
 
-/// The GUID of an FMU: the first 128 bits of the SHA-256 of its description.
+/// The GUID of an FMU: the first 128 bits of the SHA-256 of its serialised description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Guid(pub [u8; 16]);
 
 impl Guid {
-    /// Hashes everything in `description` except its `guid`.
+    /// Hashes everything in `description` except `guid`, `terminals` and `is_bus_simulation`.
     ///
     /// # Panics
     ///
@@ -37,11 +37,11 @@ impl Display for Guid {
 }
 
 impl ModelDescription {
-    /// Returns a `guid` derived from everything else in the description: the first 128 bits of the
-    /// SHA-256 of its serialised form, as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
+    /// Returns [`Guid::of`] the description as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
     ///
-    /// The form is that of postcard, which takes a tenth of the time of XML; each `fmi2Instantiate`
-    /// computes it. Two descriptions that differ in anything but `guid` have different results.
+    /// The crate postcard serialises the description, in a tenth of the time of XML, because each
+    /// `fmi2Instantiate` needs the result. Two descriptions that differ in `modelDescription.xml`, except in
+    /// `guid`, have different results.
     #[must_use]
     pub fn content_guid(&self) -> String {
         Guid::of(self).to_string()

@@ -32,14 +32,14 @@ macro_rules! kinds {
         pub enum Kind { $($(#[$doc])* $variant($attributes),)* }
 
         impl Kind {
-            /// Returns the name of the XML element, with the names of FMI 2.0 for the types that it has:
-            /// `Real`, `Integer`.
+            /// Returns the name of the XML element in FMI 2.0 (`Real`, `Integer`); in FMI 3.0 for a type that
+            /// FMI 2.0 does not have.
             #[must_use]
             pub fn element(&self) -> &'static str {
                 match self { $(Kind::$variant(_) => $element,)* }
             }
 
-            /// Returns the type of the values in the C interface of FMI 3.0. Those of an `Enumeration` are `Int64`.
+            /// Returns the type of the values in the C interface of FMI 3.0: `Int64` for an `Enumeration`.
             #[must_use]
             pub fn native_type(&self) -> NativeType {
                 match self { $(Kind::$variant(_) => NativeType::$native,)* }
@@ -65,9 +65,9 @@ kinds! {
     Boolean(Option<bool>): "Boolean" "Boolean" Boolean;
     /// `String` with its `start`.
     String(Option<String>): "String" "String" String;
-    /// `Enumeration` as an integer; the type `declared_type` has the names of its items.
+    /// `Enumeration` as an integer; the type `declared_type` names its items.
     Enumeration(IntegerType): "Enumeration" "Enumeration" Int64;
-    /// `Float32`; its numbers are those of an `f32`.
+    /// `Float32`; each number is an `f32`.
     Float32(RealType): "Float32" "Float32" Float32;
     /// `Int8`.
     Int8(IntegerType): "Int8" "Int8" Int8;
@@ -115,8 +115,8 @@ impl Kind {
         }
     }
 
-    /// Returns the type with which the type shares its value references in FMI 1.0 and 2.0: an
-    /// `Enumeration` is an `Integer`.
+    /// Returns the base type of FMI 1.0 and 2.0, within which value references are unique: `Integer` for an
+    /// `Enumeration`, otherwise [`Kind::element`].
     #[must_use]
     pub fn base(&self) -> &'static str {
         match self {
@@ -125,7 +125,7 @@ impl Kind {
         }
     }
 
-    /// Returns the attributes of a floating-point type, `Float64` or `Float32`.
+    /// Returns the attributes of a floating-point type, `Float64` or `Float32`; `None` for other types.
     #[must_use]
     pub fn as_real(&self) -> Option<&RealType> {
         match self {
@@ -134,7 +134,7 @@ impl Kind {
         }
     }
 
-    /// Returns the attributes of an integer type of any width, or of an `Enumeration`.
+    /// Returns the attributes of an integer type of any width, or of an `Enumeration`; `None` for other types.
     #[must_use]
     pub fn as_integer(&self) -> Option<&IntegerType> {
         match self {
@@ -177,7 +177,7 @@ impl Kind {
         })
     }
 
-    /// Removes the start value, and `reinit`.
+    /// Removes the start value, and `reinit` of a floating-point type.
     pub fn clear_start(&mut self) {
         match self {
             Kind::Boolean(start) => *start = None,
@@ -189,7 +189,7 @@ impl Kind {
         }
     }
 
-    /// Returns the attribute `declaredType`, which a `Boolean` and a `String` do not keep.
+    /// Returns the attribute `declaredType`; always `None` for a `Boolean` and a `String`, which do not store it.
     #[must_use]
     pub fn declared_type(&self) -> Option<&str> {
         match self {
@@ -201,7 +201,7 @@ impl Kind {
         }
     }
 
-    /// Whether the variable has a `start` for a scalar, or for all elements of an array.
+    /// Whether the type has a `start`: of a scalar, or one for all elements of an array.
     #[must_use]
     pub fn has_start(&self) -> bool {
         match self {
@@ -265,7 +265,7 @@ pub struct BinaryType {
     pub mime_type: Option<String>,
     /// `maxSize` in bytes.
     pub max_size: Option<u64>,
-    /// The value of the element `Start`.
+    /// The value of the only element `Start`.
     pub start: Option<Vec<u8>>,
 }
 
@@ -306,7 +306,7 @@ pub struct ClockType {
     pub shift_decimal: Option<f64>,
     /// `supportsFraction`.
     pub supports_fraction: bool,
-    /// `resolution`: the counters count parts of 1 s, this many.
+    /// `resolution`: the unit of the counters is 1 s divided by this number.
     pub resolution: Option<u64>,
     /// `intervalCounter`.
     pub interval_counter: Option<u64>,

@@ -1,4 +1,4 @@
-//! The types of values for which FMI 3.0 has functions of their own.
+//! The types of values in the C interface of FMI 3.0.
 
 macro_rules! native_types {
     ($($name:ident)*) => {

@@ -48,20 +48,23 @@ impl ModelDescription {
     /// itself. Skips annotations.
     ///
     /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become
-    /// indices; each `Alias` becomes a variable after the one that contains it. FMI 1.0: `internal`
-    /// becomes local, a `parameter` that is no output becomes a parameter, `fixed` becomes `initial`,
-    /// and `DirectDependency` the dependencies of an output.
+    /// indices; each `Alias` becomes a variable after the one that contains it. FMI 1.0: `internal` and
+    /// `none` become local, the variability `parameter` becomes a parameter or, without start value, a
+    /// calculated parameter, whatever the causality; `fixed` of an output or local variable becomes
+    /// `initial`, and `DirectDependency` the dependencies of an output.
     ///
     /// Content that breaks the standard gives a [`Warning`], which states the assumption made, if
     /// the meaning for a simulation is clear or other importers accept it: other encodings,
     /// `fmiVersion` 2.0.x, unknown elements and attributes, wrong order, words in another case,
     /// unknown words, flags, types and dependencies, numbers that are infinite or empty. Content
     /// that would mislead a simulation is an error: missing required attributes, numbers that are
-    /// malformed or too large, value references that two inputs or parameters share, names of two
-    /// outputs, types that refer to types. [`ModelDescription::problems`] checks further rules.
+    /// malformed or too large, value references that two inputs or parameters share, a name of two
+    /// variables unless both are local or have one value, types that refer to types.
+    /// [`ModelDescription::problems`] checks further rules.
     ///
-    /// [Limits](crate::limits): 512 MiB, 4,000,000 elements, 12,000,000 attributes, 1,000,000 variables. Cost:
-    /// linear in the length of the file. At most 1000 warnings are kept.
+    /// [Limits](crate::limits): 512 MiB, 4,000,000 elements, 12,000,000 attributes, 256 attributes of an
+    /// element, 64 levels, 1,000,000 variables, 128 MiB of texts and lists that aliases inherit. Cost: linear
+    /// in the length of the file. At most 1000 warnings are kept; one more states that there are others.
     ///
     /// # Errors
     ///
@@ -90,8 +93,8 @@ impl ModelDescription {
     }
 }
 
-/// Returns the version of FMI that the root element states. FMI 2.0.1 to 2.0.5 and 3.0.1 to 3.x are
-/// versions of the standard's text: importers of 2.0 and 3.0 run them.
+/// Returns the version of FMI that the root element states. 2.0.x is read as 2.0 and every 3.x as 3.0: these are
+/// versions of the standard's text, and importers of 2.0 and 3.0 run their FMUs.
 fn version(root: &Element<'_>) -> Result<Version, ParseError> {
     if root.name != "fmiModelDescription" {
         return Err(ParseError::Element {

@@ -13,7 +13,7 @@ use super::{
 use crate::unit::{BaseUnit, Unit};
 pub(crate) use tag::Tag;
 
-/// Adds flags and numbers of an interface to its tag, unless they are false or zero: attribute and field.
+/// Adds flags and numbers of an interface, pairs of attribute and field, to its tag unless they are false or zero.
 macro_rules! flags {
     ($tag:ident, $flags:ident: $($name:literal $field:ident,)*) => {
         $tag$(.unless_default($name, &$flags.$field))*
@@ -54,7 +54,7 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    /// Returns the text of a file with this content.
+    /// Returns the text of a file: the XML declaration and what `content` writes.
     pub(crate) fn file(content: impl FnOnce(&mut Self)) -> String {
         let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
@@ -68,10 +68,12 @@ impl Output {
         self.writer.write_event(event).expect("a vector takes all bytes");
     }
 
+    /// Writes an element without content.
     pub(crate) fn empty(&mut self, tag: Tag<'_>) {
         self.event(Event::Empty(tag.0));
     }
 
+    /// Writes an element with the content that `content` writes.
     pub(crate) fn around(&mut self, tag: Tag<'_>, content: impl FnOnce(&mut Self)) {
         let end = BytesEnd::new(tag.0.name().as_ref().to_owned());
         self.event(Event::Start(tag.0));
@@ -79,7 +81,7 @@ impl Output {
         self.event(Event::End(end));
     }
 
-    /// Writes a list, which is absent if it is empty.
+    /// Writes the element `name` with all `items`; nothing if there are none.
     fn list<T>(&mut self, name: &str, items: &[T], item: impl Fn(&mut Self, &T)) {
         if !items.is_empty() {
             self.around(Tag::new(name), |output| {
@@ -302,22 +304,24 @@ impl Output {
     }
 }
 
+/// Adds the attributes of a unit conversion, unless they are 1 and 0.
 fn conversion(tag: Tag<'_>, factor: f64, offset: f64) -> Tag<'_> {
-    let other = Some(&factor).filter(|factor| (**factor - 1.0).abs() > 0.0);
-    tag.maybe("factor", other).unless_default("offset", &offset)
+    let factor = Some(factor).filter(|factor| (factor - 1.0).abs() > 0.0);
+    tag.maybe("factor", factor.as_ref()).unless_default("offset", &offset)
 }
 
-/// Returns the attribute `dependenciesKind`.
+/// Returns the value of the attribute `dependenciesKind`; `None` if the row has no kinds.
 fn kinds(row: &Unknown) -> Option<String> {
     let kinds = row.kinds.as_ref()?;
     Some(kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "))
 }
 
-/// The shortest text of a number that reads back to the same bits.
+/// Returns the shortest text of a number that reads back to the same bits.
 fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
+/// Adds quantity, units, limits and nominal value; `text` formats numbers.
 fn real_limits<'a>(tag: Tag<'a>, real: &RealType, text: fn(f64) -> String) -> Tag<'a> {
     tag.maybe("quantity", real.quantity.as_ref())
         .maybe("unit", real.unit.as_ref())
@@ -327,6 +331,7 @@ fn real_limits<'a>(tag: Tag<'a>, real: &RealType, text: fn(f64) -> String) -> Ta
         .maybe("nominal", real.nominal.map(text).as_ref())
 }
 
+/// Adds quantity and limits.
 fn integer_limits<'a>(tag: Tag<'a>, integer: &IntegerType) -> Tag<'a> {
     tag.maybe("quantity", integer.quantity.as_ref())
         .maybe("min", integer.min.as_ref())

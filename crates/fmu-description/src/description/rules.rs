@@ -1,5 +1,5 @@
-//! The static rules of the standard that a readable model description can still break: here what FMI
-//! 2.0.5 and 3.0.2 have in common, and the identity of FMI 2.0.
+//! The static rules of the standard that a readable model description can still break. This file has the
+//! rules on the root element, of which `fmi3` has those of FMI 3.0 only.
 
 mod definitions;
 mod fmi3;
@@ -29,7 +29,7 @@ impl fmt::Display for Problem {
     }
 }
 
-/// The sections of rules that both versions have.
+/// The sections with the rules that FMI 2.0.5 and 3.0.2 have in common.
 struct Sections {
     root: &'static str,
     units: &'static str,
@@ -66,7 +66,7 @@ const SECTIONS_OF_3: Sections = Sections {
     structure: "2.4.8",
 };
 
-/// Collects problems.
+/// Collects problems of a description.
 struct Problems {
     sections: &'static Sections,
     list: Vec<Problem>,
@@ -84,7 +84,7 @@ impl Problems {
         }
     }
 
-    /// Checks that XML allows the text.
+    /// Checks that XML allows all characters of the text.
     fn text(&mut self, section: &'static str, what: &str, value: &str) {
         self.demand(value.chars().all(crate::xml::is_character), section, || {
             format!("{what} {value:?} has characters that XML cannot hold")
@@ -99,6 +99,7 @@ impl Problems {
         });
     }
 
+    /// Checks that a number is finite, if there is one.
     fn finite(&mut self, section: &'static str, what: &str, value: Option<f64>) {
         if let Some(value) = value.filter(|value| !value.is_finite()) {
             self.add(section, format!("{what} is {value:?}, and FMI has finite numbers only"));
@@ -122,8 +123,8 @@ impl Problems {
 }
 
 impl ModelDescription {
-    /// Returns the static rules of FMI 2.0.5, or of FMI 3.0.2, that this description breaks. None are
-    /// known here for FMI 1.0, which is only read.
+    /// Returns the static rules of FMI 2.0.5, or of FMI 3.0.2, that this description breaks. Empty for FMI 1.0,
+    /// which this crate only reads.
     ///
     /// These are the rules on the file itself: identifiers and flags, units, types, the tables of
     /// causality, variability and initial, start values and limits, names, aliases, the lists of
@@ -142,13 +143,13 @@ impl ModelDescription {
         if self.version() == Version::V3 {
             fmi3::check_identity(self, &mut problems);
         } else {
-            identity(self, &mut problems);
+            check_identity(self, &mut problems);
         }
-        texts(self, &mut problems);
+        check_texts(self, &mut problems);
         let categories = self.log_categories.iter().map(|category| category.name.as_str());
         problems.unique(sections.categories, "log category", categories);
-        if let Some(default_experiment) = &self.default_experiment {
-            experiment(default_experiment, self.version(), &mut problems);
+        if let Some(experiment) = &self.default_experiment {
+            check_experiment(experiment, self.version(), &mut problems);
         }
         definitions::check(self, &mut problems);
         if self.version() == Version::V3 {
@@ -166,13 +167,14 @@ impl ModelDescription {
     }
 }
 
-fn identity(description: &ModelDescription, problems: &mut Problems) {
+/// Checks version, GUID, date and interfaces by the rules of FMI 2.0.
+fn check_identity(description: &ModelDescription, problems: &mut Problems) {
     let version = &description.fmi_version;
     problems.demand(version == "2.0", "2.2.1", || {
         format!("fmiVersion is {version:?}, it must be \"2.0\" for every 2.0.x")
     });
     problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
-    date(description, problems);
+    check_date(description, problems);
     let interfaces: Vec<_> = interfaces(description)
         .filter_map(|interface| Some((interface.section?, interface)))
         .collect();
@@ -184,20 +186,22 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(!interfaces.is_empty(), "2.2.1", || {
         "neither ModelExchange nor CoSimulation is there".to_owned()
     });
-    for (section, Interface { keeps, serializes, .. }) in interfaces {
-        problems.demand(keeps || !serializes, section, || {
+    for (section, Interface { has_state, serializes, .. }) in interfaces {
+        problems.demand(has_state || !serializes, section, || {
             "canSerializeFMUstate is true without canGetAndSetFMUstate".to_owned()
         });
     }
 }
 
-/// What the rules on each interface need.
+/// The attributes of an interface that the rules compare.
 struct Interface<'a> {
     name: &'static str,
-    /// Section of FMI 2.0.5, which has no scheduled execution.
+    /// Section of FMI 2.0.5; `None` for scheduled execution, which it does not have.
     section: Option<&'static str>,
     identifier: &'a str,
-    keeps: bool,
+    /// `canGetAndSetFMUState`.
+    has_state: bool,
+    /// `canSerializeFMUState`.
     serializes: bool,
 }
 
@@ -209,7 +213,7 @@ fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<
                 name: $name,
                 section: $section,
                 identifier: &flags.model_identifier,
-                keeps: flags.can_get_and_set_fmu_state,
+                has_state: flags.can_get_and_set_fmu_state,
                 serializes: flags.can_serialize_fmu_state,
             })
         };
@@ -222,7 +226,7 @@ fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<
     interfaces.into_iter().flatten()
 }
 
-fn date(description: &ModelDescription, problems: &mut Problems) {
+fn check_date(description: &ModelDescription, problems: &mut Problems) {
     if let Some(date) = &description.generation_date_and_time {
         problems.demand(is_date_and_time(date), problems.sections.root, || {
             format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
@@ -230,7 +234,8 @@ fn date(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-fn texts(description: &ModelDescription, problems: &mut Problems) {
+/// Checks the texts of the root element and of the log categories.
+fn check_texts(description: &ModelDescription, problems: &mut Problems) {
     let Sections { root, categories, .. } = problems.sections;
     problems.text(root, "modelName", &description.model_name);
     let token = if description.version() == Version::V3 { "instantiationToken" } else { "guid" };
@@ -255,31 +260,27 @@ fn texts(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-fn experiment(default_experiment: &DefaultExperiment, version: Version, problems: &mut Problems) {
+fn check_experiment(experiment: &DefaultExperiment, version: Version, problems: &mut Problems) {
+    let DefaultExperiment { start_time, stop_time, tolerance, step_size } = *experiment;
     let section = problems.sections.experiment;
     for (name, value) in [
-        ("startTime", default_experiment.start_time),
-        ("stopTime", default_experiment.stop_time),
-        ("tolerance", default_experiment.tolerance),
-        ("stepSize", default_experiment.step_size),
+        ("startTime", start_time),
+        ("stopTime", stop_time),
+        ("tolerance", tolerance),
+        ("stepSize", step_size),
     ] {
         problems.finite(section, name, value);
     }
-    for (name, value) in
-        [("tolerance", default_experiment.tolerance), ("stepSize", default_experiment.step_size)]
-    {
+    for (name, value) in [("tolerance", tolerance), ("stepSize", step_size)] {
         if let Some(value) = value {
             problems.demand(value > 0.0, section, || format!("{name} is {value:?}, not positive"));
         }
     }
-    let (Some(start), Some(stop)) = (default_experiment.start_time, default_experiment.stop_time)
-    else {
-        return;
-    };
+    let (Some(start), Some(stop)) = (start_time, stop_time) else { return };
     problems.demand(stop > start, section, || {
         format!("stopTime {stop:?} is not after startTime {start:?}")
     });
-    if let Some(step) = default_experiment.step_size.filter(|_| version == Version::V2) {
+    if let Some(step) = step_size.filter(|_| version == Version::V2) {
         problems.demand(step < stop - start, section, || {
             format!("stepSize {step:?} is not shorter than the experiment")
         });

@@ -17,8 +17,9 @@ pub struct ScalarVariable {
     pub description: Option<String>,
     /// `causality`; `local` if absent.
     pub causality: Causality,
-    /// `variability`; if absent, `continuous` for every type in FMI 2.0; in FMI 3.0 `fixed` for parameters,
-    /// `continuous` for floating-point types and otherwise `discrete`.
+    /// `variability`; if absent, the reader sets it by the standard: in FMI 1.0 and 2.0 `continuous`, in FMI 3.0
+    /// `fixed` for parameters, `continuous` for floating-point types and otherwise `discrete`. A type that is not
+    /// floating-point is never read as `continuous`: it is `fixed` for parameters and otherwise `discrete`.
     pub variability: Variability,
     /// `initial`; if absent, the default of the table in section 2.2.7 (FMI 3.0.2: 2.4.7.5)
     /// applies.
@@ -32,13 +33,14 @@ pub struct ScalarVariable {
     /// one. `None` for a scalar, and for an array whose elements all have the `start` of `kind`.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<2, _, _>")]
     pub start_elements: Option<Elements>,
-    /// `canHandleMultipleSetPerTimeInstant`; `Some(false)` forbids to set the input twice at one time.
+    /// `canHandleMultipleSetPerTimeInstant` (FMI 3.0; not read in FMI 2.0); `Some(false)` forbids to set the
+    /// input twice at one time.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<3, _, _>")]
     pub can_handle_multiple_set_per_time_instant: Option<bool>,
     /// `intermediateUpdate` (FMI 3.0): accessible in intermediate update.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<4, _, _>")]
     pub intermediate_update: bool,
-    /// `previous` (FMI 3.0): 1-based index of the variable with the value at the previous tick.
+    /// `previous` (FMI 3.0): 1-based index of the variable that has the value of this one at the previous tick.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<5, _, _>")]
     pub previous: Option<u32>,
     /// `clocks` (FMI 3.0): 1-based indices of the clocks that determine when the variable changes.
@@ -55,7 +57,7 @@ pub struct ScalarVariable {
 
 impl ScalarVariable {
     /// Returns the effective value of `initial`: the attribute, or the default of the table in section
-    /// 2.2.7.
+    /// 2.2.7. `None` for an input and the independent variable without the attribute.
     #[must_use]
     pub fn initial_in_force(&self) -> Option<Initial> {
         use Causality::{Independent, Input, Parameter, StructuralParameter};
@@ -68,8 +70,11 @@ impl ScalarVariable {
         })
     }
 
-    /// Says what a variable is that the standard allows nobody to set (FMI 2.0.5, table 4.2.4; FMI 3.0.2,
-    /// section 2.4.7.5). One with a start value may be set before the initialization.
+    /// Returns the reason why nobody may set the variable (FMI 2.0.5, table 4.2.4; FMI 3.0.2, section 2.4.7.5),
+    /// as a noun for messages; `None` if it may be set at some time.
+    ///
+    /// An output or local variable counts as calculated only with the attribute `initial = calculated` and
+    /// without a start value.
     #[must_use]
     pub fn never_set(&self) -> Option<&'static str> {
         match self.causality {
@@ -136,7 +141,7 @@ impl Elements {
         self.len() == 0
     }
 
-    /// Returns the start value of `kind`, `count` times; `None` without start value.
+    /// Returns the start value of `kind`, `count` times; `None` if it has none.
     fn repeated(kind: &Kind, count: usize) -> Option<Self> {
         Some(match kind {
             Kind::Boolean(start) => Elements::Boolean(vec![(*start)?; count]),
@@ -159,7 +164,7 @@ impl ScalarVariable {
     }
 
     /// Returns the extents of an array with the start values of structural parameters; empty for a
-    /// scalar. An extent that the description does not give is 0.
+    /// scalar. An extent is 0 if [`ModelDescription::extent`] has no value for it.
     ///
     /// Cost: linear in the number of variables for each dimension with a value reference.
     #[must_use]
@@ -182,7 +187,8 @@ impl ScalarVariable {
 
     /// Returns the start values of all elements in row-major order, one for a scalar: the stated
     /// list, or the common start value for each element. `None` without start value, and if there
-    /// are more than `most` elements. An alias of FMI 3.0 has the start values of its variable.
+    /// are more than `most` elements. An alias of FMI 3.0 without start value has the start values of its
+    /// variable.
     ///
     /// Cost: see [`ScalarVariable::extents`]; for an alias also linear in the number of variables.
     #[must_use]
@@ -211,8 +217,8 @@ fn elements(extents: &[u64]) -> usize {
 }
 
 impl ModelDescription {
-    /// Returns the start value of the constant or structural parameter with that value reference,
-    /// which determines the extent of an array.
+    /// Returns the extent that a [`Dimension::Variable`] refers to: the start value of the first variable with
+    /// that value reference. `None` if there is none, or if its start value is not an integer from 0.
     #[must_use]
     pub fn extent(&self, reference: u32) -> Option<u64> {
         let variable =
@@ -221,7 +227,7 @@ impl ModelDescription {
     }
 }
 
-/// Returns two hexadecimal digits for each byte, as the start value of a Binary has them.
+/// Returns two hexadecimal digits for each byte, as in the start value of a Binary.
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }

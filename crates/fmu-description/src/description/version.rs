@@ -27,7 +27,7 @@ impl Version {
         }
     }
 
-    /// Returns the release of the standard to which section numbers refer.
+    /// Returns the release of the standard whose section numbers this crate states.
     #[must_use]
     pub fn release(self) -> &'static str {
         match self {
@@ -45,8 +45,8 @@ impl fmt::Display for Version {
 }
 
 impl ModelDescription {
-    /// Returns the version of FMI, by the first digit of `fmi_version`; [`Version::V2`] if it is
-    /// neither 1 nor 3.
+    /// Returns the version of FMI by the first character of `fmi_version`; [`Version::V2`] if it is
+    /// neither 1 nor 3, or if `fmi_version` is empty.
     #[must_use]
     pub fn version(&self) -> Version {
         match self.fmi_version.bytes().next() {

@@ -33,7 +33,7 @@ spelt! {
     /// `causality` (FMI 2.0.5, section 2.2.7; FMI 3.0.2, section 2.4.7.4).
     #[derive(Default)]
     Causality {
-        /// Independent parameter.
+        /// A parameter that the importer's environment may set.
         Parameter = "parameter",
         /// Computed from parameters.
         CalculatedParameter = "calculatedParameter",
@@ -59,11 +59,12 @@ spelt! {
         Constant = "constant",
         /// Fixed after initialization.
         Fixed = "fixed",
-        /// May change between communication points.
+        /// Constant between events and between communication points; the importer's environment may change it
+        /// there.
         Tunable = "tunable",
         /// Changes at events or communication points only.
         Discrete = "discrete",
-        /// Changes at any time; only for a Real.
+        /// Changes at any time; only for a floating-point type.
         #[default]
         Continuous = "continuous",
     }

@@ -29,7 +29,7 @@ pub(super) struct Node<'a> {
 
 impl<'a> Node<'a> {
     /// Returns the error for a missing or surplus child.
-    pub(super) fn misses(&self, expected: impl Into<String>, actual: String) -> ParseError {
+    pub(super) fn child_error(&self, expected: impl Into<String>, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
         ParseError::Element { at, element, expected: expected.into(), actual }
     }
@@ -44,6 +44,7 @@ impl<'a> Node<'a> {
         self.fault(attribute, expected, format!("{actual:?}"))
     }
 
+    /// Returns the error for an attribute whose actual content is the text `actual`, without quotes.
     fn fault(&self, attribute: &'static str, expected: &str, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
         ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), actual }
@@ -62,7 +63,7 @@ impl<'a> Node<'a> {
         self.warn_of(false, place, expected, format!("{actual:?}"), assumed);
     }
 
-    /// The name of an attribute in a warning.
+    /// Returns the name of an attribute in a warning.
     pub(super) fn place(&self, attribute: &str) -> String {
         format!("<{}>, attribute {attribute}", self.element.name)
     }
@@ -87,12 +88,13 @@ impl<'a> Node<'a> {
         });
     }
 
+    /// Returns the value of an attribute, unchanged.
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         let attribute = self.element.attributes.iter().find(|(known, _)| *known == name);
         attribute.map(|(_, value)| value.as_ref())
     }
 
-    /// Returns the text in the element, with its entities resolved.
+    /// Returns the text in the element, with its entities resolved; unchanged if it has an unknown entity.
     pub(super) fn content_text(&self) -> String {
         let text = self.element.text;
         quick_xml::escape::unescape(text).map_or_else(|_| text.to_owned(), Cow::into_owned)
@@ -117,13 +119,14 @@ impl<'a> Node<'a> {
         self.attribute(name).map(str::to_owned)
     }
 
+    /// Returns the value of an attribute; an error if it is missing.
     pub(super) fn required(&self, name: &'static str) -> Result<&'a str> {
         let value = self.attribute(name);
         value.ok_or_else(|| self.fault(name, "a value", "no such attribute".to_owned()))
     }
 
-    /// Returns an attribute without white space around it; an empty one gives a warning and counts
-    /// as missing.
+    /// Returns the value of an attribute, unchanged and without white space around it. An empty one gives a
+    /// warning and counts as missing.
     fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);
@@ -134,8 +137,8 @@ impl<'a> Node<'a> {
         Some((text, trimmed))
     }
 
-    /// Reads an `xs:double`. Infinity and NaN give a warning and count as missing; a number too
-    /// large for a double is an error.
+    /// Reads an `xs:double`. Infinity and NaN give a warning and count as missing; a malformed number, or one
+    /// too large for a double, is an error.
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>> {
         let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
         if is_not_finite(trimmed) {
@@ -158,38 +161,37 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Reads an `xs:double` of a conversion, which must be finite.
+    /// Reads an `xs:double` of a conversion; `default` if it is missing, an error if it is not finite.
     pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64> {
         let Some(text) = self.attribute(name) else { return Ok(default) };
         let value = text.trim_matches(WHITE_SPACE).parse::<f64>().ok();
         value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(name, NUMBER, text))
     }
 
-    /// Reads an `xs:int`. An integer written with a point (`1.0`) gives a warning.
+    /// Reads an `xs:int`. An integer written with a point (`1.0`) gives a warning, any other text is an error.
     pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>> {
-        let value = self.whole(name, &(i32::MIN.into()..=i32::MAX.into()), INTEGER)?;
+        let value = self.integer_in(name, &(i32::MIN.into()..=i32::MAX.into()), INTEGER)?;
         Ok(value.and_then(|value| i32::try_from(value).ok()))
     }
 
-    /// Reads an integer of a type of FMI 3.0 with its smallest and largest value. An integer written
-    /// with a point (`1.0`) gives a warning.
+    /// Reads an integer in `range`, as [`Node::integer`] does.
     pub(super) fn integer_within(
         &self,
         name: &'static str,
         range: &RangeInclusive<i128>,
     ) -> Result<Option<i128>> {
-        self.whole(name, range, "an integer")
+        self.integer_in(name, range, "an integer")
     }
 
-    /// Reads an integer in a range; `content` says what an empty attribute should have.
-    fn whole(
+    /// Reads an integer in `range`; `expected_if_empty` is the expectation in the warning of an empty attribute.
+    fn integer_in(
         &self,
         name: &'static str,
         range: &RangeInclusive<i128>,
-        content: &str,
+        expected_if_empty: &str,
     ) -> Result<Option<i128>> {
         let expected = || format!("an integer from {} to {}", range.start(), range.end());
-        let Some((text, trimmed)) = self.content(name, content) else { return Ok(None) };
+        let Some((text, trimmed)) = self.content(name, expected_if_empty) else { return Ok(None) };
         let inside = |value: &i128| range.contains(value);
         if let Some(value) = trimmed.parse().ok().filter(inside) {
             return Ok(Some(value));
@@ -201,19 +203,21 @@ impl<'a> Node<'a> {
         Ok(Some(value))
     }
 
-    /// Reads an `xs:unsignedLong` that a simulation does not need.
+    /// Reads an `xs:unsignedLong` that a simulation does not need; any other value gives a warning and counts as
+    /// missing.
     pub(super) fn optional_counter(&self, name: &'static str) -> Option<u64> {
         self.optional_number(name, COUNTER)
     }
 
-    /// Reads an `xs:unsignedInt`; any other value is an error.
+    /// Reads a required `xs:unsignedInt`; any other value is an error.
     pub(super) fn unsigned(&self, name: &'static str) -> Result<u32> {
         let text = self.required(name)?;
         let value = text.trim_matches(WHITE_SPACE).parse();
         value.map_err(|_| self.wrong(name, UNSIGNED, text))
     }
 
-    /// Reads an `xs:unsignedInt` that a simulation does not need.
+    /// Reads an `xs:unsignedInt` that a simulation does not need; any other value gives a warning and counts as
+    /// missing.
     pub(super) fn optional_unsigned(&self, name: &'static str) -> Option<u32> {
         self.optional_number(name, UNSIGNED)
     }
@@ -227,23 +231,24 @@ impl<'a> Node<'a> {
         value
     }
 
-    /// Reads an `xs:boolean`, in any case.
+    /// Reads an `xs:boolean`. Another case gives a warning, any other text is an error.
     pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>> {
         let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return Ok(None) };
-        let value = self.truth(name, trimmed);
+        let value = self.parse_boolean(name, trimmed);
         value.map(Some).ok_or_else(|| self.wrong(name, BOOLEAN, text))
     }
 
-    /// Reads a capability flag; false if its value is no `xs:boolean`.
+    /// Reads a capability flag; false if it is missing or, with a warning, no `xs:boolean`.
     pub(super) fn flag(&self, name: &'static str) -> bool {
         let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return false };
-        self.truth(name, trimmed).unwrap_or_else(|| {
+        self.parse_boolean(name, trimmed).unwrap_or_else(|| {
             self.warn(name, BOOLEAN, text, "read as false");
             false
         })
     }
 
-    fn truth(&self, name: &'static str, text: &str) -> Option<bool> {
+    /// Parses an `xs:boolean`; warns of another case.
+    fn parse_boolean(&self, name: &'static str, text: &str) -> Option<bool> {
         let value = match text {
             "true" | "1" => return Some(true),
             "false" | "0" => return Some(false),
@@ -277,11 +282,13 @@ impl<'a> Node<'a> {
         self.element.children.iter().map(move |element| Node { element, ..self })
     }
 
+    /// Returns the children called `name`.
     pub(super) fn children_named(self, name: &'a str) -> impl Iterator<Item = Node<'a>> {
         let named = self.element.children.iter().filter(move |child| child.name == name);
         named.map(move |element| Node { element, ..self })
     }
 
+    /// Returns the child called `name`, if there is one; two are an error.
     pub(super) fn optional_child(self, name: &'a str) -> Result<Option<Node<'a>>> {
         let mut children = self.children_named(name);
         let first = children.next();
@@ -289,12 +296,12 @@ impl<'a> Node<'a> {
             None => Ok(first),
             Some(second) => {
                 let actual = format!("another at {}", second.element.at);
-                Err(self.misses(format!("one element {name}"), actual))
+                Err(self.child_error(format!("one element {name}"), actual))
             }
         }
     }
 
-    /// Reads the child called `name`, if there is one.
+    /// Reads the child called `name`, if there is one; two are an error.
     pub(super) fn optional<T>(
         self,
         name: &'a str,
@@ -303,12 +310,13 @@ impl<'a> Node<'a> {
         self.optional_child(name)?.map(read).transpose()
     }
 
+    /// Returns the only child called `name`; none or two are an error.
     pub(super) fn child(self, name: &'a str) -> Result<Node<'a>> {
         let child = self.optional_child(name)?;
-        child.ok_or_else(|| self.misses(format!("an element {name}"), "none".to_owned()))
+        child.ok_or_else(|| self.child_error(format!("an element {name}"), "none".to_owned()))
     }
 
-    /// Returns the items called `item` of the list called `name`; empty if there is no such list.
+    /// Reads the items called `item` of the list called `name`; empty if there is no such list, an error for two.
     pub(super) fn list<T>(
         self,
         name: &'a str,
@@ -320,7 +328,7 @@ impl<'a> Node<'a> {
     }
 }
 
-/// Whether a number is a spelling of infinity or NaN by XML Schema, C, C#, Java or Windows.
+/// Whether the text is a spelling of infinity or NaN in XML Schema, C, C#, Java or Windows.
 fn is_not_finite(text: &str) -> bool {
     let unsigned = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
     ["inf", "infinity", "nan"].contains(&unsigned.as_str()) || unsigned.starts_with("1.#")

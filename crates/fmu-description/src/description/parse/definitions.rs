@@ -5,7 +5,8 @@ use super::attributes::{Node, Result};
 use crate::description::{DefaultExperiment, LogCategory, ModelDescription, Version};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 
-/// Reads the attributes of the root element that mean the same in every version.
+/// Reads the attributes of the root element that mean the same in every version; `model_name` replaces a missing
+/// `modelName`, with a warning.
 pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
     let version = root.warnings.version;
     let model_name = root.text_or("modelName", model_name);
@@ -27,9 +28,9 @@ pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
     }
 }
 
-/// Reads what the root elements of FMI 2.0 and 3.0 have in common.
+/// Reads what the root elements of FMI 2.0 and 3.0 have in common; `model_name` as for [`general`].
 pub(super) fn common(root: Node<'_>, model_name: String) -> Result<ModelDescription> {
-    // Before the lists: of many warnings only the first ones are kept.
+    // Before the lists below, because only the first warnings are kept.
     let general = general(root, model_name);
     Ok(ModelDescription {
         copyright: root.text("copyright"),

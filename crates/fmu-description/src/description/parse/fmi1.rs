@@ -24,7 +24,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
             .unwrap_or(0),
         ..ModelExchange::default()
     });
-    // Before the lists: of many warnings only the first ones are kept.
+    // Before the units, because only the first warnings are kept.
     let general = general(root, identifier);
     Ok(ModelDescription {
         guid: root.required("guid")?.to_owned(),
@@ -39,6 +39,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     })
 }
 
+/// Reads a `BaseUnit`, which in FMI 1.0 has display units but no conversion to SI base units.
 fn unit(element: Node<'_>) -> Result<Unit> {
     let display_units = element.children_named("DisplayUnitDefinition").map(|display| {
         Ok(DisplayUnit {
@@ -59,7 +60,7 @@ fn simple_type(element: Node<'_>) -> Result<SimpleType> {
     let mut kinds = element.children().filter(|child| child.element.name.ends_with("Type"));
     let Some(element_of_kind) = kinds.next() else {
         let expected = "RealType, IntegerType, BooleanType, StringType or EnumerationType";
-        return Err(element.misses(expected, "none".to_owned()));
+        return Err(element.child_error(expected, "none".to_owned()));
     };
     let name = element_of_kind.element.name.strip_suffix("Type").unwrap_or_default();
     // The items of an enumeration are numbered from 1.
@@ -73,13 +74,13 @@ fn simple_type(element: Node<'_>) -> Result<SimpleType> {
     })
 }
 
-/// Reads `Implementation`: the kind stand-alone, or the kind that needs a simulation tool.
+/// Reads `Implementation`: `CoSimulation_StandAlone`, or `CoSimulation_Tool`, which needs an execution tool.
 fn co_simulation(implementation: Node<'_>, model_identifier: String) -> Result<CoSimulation> {
     let stand_alone = implementation.optional_child("CoSimulation_StandAlone")?;
     let tool = implementation.optional_child("CoSimulation_Tool")?;
     let Some(interface) = stand_alone.or(tool) else {
         let expected = "CoSimulation_StandAlone or CoSimulation_Tool";
-        return Err(implementation.misses(expected, "neither".to_owned()));
+        return Err(implementation.child_error(expected, "neither".to_owned()));
     };
     let mut flags = CoSimulation {
         model_identifier,

@@ -27,7 +27,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     })
 }
 
-/// Warns of 2.0.1 to 2.0.5, versions of the standard's text, which are read as 2.0.
+/// Warns of a version other than 2.0, such as 2.0.5, which is read as 2.0.
 fn version(root: Node<'_>) {
     if let Some(stated) = root.attribute("fmiVersion").filter(|stated| *stated != "2.0") {
         root.warn("fmiVersion", "2.0 for every 2.0.x", stated, "read as 2.0");

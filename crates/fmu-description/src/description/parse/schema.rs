@@ -1,5 +1,5 @@
-//! Warns of elements and attributes that the schema of the standard does not have, or has in another
-//! order.
+//! Warns of elements and attributes that the schema of the standard does not have, and of elements in
+//! another order.
 
 mod fmi1;
 mod fmi2;
@@ -11,16 +11,17 @@ use crate::description::Version;
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
     attributes: &'static [&'static str],
-    /// Lists of attributes that this element shares with other elements.
+    /// Further attributes: lists that this element shares with other elements.
     shared: [&'static [&'static str]; 3],
     children: &'static [&'static str],
-    /// The children are one optional list, which must not be empty.
+    /// Whether the element needs at least one child.
     list: bool,
-    /// The first children, up to this position, may come in any order.
+    /// The children up to this position, counted from 0, may come in any order.
     unordered: usize,
 }
 
 impl Shape {
+    /// Adds a shared list of attributes, of which there are at most three.
     const fn with(self, shared: &'static [&'static str]) -> Shape {
         let [first, second, third] = self.shared;
         assert!(third.is_empty(), "room for three lists");
@@ -40,7 +41,7 @@ const fn branch(attributes: &'static [&'static str], children: &'static [&'stati
     Shape { attributes, shared: [&[]; 3], children, list: false, unordered: 0 }
 }
 
-/// Warns of everything in the file with the root element `root`.
+/// Warns of everything in the element `root` of a file that the schema of `version` does not allow.
 pub(super) fn check(root: Node<'_>, version: Version) {
     match version {
         Version::V1 => check_element(root, "", fmi1::shape),
@@ -49,7 +50,8 @@ pub(super) fn check(root: Node<'_>, version: Version) {
     }
 }
 
-/// Warns of everything below `node`, a child of the element `parent`.
+/// Warns of the attributes and children of `node`, a child of the element `parent`, and of everything below. Does
+/// nothing if `shapes` has no shape for it.
 fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<Shape>) {
     let element = node.element;
     let Some(shape) = shapes(parent, element.name) else { return };

@@ -1,4 +1,4 @@
-//! Reads `ModelStructure`.
+//! Reads `ModelStructure` of FMI 2.0; some functions are also for FMI 3.0.
 
 use std::collections::HashSet;
 
@@ -10,7 +10,8 @@ pub(super) const ANYTHING: &str = "read as depending on anything";
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
 /// If a list has an index that belongs to no variable, all of its rows are read as depending on
-/// anything. Outputs that are missing from `Outputs` are read in the same way.
+/// anything, and a row with such an index is skipped. Outputs that are missing from `Outputs` are read as
+/// depending on anything. Such an index of a row in `Derivatives` is an error.
 pub(super) fn read(root: Node<'_>, variables: &[ScalarVariable]) -> Result<ModelStructure> {
     let Some(element) = child(root)? else {
         let missing = missing_outputs(&[], variables).map(|(row, _)| row);
@@ -38,8 +39,8 @@ pub(super) fn child(root: Node<'_>) -> Result<Option<Node<'_>>> {
     Ok(element)
 }
 
-/// Adds the rows that are missing, each with the name of its output, and warns of them; `texts` say what is
-/// expected, and what is there instead.
+/// Adds the rows in `missing`, each with the name of its output, and warns of them: `expected` content, and
+/// `none_for` before the names.
 pub(super) fn add_outputs(
     element: Node<'_>,
     outputs: &mut Vec<Unknown>,
@@ -56,6 +57,7 @@ pub(super) fn add_outputs(
     outputs.extend(missing.into_iter().map(|(row, _)| row));
 }
 
+/// Returns rows for the outputs that are no aliases and have no row, with their names.
 pub(super) fn missing_outputs<'a>(
     rows: &[Unknown],
     variables: &'a [ScalarVariable],
@@ -69,6 +71,7 @@ pub(super) fn missing_outputs<'a>(
     })
 }
 
+/// Reads the list called `name` in `ModelStructure`, for `count` variables; empty if there is none.
 fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unknown>> {
     let Some(list) = element.optional_child(name)? else { return Ok(Vec::new()) };
     let mut trusted = true;
@@ -98,8 +101,7 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
     Ok(rows)
 }
 
-/// Reads `Derivatives`, which determine the states: an index that belongs to no variable is an
-/// error.
+/// Reads `Derivatives`. Its rows determine the states, so one whose index belongs to no variable is an error.
 fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>> {
     if let Some(list) = element.optional_child("Derivatives")? {
         for row in list.children_named("Unknown") {
@@ -110,38 +112,41 @@ fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>> {
     list(element, "Derivatives", count)
 }
 
-/// Reads the 1-based index of one of `count` variables.
+/// Reads the 1-based index of one of `count` variables; `None` for any other text.
 pub(super) fn index(text: &str, count: usize) -> Option<u32> {
     let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok()?;
     (index > 0 && usize::try_from(index).is_ok_and(|position| position <= count)).then_some(index)
 }
 
+/// Returns the expectation of an index in a message.
 pub(super) fn indices(count: usize) -> String {
     format!("the index of a variable, 1 to {count}")
 }
 
+/// Returns the parts of `text` between white space.
 pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(WHITE_SPACE).filter(|word| !word.is_empty())
 }
 
 /// The error for an index that belongs to no variable.
-struct Impossible;
+struct InvalidIndex;
 
-/// Reads the attribute `dependencies`, if there is one.
-fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossible> {
+/// Reads the attribute `dependencies`; `None` if it is absent. Warns of an index that belongs to no variable.
+fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, InvalidIndex> {
     let Some(text) = row.attribute("dependencies") else { return Ok(None) };
     let mut listed = Vec::new();
     for word in words(text) {
         let Some(index) = index(word, count) else {
             row.warn_text("dependencies", &indices(count), word, ANYTHING);
-            return Err(Impossible);
+            return Err(InvalidIndex);
         };
         listed.push(index);
     }
     Ok(Some(listed))
 }
 
-/// Reads the attribute `dependenciesKind`, if it fits `dependencies`.
+/// Reads the attribute `dependenciesKind`; `None` if it is absent or, with a warning, if it has an unknown word or
+/// another number of words than `dependencies`.
 pub(super) fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKind>> {
     const NAME: &str = "dependenciesKind";
     let text = row.attribute(NAME)?;

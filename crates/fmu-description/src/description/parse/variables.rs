@@ -1,4 +1,4 @@
-//! Reads `TypeDefinitions` and `ModelVariables`.
+//! Reads `TypeDefinitions` and `ModelVariables` of FMI 2.0; some functions are also for FMI 1.0 and 3.0.
 
 use std::collections::HashMap;
 
@@ -37,7 +37,7 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
     })
 }
 
-/// Reads the kind of a type definition of FMI 1.0 or 2.0; any other name than those of the standard is a Real.
+/// Reads the kind of a type definition of FMI 1.0 or 2.0; a `name` that is no type is read as `Real`.
 pub(super) fn kind_of_type(element: Node<'_>, name: &str) -> Result<Kind> {
     Ok(match name {
         "Integer" => Kind::Integer(integer_limits(element, &IntegerType::default())?),
@@ -62,12 +62,13 @@ pub(super) fn variables(list: Node<'_>, types: &[SimpleType]) -> Result<Vec<Scal
     Ok(variables)
 }
 
-/// The types by name.
+/// Returns the types by name; of several with one name the last.
 pub(super) fn by_name(types: &[SimpleType]) -> Types<'_> {
     types.iter().map(|declared| (declared.name.as_str(), declared)).collect()
 }
 
-/// Reads each `ScalarVariable` by `variable`, which gets the types and the number of variables.
+/// Reads each `ScalarVariable` by `variable`, whose arguments are the element, the types and the number of variables.
+/// Returns the elements and the variables in the same order.
 pub(super) fn scalar_variables<'a>(
     list: Node<'a>,
     types: &[SimpleType],
@@ -84,7 +85,8 @@ pub(super) fn scalar_variables<'a>(
     Ok((elements, variables))
 }
 
-/// Refuses a name that two variables have, unless it does not matter which one is meant.
+/// Refuses a name of two variables. Only warns if both are local, or have one base type and value reference, because
+/// then either may be meant.
 pub(super) fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()> {
     let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
     for (element, variable) in elements.iter().zip(variables) {
@@ -106,7 +108,7 @@ pub(super) fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -
     Ok(())
 }
 
-/// Two variables that are set from outside must not share a value reference.
+/// Refuses two inputs or parameters of one base type with the same value reference, except aliases.
 pub(super) fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()> {
     let mut settable: HashMap<(&str, u32), &str> = HashMap::new();
     for (element, variable) in elements.iter().zip(variables) {
@@ -143,8 +145,8 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     })
 }
 
-/// Reads `variability`. If only a Real can have the stated or default value, other types get the
-/// most restrictive value that they can have.
+/// Reads `variability`, continuous by default. For types that cannot be continuous, warns and reads continuous as
+/// fixed for parameters and as discrete for other variables.
 fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variability {
     let stated = element.word("variability", &VARIABILITIES);
     let variability = stated.unwrap_or(Variability::Continuous);
@@ -163,7 +165,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     assumed
 }
 
-/// Returns the single child that gives the type of a variable or a type definition.
+/// Returns the only child that names the type of a variable or a type definition; none or two are an error.
 pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
     let is_kind = |child: &&crate::xml::tree::Element<'_>| KINDS.contains(&child.name);
     let mut kinds = element.element.children.iter().filter(is_kind);
@@ -172,11 +174,12 @@ pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
         (first, _) => {
             let actual = if first.is_some() { "more" } else { "none" };
             let expected = "one of Real, Integer, Boolean, String and Enumeration";
-            Err(element.misses(expected, actual.to_owned()))
+            Err(element.child_error(expected, actual.to_owned()))
         }
     }
 }
 
+/// Reads the type of a variable with its attributes, also those of its declared type.
 pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind> {
     let declared = declared(element, types);
     Ok(match element.element.name {
@@ -222,7 +225,8 @@ fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>> {
     index.map(Some).ok_or_else(|| element.wrong("derivative", &indices(count), text))
 }
 
-/// Returns the declared type of a variable, if it exists and has the kind of the variable.
+/// Returns the name and the kind of the declared type; `None` if no type is declared or, with a warning, if it does
+/// not exist or is of another kind than the variable. Also warns of an Enumeration without declared type.
 pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
     const NAME: &str = "declaredType";
     let (kind, version) = (element.element.name, element.warnings.version);

@@ -1,4 +1,4 @@
-//! Collects warnings about content that breaks the standard and can still be read.
+//! Collects warnings about content that breaks the standard but is read.
 
 use std::cell::RefCell;
 
@@ -6,8 +6,8 @@ use crate::defect::Warning;
 use crate::description::Version;
 use crate::xml::tree::Element;
 
-/// Maximum number of warnings that are kept; one more says that there were others.
-const KEPT: usize = 1000;
+/// Maximum number of warnings; one more states that there are others.
+const MOST: usize = 1000;
 
 /// Collects warnings.
 #[derive(Debug)]
@@ -22,20 +22,21 @@ impl Warnings {
         Self { version, list: RefCell::new(Vec::new()) }
     }
 
+    /// Adds a warning; does nothing after [`MOST`] warnings and the one about others.
     pub(super) fn add(&self, warning: Warning) {
         let mut list = self.list.borrow_mut();
-        if list.len() < KEPT {
+        if list.len() < MOST {
             list.push(warning);
-        } else if list.len() == KEPT {
+        } else if list.len() == MOST {
             let place = "after this".to_owned();
             let actual = "more".to_owned();
-            let expected = format!("at most {KEPT} warnings");
+            let expected = format!("at most {MOST} warnings");
             let assumed = "the others are not listed".to_owned();
             list.push(Warning { place, expected, actual, assumed, ..warning });
         }
     }
 
-    /// Returns all warnings in the order of the file.
+    /// Returns the warnings, sorted by their positions in the file.
     pub(super) fn finish(self) -> Vec<Warning> {
         let mut list = self.list.into_inner();
         list.sort_by_key(|warning| (warning.at.line, warning.at.column));

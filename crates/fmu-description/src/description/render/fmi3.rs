@@ -75,11 +75,12 @@ impl Output {
     }
 }
 
-/// Returns the value reference of the variable with a 1-based index, 0 if there is none.
+/// Returns the value reference of the variable with a 1-based index; 0 if there is no such variable.
 fn reference(description: &ModelDescription, index: u32) -> u32 {
     description.at(index).map(|variable| variable.value_reference).unwrap_or_default()
 }
 
+/// Returns the value references of variables with 1-based indices, separated by blanks.
 fn references(description: &ModelDescription, indices: &[u32]) -> String {
     let words = indices.iter().map(|index| reference(description, *index).to_string());
     words.collect::<Vec<_>>().join(" ")
@@ -119,7 +120,7 @@ fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
     }
 }
 
-/// The shortest text of a Float32 that reads back to the same bits.
+/// Returns the shortest text of a Float32 that reads back to the same bits.
 #[expect(clippy::cast_possible_truncation, reason = "the numbers of a Float32 are those of an f32")]
 fn single(value: f64) -> String {
     format!("{:?}", value as f32)

@@ -1,11 +1,11 @@
-//! A start tag of quick-xml, with attributes of typed values and optional attributes: `BytesStart`
-//! takes text only, and `Display` of a number is not the text that `modelDescription.xml` has.
+//! A start tag of quick-xml, with attributes of typed values and optional attributes. `BytesStart` accepts
+//! text only, and `Display` of an `f64` is not the text of a number in `modelDescription.xml`.
 
 use std::borrow::Cow;
 
 use quick_xml::events::BytesStart;
 
-/// A value of an attribute.
+/// The value of an attribute, as a type that has a text in XML.
 pub(crate) trait Value {
     fn text(&self) -> Cow<'_, str>;
 }
@@ -28,6 +28,7 @@ impl Value for f64 {
     }
 }
 
+/// Implements [`Value`] for types whose `Display` is their text in XML.
 macro_rules! displayed {
     ($($kind:ty),*) => {$(
         impl Value for $kind {
@@ -53,6 +54,7 @@ impl<'a> Tag<'a> {
         self
     }
 
+    /// Adds an attribute, if it has a value.
     pub(super) fn maybe(self, name: &str, value: Option<&(impl Value + ?Sized)>) -> Self {
         match value {
             Some(value) => self.with(name, value),
@@ -60,7 +62,7 @@ impl<'a> Tag<'a> {
         }
     }
 
-    /// Adds an attribute, unless it has its default, zero or false.
+    /// Adds an attribute, unless its value is the default of the type: zero or false.
     pub(super) fn unless_default<T: Value + Default + PartialEq>(
         self,
         name: &str,

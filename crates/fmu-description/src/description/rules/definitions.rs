@@ -56,7 +56,7 @@ fn check_unit(unit: &Unit, problems: &mut Problems) {
     }
 }
 
-/// Checks that the unit of a variable or type is defined and has the display unit.
+/// Checks that the unit of a variable or type, called `who`, is defined and lists its display unit.
 fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems: &mut Problems) {
     let Sections { units: in_units, types: in_types, .. } = problems.sections;
     let unit = real.unit.as_deref();

@@ -5,12 +5,13 @@ mod clocks;
 mod structure;
 mod variables;
 
-use super::{Interface, Problems, date, interfaces, is_c_identifier};
+use super::{Interface, Problems, check_date, interfaces, is_c_identifier};
 use crate::description::{CoSimulation, Kind, ModelDescription};
 
 pub(super) use structure::check as check_structure;
 pub(super) use variables::check as check_variables;
 
+/// Checks version, instantiation token, date and interfaces by the rules of FMI 3.0.
 pub(super) fn check_identity(description: &ModelDescription, problems: &mut Problems) {
     const ROOT: &str = "2.4.1";
     let version = &description.fmi_version;
@@ -19,16 +20,16 @@ pub(super) fn check_identity(description: &ModelDescription, problems: &mut Prob
     });
     let token = &description.guid;
     problems.demand(!token.is_empty(), ROOT, || "instantiationToken is empty".to_owned());
-    date(description, problems);
+    check_date(description, problems);
     let interfaces: Vec<_> = interfaces(description).collect();
     problems.demand(!interfaces.is_empty(), ROOT, || {
         "none of ModelExchange, CoSimulation and ScheduledExecution is there".to_owned()
     });
-    for Interface { name, identifier, keeps, serializes, .. } in interfaces {
+    for Interface { name, identifier, has_state, serializes, .. } in interfaces {
         problems.demand(is_c_identifier(identifier), "2.4.2", || {
             format!("{name}: modelIdentifier {identifier:?} is no C identifier")
         });
-        problems.demand(keeps || !serializes, "2.4.2", || {
+        problems.demand(has_state || !serializes, "2.4.2", || {
             format!("{name}: canSerializeFMUState is true without canGetAndSetFMUState")
         });
     }

@@ -34,9 +34,9 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-/// Returns the positions of the names that break the order of array elements (FMI 2.0.5, section
-/// 2.2.9), each with the reason: the elements of an array are adjacent, with the last index running
-/// fastest. Only arrays of scalars are checked: names with indices at their end.
+/// Returns the positions, counted from 0, of the names that break the order of array elements (FMI 2.0.5,
+/// section 2.2.9), each with the reason: the elements of an array are adjacent, with the last index running
+/// fastest. Only arrays of scalars are checked: names with indices at their end. Missing elements are allowed.
 pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usize, String)> {
     let mut misplaced = Vec::new();
     let mut arrays = HashSet::new();
@@ -59,7 +59,7 @@ pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usiz
     misplaced
 }
 
-/// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices.
+/// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices, or has others before.
 #[must_use]
 pub fn array_element(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
@@ -81,7 +81,7 @@ pub fn is_structured_name(name: &str) -> bool {
     with_order || is_identifier(inner)
 }
 
-/// `identifier = B-name [ indices ] { "." B-name [ indices ] }`.
+/// Whether the text is `identifier = B-name [ indices ] { "." B-name [ indices ] }`.
 fn is_identifier(text: &str) -> bool {
     let mut rest = text;
     loop {
@@ -98,7 +98,7 @@ fn is_identifier(text: &str) -> bool {
     }
 }
 
-/// Returns the rest after a `B-name`, which is plain or in apostrophes.
+/// Returns the rest after a `B-name`, which is plain or in apostrophes; `None` if `text` does not start with one.
 fn after_name(text: &str) -> Option<&str> {
     let Some(quoted) = text.strip_prefix('\'') else {
         let is_letter = |character: char| character.is_ascii_alphanumeric() || character == '_';
@@ -122,7 +122,8 @@ fn after_name(text: &str) -> Option<&str> {
     None
 }
 
-/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`.
+/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`; `None` for other content in
+/// brackets.
 fn after_indices(text: &str) -> Option<&str> {
     let Some(inner) = text.strip_prefix('[') else {
         return Some(text);

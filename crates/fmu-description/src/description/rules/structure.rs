@@ -1,4 +1,4 @@
-//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), and those that both versions have.
+//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), and those that FMI 3.0 has too.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -11,12 +11,13 @@ use crate::description::{
 const SECTION: &str = "2.2.8";
 
 impl ModelDescription {
-    /// Returns the 1-based indices of the variables that `chosen` accepts.
-    pub(super) fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
+    /// Returns the 1-based indices of the variables for which `holds` is true.
+    pub(super) fn indices_of(&self, holds: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
         let numbered = (1..).zip(&self.variables);
-        numbered.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
+        numbered.filter(|(_, variable)| holds(variable)).map(|(index, _)| index).collect()
     }
 
+    /// Returns the name of the variable with a 1-based index, or the index as text if there is none.
     pub(super) fn name_of(&self, index: u32) -> String {
         self.at(index).map_or_else(|| format!("number {index}"), |variable| variable.name.clone())
     }
@@ -34,18 +35,18 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
     problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
-    let is_given = |variable: &ScalarVariable| {
+    let is_external = |variable: &ScalarVariable| {
         matches!(variable.causality, Causality::Input | Causality::Independent)
     };
     let known =
-        |index: u32, variable: &ScalarVariable| is_given(variable) || states.contains(&index);
+        |index: u32, variable: &ScalarVariable| is_external(variable) || states.contains(&index);
     for (list, rows) in [("Outputs", &structure.outputs), ("Derivatives", &structure.derivatives)] {
         for row in rows {
             check_dependencies(list, row, description, known, problems);
         }
     }
     let known_at_start = |_: u32, variable: &ScalarVariable| {
-        is_given(variable) || variable.initial_in_force() == Some(Initial::Exact)
+        is_external(variable) || variable.initial_in_force() == Some(Initial::Exact)
     };
     for row in rows {
         check_dependencies("InitialUnknowns", row, description, known_at_start, problems);
@@ -53,7 +54,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-/// Checks that a dependency at initialization is general or has a constant factor.
+/// Checks that each dependency at initialization is of the kind `dependent` or `constant`.
 pub(super) fn check_initial_kinds(
     list: &str,
     row: &Unknown,
@@ -76,7 +77,8 @@ fn is_real(variable: &ScalarVariable, description: &ModelDescription) -> bool {
     }
 }
 
-/// Returns the continuous states, whose derivatives are the rows of `list`; `needed` is what these have.
+/// Returns the indices of the continuous states. Their derivatives are the rows of `list`; a row without `needed`,
+/// the attribute that names its state, is a problem.
 pub(super) fn states(
     [list, needed]: [&str; 2],
     description: &ModelDescription,
@@ -123,7 +125,7 @@ fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BT
     indices
 }
 
-/// Checks that a list has exactly the required members, each once.
+/// Checks that the rows of `list` are exactly the variables in `required`, each once.
 pub(super) fn check_members(
     list: &str,
     rows: &[Unknown],
@@ -147,7 +149,8 @@ pub(super) fn check_members(
     }
 }
 
-/// Checks that dependencies are unique (in FMI 2.0 also ascending) known quantities, with one allowed kind each.
+/// Checks that dependencies are unique (in FMI 2.0 also ascending) and known, with one kind each; kinds other than
+/// `dependent` only for floating-point variables.
 pub(super) fn check_dependencies(
     list: &str,
     row: &Unknown,

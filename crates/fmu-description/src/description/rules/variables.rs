@@ -85,7 +85,7 @@ fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-/// Checks that the variable has a start value where it needs one, and no other. A clock of FMI 3.0 has none.
+/// Checks that the variable has a start value if, and only if, it needs one. A clock of FMI 3.0 needs none.
 pub(super) fn check_start(variable: &ScalarVariable, is_clock: bool, problems: &mut Problems) {
     let name = &variable.name;
     let section = problems.sections.limits;
@@ -126,6 +126,7 @@ pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Pro
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
 
+/// Checks that `min <= start <= max` for those that are stated.
 pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     who: &str,
     min: Option<T>,
@@ -147,8 +148,8 @@ pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     }
 }
 
-/// Checks the declared type of a variable, which an Enumeration must have: that the type exists, has the variable's
-/// kind, and includes the range of the variable or, of an Enumeration, the start value.
+/// Checks that a declared type exists and has the variable's kind, and that min and max of a number are within those of
+/// the type. An Enumeration must have a declared type, and an item of it as its start value.
 fn check_declared_type(
     variable: &ScalarVariable,
     types: &HashMap<&str, &SimpleType>,
@@ -197,6 +198,7 @@ fn check_declared_type(
     });
 }
 
+/// Whether the limits `inner` (min, max) are within `outer`; a limit that is not stated in both is not compared.
 fn within<T: Copy + PartialOrd>(
     inner: (Option<T>, Option<T>),
     outer: (Option<T>, Option<T>),
@@ -233,7 +235,7 @@ fn check_derivative(
     });
 }
 
-/// Checks variables of one base type with the same value reference.
+/// Checks the sets of variables with one base type and one value reference.
 fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
     let mut sets: BTreeMap<(u8, u32), Vec<&ScalarVariable>> = BTreeMap::new();
     for variable in &description.variables {
@@ -250,6 +252,8 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
+/// Checks that aliases have one unit, and that either all are constants of one value, or none is a constant, at most
+/// one can be set and at most one has a start value.
 fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
     let names = set.iter().map(|variable| variable.name.as_str()).collect::<Vec<_>>().join(", ");
     let is_constant = |variable: &&&ScalarVariable| variable.variability == Variability::Constant;
@@ -257,13 +261,13 @@ fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
     problems.demand(constants == 0 || constants == set.len(), SECTION, || {
         format!("aliases {names}: constants can only be aliases of constants")
     });
-    let is_free = |variable: &&&ScalarVariable| {
+    let is_settable = |variable: &&&ScalarVariable| {
         matches!(
             variable.causality,
             Causality::Parameter | Causality::Input | Causality::Independent
         )
     };
-    problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
+    problems.demand(set.iter().filter(is_settable).count() <= 1, SECTION, || {
         format!("aliases {names}: more than one can be set from outside")
     });
     let starts = set.iter().filter(|variable| variable.has_start()).count();

@@ -43,7 +43,7 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
             };
             let variability = match variability {
                 Some("constant") => Variability::Constant,
-                // The default of every type, which only a Real can have.
+                // The default for every type, although only a Real can be continuous.
                 Some("continuous") | None if continuous => Variability::Continuous,
                 _ => Variability::Discrete,
             };
@@ -67,7 +67,8 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     })
 }
 
-/// Sets `alias_of` and `negated` by the attribute `alias`.
+/// Sets `alias_of` and `negated` by the attribute `alias`. Warns of an alias whose value reference no other
+/// variable of its base type has, and reads it as no alias.
 fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
     const NAME: &str = "alias";
     let stated: Vec<_> = elements
@@ -97,8 +98,8 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
     }
 }
 
-/// Returns the outputs with their `DirectDependency`: without this element an output depends on all
-/// inputs.
+/// Returns the outputs with their `DirectDependency`. Without this element, or with a name in it that no input
+/// has, an output depends on all inputs.
 fn outputs(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<Vec<Unknown>> {
     let inputs =
         (1..).zip(variables).filter(|(_, variable)| variable.causality == Causality::Input);
@@ -115,6 +116,8 @@ fn outputs(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<Vec<Un
     Ok(rows)
 }
 
+/// Returns the sorted indices of the inputs that `DirectDependency` names; warns and returns `None` at the first name
+/// that no input has.
 fn dependencies(element: Node<'_>, inputs: &HashMap<&str, u32>) -> Option<Vec<u32>> {
     let mut indices = Vec::new();
     for name in element.children_named("Name") {

@@ -1,4 +1,4 @@
-//! Reads the types of FMI 3.0 with their attributes: definitions, and defaults of variables.
+//! Reads the types of FMI 3.0 with their attributes, in `TypeDefinitions` and of variables.
 
 use std::ops::RangeInclusive;
 
@@ -40,8 +40,8 @@ fn item(element: Node<'_>) -> Result<(String, i64)> {
     Ok((element.required("name")?.to_owned(), value))
 }
 
-/// Reads the attributes that a type and a variable have in common; `defaults` has those of the
-/// declared type.
+/// Reads the attributes that a type and a variable have in common into `kind`; a Boolean and a String have none.
+/// `defaults` is the declared type, whose attributes replace missing ones.
 pub(super) fn attributes(
     element: Node<'_>,
     kind: &mut Kind,
@@ -84,7 +84,7 @@ impl Precision {
     }
 
     /// Rounds a number to the precision.
-    #[expect(clippy::cast_possible_truncation, reason = "the FMU has this number")]
+    #[expect(clippy::cast_possible_truncation, reason = "the FMU stores the rounded number")]
     pub(super) fn round(self, value: f64) -> f64 {
         match self {
             Precision::Single => f64::from(value as f32),
@@ -154,7 +154,8 @@ fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
     })
 }
 
-/// Returns the interval variability of a clock that does not state it.
+/// Returns the interval variability of a clock without a valid one: constant if it has an interval, otherwise
+/// triggered. Warns if the attribute is missing.
 fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariability {
     let assumed = if interval.is_some() {
         IntervalVariability::Constant

@@ -8,7 +8,7 @@ use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
 
 /// Reads `start`, or the elements `Start` of a String or Binary. A single value becomes the start of
-/// `kind`; a list is returned.
+/// `kind`; several values are returned. A Clock has none.
 pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements>> {
     let range = kind.integer_range(Version::V3);
     if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
@@ -21,7 +21,7 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
     }
     let precision = Precision::of(kind);
     if let Some(real_type) = kind.as_real_mut() {
-        // XML Schema has `INF`, `-INF` and `NaN`, and so has `parse`.
+        // `parse` reads `INF`, `-INF` and `NaN` of XML Schema.
         let number = |text: &str| Some(precision.round(text.parse().ok()?));
         let values = list(element, number, || "numbers".to_owned())?;
         return Ok(single(values, |value| real_type.start = Some(value)).map(Elements::Real));
@@ -45,7 +45,7 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
     })
 }
 
-/// Passes on a single value, and returns any other number of values but none.
+/// Returns several values; passes a single one to `set` and returns `None`.
 fn single<T>(mut values: Vec<T>, set: impl FnOnce(T)) -> Option<Vec<T>> {
     if values.len() > 1 {
         return Some(values);
@@ -54,7 +54,8 @@ fn single<T>(mut values: Vec<T>, set: impl FnOnce(T)) -> Option<Vec<T>> {
     None
 }
 
-/// Reads the attribute `start` as a list of values between white space.
+/// Reads the attribute `start` as a list of values between white space; empty if it is missing or, with a warning,
+/// if it has no value.
 fn list<T>(
     element: Node<'_>,
     value: impl Fn(&str) -> Option<T>,
@@ -70,6 +71,7 @@ fn list<T>(
     Ok(values)
 }
 
+/// Parses an integer in `range`, also one with a point (`1.0`).
 fn integer(text: &str, range: &RangeInclusive<i128>) -> Option<i128> {
     let plain = text.parse().ok();
     let whole = || {
@@ -87,12 +89,12 @@ fn boolean(text: &str) -> Option<bool> {
     }
 }
 
-/// The values of the elements `Start`; empty where the attribute is absent.
+/// Returns the value of each element `Start`, an empty text if the attribute `value` is missing.
 fn texts(element: Node<'_>) -> impl Iterator<Item = &str> {
     element.children_named("Start").map(|start| start.attribute("value").unwrap_or_default())
 }
 
-/// Decodes hexadecimal digits; white space between bytes is skipped.
+/// Decodes pairs of hexadecimal digits, without white space; `None` for other characters and an odd number of digits.
 fn hexadecimal(text: &str) -> Option<Vec<u8>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());

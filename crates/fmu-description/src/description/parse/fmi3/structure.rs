@@ -11,8 +11,9 @@ use crate::description::{ModelStructure, ScalarVariable, Unknown};
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
-/// A dependency on a value reference that belongs to no variable is read as a dependency on anything.
-/// Outputs that are missing are read in the same way.
+/// If `dependencies` of a row has a value reference that belongs to no variable, the row is read as depending on
+/// anything, and so is each output without a row. A row with such a value reference itself is skipped; among
+/// `ContinuousStateDerivative` it is an error, because these rows determine the states.
 pub(super) fn read(
     root: Node<'_>,
     variables: &[ScalarVariable],
@@ -27,7 +28,6 @@ pub(super) fn read(
     add_outputs(element, &mut outputs, missing, ["an Output for every output", "none for"]);
     for row in element.children_named("ContinuousStateDerivative") {
         if index(row, references)?.is_none() {
-            // The rows determine the states.
             let stated = row.attribute("valueReference").unwrap_or_default();
             return Err(row.wrong("valueReference", A_REFERENCE, stated));
         }
@@ -41,8 +41,8 @@ pub(super) fn read(
     })
 }
 
-/// Returns rows for the outputs without a row. A variable whose value reference means another variable
-/// cannot have one.
+/// Returns rows for the outputs without a row, with their names. An output with the value reference of an earlier
+/// variable gets none, because the reference means the earlier one.
 fn missing<'a>(
     rows: &[Unknown],
     variables: &'a [ScalarVariable],
@@ -52,6 +52,7 @@ fn missing<'a>(
     missing_outputs(rows, variables).filter(move |(row, _)| meant.contains(&row.index))
 }
 
+/// Returns the index of the variable of a row; `None` if the value reference belongs to no variable.
 fn index(row: Node<'_>, references: &References) -> Result<Option<u32>> {
     Ok(references.get(&row.unsigned("valueReference")?).copied())
 }
@@ -71,8 +72,8 @@ fn list(element: Node<'_>, name: &'static str, references: &References) -> Resul
     Ok(rows)
 }
 
-/// Reads the attribute `dependencies` as indices; `None` if it is absent or has a reference that
-/// belongs to no variable.
+/// Reads the attribute `dependencies` as indices; `None` if it is absent or, with a warning, if it has a reference
+/// that belongs to no variable.
 fn dependencies(row: Node<'_>, references: &References) -> Option<Vec<u32>> {
     let text = row.attribute("dependencies")?;
     let mut indices = Vec::new();

@@ -15,7 +15,7 @@ use crate::description::{
 };
 use crate::limits::{HELP, exceeds};
 
-/// Maximum size in bytes of what aliases inherit from their variables.
+/// Maximum size in bytes of the texts and lists that aliases copy from their variables.
 const ALIASES: usize = 128 << 20;
 
 const CAUSALITIES: [&str; 7] = [
@@ -29,7 +29,7 @@ const CAUSALITIES: [&str; 7] = [
 ];
 pub(super) const A_REFERENCE: &str = "the value reference of a variable";
 
-/// The 1-based index of the variable with a value reference, without aliases.
+/// Maps a value reference to the 1-based index of its variable, the first one that is no alias.
 pub(super) type References = HashMap<u32, u32>;
 
 /// Returns the variables, each followed by its aliases, and the indices of value references.
@@ -39,7 +39,7 @@ pub(super) fn read(
 ) -> Result<(Vec<ScalarVariable>, References)> {
     let types = by_name(types);
     let (mut elements, mut variables) = (Vec::new(), Vec::new());
-    // A few bytes of the file may name an alias of a variable with long texts and lists.
+    // An alias of a few bytes in the file copies the texts and lists of its variable, which may be long.
     let mut inherited = 0;
     for element in list.children() {
         let Some(kind) = Kind::blank(element.element.name) else { continue };
@@ -49,7 +49,7 @@ pub(super) fn read(
         variables.push(variable);
         for element in element.children_named("Alias") {
             let alias = alias(element, &variables[position])?;
-            inherited += weight(&alias);
+            inherited += copied_bytes(&alias);
             if exceeds(inherited, ALIASES) {
                 let (at, limit) = (element.element.at, ALIASES);
                 return Err(ParseError::Limit { at, what: "bytes of aliases", limit, help: HELP });
@@ -72,7 +72,7 @@ pub(super) fn read(
     Ok((variables, references))
 }
 
-/// Maps value references to indices; the first of several variables counts.
+/// Maps value references to indices, without aliases. If several variables have one, warns and takes the first.
 fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References {
     let mut references = HashMap::with_capacity(variables.len());
     for ((index, variable), element) in (1..).zip(variables).zip(elements) {
@@ -135,25 +135,25 @@ fn set_declared_type(kind: &mut Kind, name: Option<String>) {
     }
 }
 
-/// Reads an `Alias`: a variable with the value of the one that contains it.
-fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable> {
-    let mut kind = of.kind.clone();
+/// Reads an `Alias` of `variable`: another variable with its value and attributes, but without start value.
+fn alias(element: Node<'_>, variable: &ScalarVariable) -> Result<ScalarVariable> {
+    let mut kind = variable.kind.clone();
     kind.clear_start();
     let mut alias = ScalarVariable {
         name: element.required("name")?.to_owned(),
-        value_reference: of.value_reference,
-        description: element.text("description").or_else(|| of.description.clone()),
-        causality: of.causality,
-        variability: of.variability,
-        initial: of.initial,
+        value_reference: variable.value_reference,
+        description: element.text("description").or_else(|| variable.description.clone()),
+        causality: variable.causality,
+        variability: variable.variability,
+        initial: variable.initial,
         kind,
-        dimensions: of.dimensions.clone(),
+        dimensions: variable.dimensions.clone(),
         start_elements: None,
-        can_handle_multiple_set_per_time_instant: of.can_handle_multiple_set_per_time_instant,
-        intermediate_update: of.intermediate_update,
-        previous: of.previous,
-        clocks: of.clocks.clone(),
-        alias_of: Some(of.name.clone()),
+        can_handle_multiple_set_per_time_instant: variable.can_handle_multiple_set_per_time_instant,
+        intermediate_update: variable.intermediate_update,
+        previous: variable.previous,
+        clocks: variable.clocks.clone(),
+        alias_of: Some(variable.name.clone()),
         negated: false,
     };
     if let (Some(unit), Some(real)) = (element.text("displayUnit"), alias.kind.as_real_mut()) {
@@ -162,8 +162,8 @@ fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable> {
     Ok(alias)
 }
 
-/// Returns the approximate number of bytes that an alias takes from its variable.
-fn weight(alias: &ScalarVariable) -> usize {
+/// Returns the approximate number of bytes of the texts and lists of an alias, most of which it copies.
+fn copied_bytes(alias: &ScalarVariable) -> usize {
     let text = |attribute: &Option<String>| attribute.as_ref().map_or(0, String::len);
     let kind = match &alias.kind {
         Kind::Binary(binary) => text(&binary.mime_type),
@@ -198,6 +198,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     stated
 }
 
+/// Reads a `Dimension`; neither `start` nor `valueReference` is an error, of both `start` counts.
 fn dimension(element: Node<'_>) -> Result<Dimension> {
     let start = element.optional_counter("start").map(Dimension::Fixed);
     let reference = reference(element, "valueReference")?.map(Dimension::Variable);
@@ -206,7 +207,7 @@ fn dimension(element: Node<'_>) -> Result<Dimension> {
         let expected = "start or valueReference";
         element.warn_of(false, place, expected, "both".to_owned(), "read with its start");
     }
-    let missing = || element.misses("start or valueReference", "neither".to_owned());
+    let missing = || element.child_error("start or valueReference", "neither".to_owned());
     start.or(reference).ok_or_else(missing)
 }
 
@@ -221,8 +222,11 @@ fn clocks(element: Node<'_>) -> Result<Vec<u32>> {
     words(text).map(|word| word.parse().map_err(|_| wrong(word))).collect()
 }
 
-/// Checks that each dimension has an extent, and drops start values that are not as many as the
-/// elements.
+/// Removes the list of start values of a variable, with a warning, if there are more or fewer than elements.
+///
+/// # Errors
+///
+/// A dimension whose value reference belongs to no integer with a start value from 0.
 fn check_dimensions(
     elements: &[Node<'_>],
     variables: &mut [ScalarVariable],
@@ -255,15 +259,14 @@ fn check_dimensions(
             let expected = format!("one value or {size}");
             let place = element.place("start");
             element.warn_of(false, place, &expected, actual, "read without start values");
-        }
-        if !fits {
             variables[position].start_elements = None;
         }
     }
     Ok(())
 }
 
-/// Replaces value references by indices.
+/// Replaces value references by indices. One that belongs to no variable is an error; in `previous` it gives a warning
+/// and counts as missing.
 fn resolve(
     element: Node<'_>,
     variable: &mut ScalarVariable,

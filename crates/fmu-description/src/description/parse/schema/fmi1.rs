@@ -37,9 +37,10 @@ const CAPABILITIES: Shape = leaf(&[
     "canBeInstantiatedOnlyOncePerProcess",
     "canNotUseMemoryManagementFunctions",
 ]);
-/// Attributes of Real and of Integer, as a type and as a variable.
+/// Attributes of a Real, as a type and as a variable.
 const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal"];
+/// Attributes of an Integer or Enumeration, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 
 /// The shape of the element `name` in `parent`; `None` if the schema does not define its content.

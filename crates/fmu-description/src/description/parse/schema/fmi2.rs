@@ -64,9 +64,10 @@ const VARIABLE: Shape = branch(
     ],
     &["Real", "Integer", "Boolean", "String", "Enumeration", "Annotations"],
 );
-/// Attributes of Real and of Integer, as a type and as a variable.
+/// Attributes of a Real, as a type and as a variable.
 const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal", "unbounded"];
+/// Attributes of an Integer or Enumeration, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 
 /// The shape of the element `name` in `parent`; `None` if the schema does not define its content.
@@ -94,7 +95,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "LogCategories") => list(&["Category"]),
         (_, "Category") => leaf(&["name", "description"]),
         (_, "DefaultExperiment") => leaf(&["startTime", "stopTime", "tolerance", "stepSize"]),
-        // The rules report an empty list, not the schema.
+        // No `list`: `problems` reports an empty one.
         (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
         (_, "ScalarVariable") => VARIABLE,
         ("ScalarVariable", "Real") => {

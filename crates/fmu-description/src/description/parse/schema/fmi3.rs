@@ -57,7 +57,7 @@ const CO_SIMULATION: Shape = branch(
 )
 .with(INTERFACE);
 
-/// Declares the elements of variables and those of types.
+/// Declares the names of the elements of variables, and with `Type` at their end those of types.
 macro_rules! elements {
     ($($name:literal)*) => {
         const VARIABLES: [&str; 15] = [$($name),*];
@@ -81,11 +81,12 @@ const VARIABLE: &[&str] = &[
     "clocks",
     "declaredType",
 ];
-/// Attributes of a type.
+/// Attributes of all types.
 const TYPE: &[&str] = &["name", "description"];
-/// Attributes of a number, as a type and as a variable.
+/// Attributes of a floating-point number, as a type and as a variable.
 const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "unbounded", "min", "max", "nominal"];
+/// Attributes of an integer, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 /// Attributes of a clock, as a type and as a variable.
 const CLOCK: &[&str] = &[
@@ -123,7 +124,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "DefaultExperiment") => {
             branch(&["startTime", "stopTime", "tolerance", "stepSize"], ANNOTATED)
         }
-        // The rules report an empty list, not the schema.
+        // No `list`: `problems` reports an empty one.
         (_, "ModelVariables") => Shape { unordered: VARIABLES.len(), ..branch(&[], &VARIABLES) },
         ("ModelVariables", name) => of_variable(name)?,
         (_, "Dimension") => leaf(&["start", "valueReference"]),

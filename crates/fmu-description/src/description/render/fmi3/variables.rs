@@ -8,8 +8,8 @@ use crate::description::{
 };
 
 impl Output {
-    /// Writes the variables with their aliases, the variables with the same value reference that name
-    /// it as `alias_of`. Neither needs to follow the other.
+    /// Writes each variable that is no alias, with its aliases inside: the variables that name it in `alias_of`, at any
+    /// position. An alias of an unknown variable or of another alias is not written.
     pub(in crate::description::render) fn variables_3(&mut self, description: &ModelDescription) {
         let mut aliases = std::collections::HashMap::<&str, Vec<&ScalarVariable>>::new();
         for alias in &description.variables {
@@ -59,14 +59,14 @@ fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<
     let clocks =
         Some(references(description, &variable.clocks)).filter(|references| !references.is_empty());
     let previous = variable.previous.map(|index| reference(description, index));
-    let once = variable.can_handle_multiple_set_per_time_instant.as_ref();
+    let multiple_set = variable.can_handle_multiple_set_per_time_instant.as_ref();
     let tag = Tag::new(kind.element_in(Version::V3))
         .with("name", &variable.name)
         .with("valueReference", &variable.value_reference)
         .maybe("description", variable.description.as_ref())
         .with("causality", variable.causality.as_str())
         .with("variability", variable.variability.as_str())
-        .maybe("canHandleMultipleSetPerTimeInstant", once)
+        .maybe("canHandleMultipleSetPerTimeInstant", multiple_set)
         .maybe("clocks", clocks.as_ref())
         .unless_default("intermediateUpdate", &variable.intermediate_update)
         .maybe("previous", previous.as_ref())
@@ -78,18 +78,18 @@ fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<
     tag.maybe("derivative", derivative.as_ref()).unless_default("reinit", &real.reinit)
 }
 
-/// Returns what an alias states itself.
-fn alias<'a>(this: &'a ScalarVariable, of: &ScalarVariable) -> Tag<'a> {
-    let description = this.description.as_ref().filter(|_| this.description != of.description);
-    let display = |variable: &'a ScalarVariable| variable.kind.as_real()?.display_unit.as_ref();
-    let unit = of.kind.as_real().and_then(|real| real.display_unit.as_ref());
+/// Returns the tag of an alias: its name, and its description and display unit if they differ from `variable`.
+fn alias<'a>(alias: &'a ScalarVariable, variable: &ScalarVariable) -> Tag<'a> {
+    let description = alias.description.as_ref();
+    let display_unit = alias.kind.as_real().and_then(|real| real.display_unit.as_ref());
+    let unit = variable.kind.as_real().and_then(|real| real.display_unit.as_ref());
     Tag::new("Alias")
-        .with("name", &this.name)
-        .maybe("description", description)
-        .maybe("displayUnit", display(this).filter(|display| Some(*display) != unit))
+        .with("name", &alias.name)
+        .maybe("description", description.filter(|_| alias.description != variable.description))
+        .maybe("displayUnit", display_unit.filter(|display| Some(*display) != unit))
 }
 
-/// Returns the attribute `start`: one value, or a list.
+/// Returns the attribute `start`: one value, or a list; `None` for types with elements `Start`.
 fn start_list(variable: &ScalarVariable) -> Option<String> {
     let number = |value: f64| match &variable.kind {
         _ if value.is_nan() => "NaN".to_owned(),
@@ -98,9 +98,9 @@ fn start_list(variable: &ScalarVariable) -> Option<String> {
         _ => format!("{value:?}"),
     };
     match &variable.start_elements {
-        Some(Elements::Real(values)) => return Some(joined(values, |value| number(*value))),
-        Some(Elements::Integer(values)) => return Some(joined(values, i128::to_string)),
-        Some(Elements::Boolean(values)) => return Some(joined(values, bool::to_string)),
+        Some(Elements::Real(values)) => return Some(join(values, |value| number(*value))),
+        Some(Elements::Integer(values)) => return Some(join(values, i128::to_string)),
+        Some(Elements::Boolean(values)) => return Some(join(values, bool::to_string)),
         _ => {}
     }
     match &variable.kind {
@@ -112,11 +112,11 @@ fn start_list(variable: &ScalarVariable) -> Option<String> {
     }
 }
 
-fn joined<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
+fn join<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
     values.iter().map(text).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the values of the elements `Start`, which a String and a Binary have.
+/// Returns the values of the elements `Start` of a String or Binary; empty for other types.
 fn start_elements(variable: &ScalarVariable) -> Vec<String> {
     let hexadecimal = |bytes: &Vec<u8>| hexadecimal(bytes);
     match (&variable.start_elements, &variable.kind) {

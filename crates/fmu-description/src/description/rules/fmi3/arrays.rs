@@ -39,7 +39,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-/// Returns the extent of a dimension, or adds the problem that there is none.
+/// Returns the extent of a dimension of the variable `name`. Adds a problem if it is 0, or if there is none.
 fn extent(
     name: &str,
     dimension: &Dimension,

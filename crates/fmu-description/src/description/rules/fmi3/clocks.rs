@@ -37,6 +37,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
+/// Checks the causality and the variability of a clock.
 fn check_clock(variable: &ScalarVariable, problems: &mut Problems) {
     use Causality::{Input, Local, Output};
     let name = &variable.name;
@@ -49,7 +50,7 @@ fn check_clock(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-/// Checks the attributes of the interval.
+/// Checks the attributes of the interval and the shift of a clock.
 fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut Problems) {
     use IntervalVariability::{Constant, Fixed, Tunable};
     let name = &variable.name;
@@ -59,15 +60,16 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
     let mut demand = |holds: bool, text: &str| {
         problems.demand(holds, TYPES, || format!("clock {name}: {text}"));
     };
-    // Section 2.4.4 wants it for every periodic clock; by section 2.2.8.2 fmi3GetInterval gives it for the others.
+    // Section 2.4.4 requires the interval of every periodic clock; by section 2.2.8.2 the functions
+    // `fmi3GetInterval...` return that of fixed and tunable clocks.
     let constant = clock.interval_variability == Constant;
     demand(has_interval || !constant, "a constant clock needs intervalDecimal");
     demand(periodic || !has_interval, "only a periodic clock has intervalDecimal");
     let positive = |seconds: f64| seconds > 0.0 && seconds.is_finite();
     demand(clock.interval_decimal.is_none_or(positive), "intervalDecimal is not positive");
     demand(has_interval || clock.shift_decimal.is_none(), "shiftDecimal needs intervalDecimal");
-    let later = |seconds: f64| seconds >= 0.0 && seconds.is_finite();
-    demand(clock.shift_decimal.is_none_or(later), "shiftDecimal is negative");
+    let not_negative = |seconds: f64| seconds >= 0.0 && seconds.is_finite();
+    demand(clock.shift_decimal.is_none_or(not_negative), "shiftDecimal is negative");
     demand(
         !counted || periodic && clock.supports_fraction,
         "intervalCounter needs a periodic clock with supportsFraction",
@@ -79,7 +81,7 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
     demand(counted || clock.shift_counter.is_none(), "shiftCounter needs intervalCounter");
 }
 
-/// Checks `clocks` of a clocked variable.
+/// Checks the attribute `clocks`: it refers to clocks, and only a discrete or tunable variable has it.
 fn check_clocks(
     variable: &ScalarVariable,
     description: &ModelDescription,
@@ -103,6 +105,7 @@ fn check_clocks(
     });
 }
 
+/// Checks the attribute `previous`, the 1-based index `index`, of a clocked variable.
 fn check_previous(
     variable: &ScalarVariable,
     index: u32,

@@ -28,12 +28,12 @@ pub(in crate::description::rules) fn check(
     check_members("ClockedState", &structure.clocked_states, &clocked, description, problems);
 
     let known = |index: u32, variable: &ScalarVariable| {
-        is_given(variable)
+        is_external(variable)
             || variable.causality == Causality::Parameter
             || variable.causality == Causality::StructuralParameter
             || variable.variability == Variability::Constant
             || states.contains(&index)
-            // The standard marks only clocked ones of the discrete-time states.
+            // It may be a discrete-time state: the standard marks only the clocked ones.
             || variable.variability == Variability::Discrete
     };
     for (list, rows) in [
@@ -47,7 +47,7 @@ pub(in crate::description::rules) fn check(
         }
     }
     let known_at_start = |_: u32, variable: &ScalarVariable| {
-        is_given(variable) || variable.initial_in_force() == Some(Initial::Exact)
+        is_external(variable) || variable.initial_in_force() == Some(Initial::Exact)
     };
     for row in &structure.initial_unknowns {
         check_dependencies("InitialUnknown", row, description, known_at_start, problems);
@@ -55,7 +55,8 @@ pub(in crate::description::rules) fn check(
     }
 }
 
-fn is_given(variable: &ScalarVariable) -> bool {
+/// Whether the importer's environment determines the variable: an input, the independent variable or a clock.
+fn is_external(variable: &ScalarVariable) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Independent)
         || matches!(variable.kind, Kind::Clock(_))
 }
@@ -71,7 +72,7 @@ fn check_reinit(states: &HashSet<u32>, description: &ModelDescription, problems:
     }
 }
 
-/// Checks that `InitialUnknown` has all that it must have, and nothing else but clocked variables.
+/// Checks that `InitialUnknown` has all required variables and no others, except clocks and clocked variables.
 fn check_initial_unknowns(
     description: &ModelDescription,
     states: &HashSet<u32>,
@@ -103,6 +104,7 @@ fn check_initial_unknowns(
     check_members("InitialUnknown", rows, &allowed, description, problems);
 }
 
+/// Checks that event indicators are continuous local or output floats, each once.
 fn check_indicators(description: &ModelDescription, problems: &mut Problems) {
     let mut earlier = HashSet::new();
     for row in &description.structure.event_indicators {

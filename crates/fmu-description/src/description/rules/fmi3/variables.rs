@@ -101,8 +101,8 @@ fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
 fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
     let name = &variable.name;
     let input = variable.causality == Causality::Input;
-    let once = variable.can_handle_multiple_set_per_time_instant.is_some();
-    problems.demand(input || !once, ATTRIBUTES, || {
+    let multiple_set = variable.can_handle_multiple_set_per_time_instant.is_some();
+    problems.demand(input || !multiple_set, ATTRIBUTES, || {
         format!("variable {name}: only inputs have canHandleMultipleSetPerTimeInstant")
     });
     let continuous = variable.variability == Variability::Continuous;
@@ -111,7 +111,7 @@ fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-/// Checks limits and start values, which must be numbers of the type.
+/// Checks limits and start values: their order, the range of the type, characters of texts, `maxSize` of a Binary.
 fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
     let who = format!("variable {}", variable.name);
     let kind = &variable.kind;
@@ -172,8 +172,8 @@ fn inside<T: Copy + PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> boo
     min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
 }
 
-/// Checks that a declared type exists and has the variable's kind, and that the start value of an
-/// enumeration is an item.
+/// Checks that a declared type exists and has the variable's kind, and that an Enumeration has a declared type
+/// and an item of it as its start value.
 fn check_declared_type(
     variable: &ScalarVariable,
     types: &HashMap<&str, &SimpleType>,
@@ -203,7 +203,7 @@ fn check_declared_type(
     }
 }
 
-/// Checks that `derivative` connects two different continuous floats of one size.
+/// Checks that `derivative` connects two different continuous floats of equal dimensions.
 fn check_derivative(
     variable: &ScalarVariable,
     description: &ModelDescription,
@@ -228,7 +228,8 @@ fn check_derivative(
     });
 }
 
-/// Checks that only aliases share a value reference, and that they name their variable.
+/// Checks that only aliases share a value reference, and that each names a variable with its value reference and
+/// type.
 fn check_references(description: &ModelDescription, problems: &mut Problems) {
     let mut variables: HashMap<u32, &ScalarVariable> = HashMap::new();
     for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none()) {
