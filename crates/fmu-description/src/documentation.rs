@@ -16,8 +16,9 @@ th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap
 /// Name of the file in `documentation/` with the author's part of the page.
 pub const FRAGMENT: &str = "model.html";
 
-/// Renders the page of a model: its description, `model_html` with the author's equations and text, the
-/// variables, the default experiment, the capabilities and the licence.
+/// Renders the page of a model: its description, version, author and GUID, `model_html` with the author's
+/// equations and text, the variables, the log categories, the default experiment, the capabilities in
+/// co-simulation and model exchange, and the licence. A section without content is absent.
 ///
 /// The page is one self-contained file without scripts, well-formed as HTML and as XML if `model_html`
 /// is. Texts of `description` are escaped; the author's fragment `model_html` is inserted unchanged.
@@ -67,7 +68,7 @@ fn escaped(text: &str) -> Cow<'_, str> {
     quick_xml::escape::escape(text)
 }
 
-/// Renders a section with a heading; empty if the content is empty.
+/// Renders a section with a heading; empty if the content is only white space.
 fn section(heading: &str, content: &str) -> String {
     if content.trim().is_empty() {
         return String::new();
@@ -75,14 +76,14 @@ fn section(heading: &str, content: &str) -> String {
     format!("<h2>{heading}</h2>\n{content}\n")
 }
 
-/// Renders text as a paragraph with its line breaks.
+/// Renders text as a paragraph with its line breaks; empty if it is absent or only white space.
 fn paragraph(text: Option<&str>) -> String {
     let text = text.filter(|text| !text.trim().is_empty());
     text.map(|text| format!("<p>{}</p>\n", escaped(text).replace('\n', "<br/>\n")))
         .unwrap_or_default()
 }
 
-/// Renders a table with a header row; empty without further rows. Cells are HTML.
+/// Renders a table, with a header row unless `header` is empty; nothing if `rows` is empty. Cells are HTML.
 fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
@@ -98,6 +99,7 @@ fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     format!("<table>\n{head}{}</table>\n", body.concat())
 }
 
+/// Renders the table of version, author, copyright, generation and GUID, without absent values.
 fn facts(description: &ModelDescription) -> String {
     let token = if description.version() == Version::V3 { "Instantiation token" } else { "GUID" };
     let facts = [
@@ -141,8 +143,8 @@ fn code(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!("<code>{}</code>", escaped(text)) }
 }
 
-/// Returns the type, with the dimensions of an array: extents, or the value references of the
-/// structural parameters.
+/// Returns the name of the type as HTML, with the dimensions of an array: extents, or the value references of
+/// the variables that determine them.
 fn type_name(variable: &ScalarVariable, version: Version) -> String {
     let name = match &variable.kind {
         Kind::Enumeration(integer) => {
@@ -159,7 +161,7 @@ fn type_name(variable: &ScalarVariable, version: Version) -> String {
     if extents.is_empty() { name } else { format!("{name} [{}]", extents.join(", ")) }
 }
 
-/// Returns the start values of an array, the first ones of a long array.
+/// Returns the first 20 start values of an array as text, for a Binary their lengths.
 fn list(elements: &Elements) -> String {
     const SHOWN: usize = 20;
     fn first<T>(values: &[T], text: fn(&T) -> String) -> Vec<String> {
@@ -176,9 +178,10 @@ fn list(elements: &Elements) -> String {
     format!("{}{more}", texts.join(", "))
 }
 
-/// Returns the unit, and start, min and max as text; an absent value is an empty text.
+/// Returns the unit, and start, min and max, as texts; an absent value is an empty text.
 ///
-/// `types` are the types of the description, with the names of the items of enumerations.
+/// `types` are the types of the description, which name the items of enumerations. The start of a Clock is its
+/// interval in s.
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
@@ -211,11 +214,9 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         other => {
             let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
             let integer = other.as_integer();
-            let of = |of: fn(&IntegerType) -> Option<i128>| number(integer.and_then(of));
-            (
-                none(),
-                [of(|integer| integer.start), of(|integer| integer.min), of(|integer| integer.max)],
-            )
+            let text = |value: fn(&IntegerType) -> Option<i128>| number(integer.and_then(value));
+            let (start, min) = (text(|integer| integer.start), text(|integer| integer.min));
+            (none(), [start, min, text(|integer| integer.max)])
         }
     }
 }
@@ -249,13 +250,13 @@ fn flag(value: bool) -> &'static str {
     if value { "yes" } else { "no" }
 }
 
-/// Renders the attributes of an interface.
+/// Renders the attributes of an interface, pairs of name and value, as one table.
 fn attributes(parts: &[&[(&str, &str)]]) -> String {
     let row = |(name, value): &(&str, &str)| vec![code(name), escaped(value).into_owned()];
     table(&[], &parts.iter().copied().flatten().map(row).collect::<Vec<_>>())
 }
 
-/// The flags of an interface: attribute and field.
+/// The flags of an interface, as attributes with `yes` or `no`.
 macro_rules! flags {
     ($flags:ident: $($name:literal $field:ident,)*) => {
         &[$(($name, flag($flags.$field)),)*][..]

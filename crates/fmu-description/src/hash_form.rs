@@ -1,17 +1,17 @@
 //! The serialised form of fields that FMI 2.0 does not have.
 //!
-//! The GUID is a hash of the serialised description. A field of another version is absent from the form
-//! while it has its default, so that descriptions of FMI 2.0 keep their GUID. Otherwise its number
-//! precedes it, so that two fields with the same value differ in the form.
+//! The GUID is a hash of the serialised description. A field of another version that has its default is
+//! absent from the form, so that it does not change the GUID of a description of FMI 2.0. Otherwise a
+//! number precedes it, so that two fields with the same value differ in the form.
 
 use serde::{Serialize, Serializer};
 
-/// Whether the field is absent from the form.
+/// Whether the field has its default and is therefore absent from the form.
 pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Serialises a field with its number, which is unique within its structure.
+/// Serialises a field after its number, which is unique within its structure.
 pub(crate) fn numbered<const NUMBER: u8, T: Serialize, S: Serializer>(
     value: &T,
     serializer: S,

@@ -1,11 +1,11 @@
-//! Limits on the sizes of files, which protect memory and disk against files that are made to fill them.
+//! Limits on the sizes of files, which protect memory and disk against malicious files.
 
 use std::sync::OnceLock;
 
 /// Environment variable that lifts the limits if it is `1`.
 pub const LIFT: &str = "ASO_FTC_TRUST_FILES";
 
-/// The end of a message about a limit: why it exists, and how to lift it.
+/// The end of a message about a limit: its purpose, and how to lift it.
 pub const HELP: &str = "; this limit protects memory and disk. For files that you trust, the environment variable \
      ASO_FTC_TRUST_FILES=1 lifts it";
 
@@ -17,7 +17,7 @@ pub fn in_force(limit: u64) -> u64 {
     if *lifted { u64::MAX } else { limit }
 }
 
-/// Whether `count` exceeds `limit`, unless the user has lifted the limits.
+/// Whether `count` exceeds `limit`; false if the user has lifted the limits.
 #[must_use]
 pub fn exceeds(count: usize, limit: usize) -> bool {
     count > limit && in_force(0) == 0

@@ -58,7 +58,7 @@ pub enum LocationError {
 ///
 /// # Errors
 ///
-/// [`LocationError`] for a relative path, and on Windows for one that is not Unicode.
+/// [`LocationError`] for a relative path, and on other systems than Unix for one that is not Unicode.
 ///
 /// ```
 /// # #[cfg(unix)] {
@@ -74,7 +74,8 @@ pub fn file_uri(path: &Path) -> Result<String, LocationError> {
     Ok(encode(&bytes_of(path)?, cfg!(windows)))
 }
 
-/// Returns an absolute path as text with a separator at its end, as `resourcePath` of FMI 3.0 needs it.
+/// Returns an absolute path as text with a separator at its end, as `resourcePath` of FMI 3.0 needs it. On
+/// Windows, without the prefix `\\?\` of long paths.
 ///
 /// # Errors
 ///
@@ -106,7 +107,8 @@ pub fn folder_path(path: &Path) -> Result<String, LocationError> {
 ///
 /// # Errors
 ///
-/// [`LocationError`] for another scheme, a relative path, another host or a NUL.
+/// [`LocationError`] for another scheme, a relative path, another host or a NUL, and on other systems than Unix
+/// for a path that is not UTF-8.
 ///
 /// ```
 /// # #[cfg(unix)] {
@@ -120,7 +122,7 @@ pub fn path_from_uri(uri: &str) -> Result<PathBuf, LocationError> {
     path_of(bytes).ok_or_else(|| LocationError::NotAFile { uri: uri.to_owned() })
 }
 
-/// Encodes a path. `drives` selects paths of Windows, with drive letter and backslashes.
+/// Encodes an absolute path as a URI. `drives` selects paths of Windows, with drive letter and backslashes.
 fn encode(path: &[u8], drives: bool) -> String {
     if !drives {
         return format!("file://{}", percent_encode(path, &ENCODED));
@@ -133,6 +135,7 @@ fn encode(path: &[u8], drives: bool) -> String {
     if encoded.starts_with("//") { format!("file:{encoded}") } else { format!("file:///{encoded}") }
 }
 
+/// Decodes the path of a URI, without slashes at its end. `drives` selects paths of Windows, with drive letter.
 fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
     let wrong = || LocationError::NotAFile { uri: uri.to_owned() };
     let (scheme, rest) = uri.split_once(':').ok_or_else(wrong)?;

@@ -1,16 +1,17 @@
 //! Numbers in messages, rounded to the digits that mean something.
 
-/// Significant digits of a time. The rounding errors of a sum of steps are behind them.
+/// Significant digits of a time; the rounding errors of a sum of steps are smaller.
 const TIME: usize = 12;
 
-/// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros; with an exponent
-/// if it is below 1e-4, or has more digits before the decimal point than both `digits` and 6.
+/// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros after the decimal
+/// point; with an exponent if its magnitude is below 1e-4, or if it has more digits before the decimal point than
+/// both `digits` and 6. NaN and infinity are `NaN` and `inf`.
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    // By integers: formatting with a precision, and parsing, need tables that are large in WebAssembly.
+    // With integers, because formatting with a precision and parsing need tables that are large in WebAssembly.
     let (mut mantissa, exponent) = scaled(value.abs(), digits);
     while mantissa > 9 && mantissa.is_multiple_of(10) {
         mantissa /= 10;
@@ -35,7 +36,8 @@ pub fn rounded(value: f64, digits: usize) -> String {
     format!("{sign}{whole}.{rest}")
 }
 
-/// Returns `digits` significant digits of a positive number as an integer, and its decimal exponent.
+/// Returns the first `digits` (at least 1, at most 15) significant digits of a positive number, rounded, as an
+/// integer, and the exponent of the first digit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 15 digits")]
 fn scaled(value: f64, digits: usize) -> (u64, i32) {
     let digits = i32::try_from(digits.clamp(1, 15)).unwrap_or(15);
@@ -43,7 +45,7 @@ fn scaled(value: f64, digits: usize) -> (u64, i32) {
     let mut exponent = value.log10().floor() as i32;
     loop {
         let shift = digits - 1 - exponent;
-        // In two factors, of which none overflows.
+        // Two factors, because a single one could overflow.
         let first = shift.clamp(-300, 300);
         let mantissa = (value * 10f64.powi(first) * 10f64.powi(shift - first)).round();
         if mantissa >= largest {

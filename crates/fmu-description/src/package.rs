@@ -17,7 +17,7 @@ pub use read::{Unpacked, unpack_archive};
 pub use temporary::{TemporaryFolder, remove_abandoned_folders, remove_temporary_folders};
 pub use write::Package;
 
-/// Name of the file at the root of the archive that describes the FMU.
+/// Name of the model description at the root of the archive.
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
 /// The error of writing or reading an archive.
@@ -34,7 +34,7 @@ pub enum PackageError {
         /// The reason given by the system.
         source: io::Error,
     },
-    /// The file is not a ZIP archive, or cannot be decompressed.
+    /// The file is not a ZIP archive, or an archive with invalid, overlapping or encrypted entries.
     #[error("{} is no ZIP archive that can be used", path.display())]
     Archive {
         /// The archive.
@@ -42,7 +42,7 @@ pub enum PackageError {
         /// The reason.
         source: io::Error,
     },
-    /// An entry has a path that an FMU must not have.
+    /// An entry has a path, a type or a compression that an FMU must not have.
     #[error("entry {entry:?}: expected {expected}")]
     Entry {
         /// The path of the entry.
@@ -80,7 +80,7 @@ pub enum PackageError {
     },
 }
 
-/// Wraps an error of the file system.
+/// Returns a function that wraps an error of the file system.
 fn file_error(
     action: &'static str,
     path: impl Into<PathBuf>,
@@ -89,21 +89,22 @@ fn file_error(
     move |source| PackageError::File { action, path, source }
 }
 
-/// Wraps an error of the archive.
+/// Returns a function that wraps an error of the archive.
 fn archive_error(path: &Path) -> impl FnOnce(ZipError) -> PackageError {
     let path = path.to_owned();
     move |error| PackageError::Archive { path, source: error.into() }
 }
 
 /// Folders of `binaries` for libraries of this platform in FMI 2.0, in order of preference: the names
-/// of FMI 2.0 for x86, otherwise the platform tuples of FMI 3.0 (allowed since FMI 2.0.4).
+/// of FMI 2.0, and the platform tuples of FMI 3.0 (allowed since FMI 2.0.4). Empty for an unknown platform.
 #[must_use]
 pub fn platforms() -> &'static [&'static str] {
     folders(std::env::consts::OS, std::env::consts::ARCH)
 }
 
 /// Folders of `binaries` for libraries of this platform in a version of FMI, in order of preference.
-/// FMI 3.0 has platform tuples only, such as `x86_64-linux` (FMI 3.0.2, section 2.5.1.4.1).
+/// FMI 3.0 has one platform tuple only, such as `x86_64-linux` (FMI 3.0.2, section 2.5.1.4.1). Empty for an
+/// unknown platform.
 #[must_use]
 pub fn platforms_of(version: Version) -> &'static [&'static str] {
     if version == Version::V3 {
@@ -112,7 +113,8 @@ pub fn platforms_of(version: Version) -> &'static [&'static str] {
     platforms()
 }
 
-/// The folder of FMI 3.0: the platform tuple among `folders`, which does not list 32-bit ARM.
+/// The folder of FMI 3.0: the platform tuple among [`folders`], or that of Linux on 32-bit ARM, which FMI 2.0 does
+/// not have. Empty for an unknown platform.
 fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
     if (system, processor) == ("linux", "arm") {
         return &["aarch32-linux"];
@@ -121,6 +123,7 @@ fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
     tuple.map_or(&[], std::slice::from_ref)
 }
 
+/// The folders of FMI 2.0 for a system and a processor, in order of preference.
 fn folders(system: &str, processor: &str) -> &'static [&'static str] {
     match (system, processor) {
         ("linux", "x86_64") => &["linux64", "x86_64-linux"],

@@ -4,10 +4,11 @@ use strsim::levenshtein;
 
 use crate::ModelDescription;
 
-/// Largest edit distance of two similar names.
+/// Maximum edit distance of two similar names.
 const EDITS: usize = 2;
 
-/// Returns up to five variables similar to `name` as part of a message: ", it has a, b", or empty.
+/// Returns the names of up to five variables similar to `name` ([`among`]) as the end of a message, `, it has a, b`;
+/// empty if there are none.
 #[must_use]
 pub fn nearest(description: &ModelDescription, name: &str) -> String {
     let names = description.variables.iter().map(|known| known.name.as_str());
@@ -15,8 +16,8 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
     if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
 }
 
-/// Returns up to five of `names` that contain `name`, are contained in it, or have an edit distance of at
-/// most two, ignoring case.
+/// Returns those of `names` that contain `name`, are contained in it, or have an edit distance of at most two,
+/// ignoring case: the five most similar ones, in the order of their edit distance.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let lower = name.to_ascii_lowercase();
@@ -30,8 +31,8 @@ pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a st
     similar
 }
 
-/// Returns the one of `names` that `name` is but for the case of its letters or, if it has more than three, for
-/// one letter.
+/// Returns the first of `names` that equals `name`, ignoring case, or, if `name` has more than three bytes, has an edit
+/// distance of one.
 #[must_use]
 pub fn slip<'a>(mut names: impl Iterator<Item = &'a str>, name: &str) -> Option<&'a str> {
     let lower = name.to_ascii_lowercase();

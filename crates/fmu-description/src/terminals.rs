@@ -9,11 +9,11 @@ pub use read::read;
 /// The path in the archive.
 pub const PATH: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
-/// Renders the terminals of a model: one bus, `signals`, with its inputs and outputs as members. A member
-/// has the name of its variable, so that tools connect the inputs and outputs with equal names of two FMUs
-/// (section 2.4.9.2, `matchingRule = bus`).
+/// Renders the terminals of a model: one bus, `signals`, with its inputs and outputs, except clocks, as members;
+/// no terminal without such variables. A member has the name of its variable, so that tools connect the inputs
+/// and outputs with equal names of two FMUs (section 2.4.9.2, `matchingRule = bus`).
 ///
-/// The icon fills the square from (-100, -100) to (100, 100).
+/// The icon is in the square from (-100, -100) to (100, 100).
 ///
 /// ```
 /// use fmu_description::{Causality, ModelDescription, ScalarVariable, terminals};
@@ -36,11 +36,12 @@ pub fn render(description: &ModelDescription) -> String {
     })
 }
 
+/// Adds the corners of the square.
 fn square(tag: Tag<'_>) -> Tag<'_> {
     tag.with("x1", "-100").with("y1", "-100").with("x2", "100").with("y2", "100")
 }
 
-/// Writes the terminal with all inputs and outputs; none if there are none.
+/// Writes the terminal with all inputs and outputs; nothing if there are none.
 fn signals(output: &mut Output, description: &ModelDescription) {
     let is_signal = |causality| matches!(causality, Causality::Input | Causality::Output);
     let signals: Vec<_> = description

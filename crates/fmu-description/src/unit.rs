@@ -72,8 +72,8 @@ impl BaseUnit {
         [self.kg, self.m, self.s, self.a, self.k, self.mol, self.cd, self.rad]
     }
 
-    /// Returns factor and offset of the conversion `value_in_other = factor * value + offset` from this unit
-    /// to `other`; `None` if the exponents differ.
+    /// Returns factor and offset of the conversion from this unit to `other`,
+    /// `value_in_other = factor * value + offset`; `None` if the exponents differ.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
         let factor = self.factor / other.factor;
@@ -82,7 +82,7 @@ impl BaseUnit {
     }
 }
 
-/// `DisplayUnit`: `display = factor * unit + offset`, in the direction opposite to [`BaseUnit`].
+/// `DisplayUnit`: `display = factor * unit + offset`. The conversion of a [`BaseUnit`] starts from the unit, too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// `name`, unique within its unit.
@@ -138,7 +138,7 @@ pub enum UnitError {
         /// The name.
         name: String,
     },
-    /// The conversion factor is too large or too small for a double.
+    /// The conversion factor is not within 1e-300 and 1e300.
     #[error(
         "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {actual}"
     )]
@@ -164,7 +164,8 @@ impl Unit {
     ///
     /// # Errors
     ///
-    /// [`UnitError`] with the column, the expected and the found symbol.
+    /// [`UnitError`] for an unknown unit, a syntax error, a unit with an offset in a larger expression, and a
+    /// conversion factor that is too large or too small.
     ///
     /// ```
     /// let unit = fmu_description::unit::Unit::parse("km/h")?;
@@ -178,7 +179,7 @@ impl Unit {
     }
 }
 
-/// Returns the display unit in degrees for angles and angular velocities in radians.
+/// Returns the display unit in degrees for `rad` and `rad/s`; none for other units.
 fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
     let radian = BaseUnit { rad: 1, ..BaseUnit::default() };
     let name = if *base == radian {

@@ -11,13 +11,13 @@ use crate::limits::exceeds;
 /// Maximum size in bytes of a file.
 pub(crate) const MOST_BYTES: usize = 512 << 20;
 
-/// An element: its attributes, child elements and text, which FMI 2.0 and SSP do not use.
+/// An element with its attributes, child elements and text.
 #[derive(Debug)]
 pub struct Element {
     /// Name with its prefix.
     pub name: String,
-    /// The first text that is not only white space, trimmed. References to characters and entities are
-    /// not resolved.
+    /// The first text that is not only white space, trimmed; empty if there is none. References to characters
+    /// and entities are not resolved.
     pub text: String,
     /// Attributes in order: name and value.
     pub attributes: Vec<(String, String)>,
@@ -27,12 +27,13 @@ pub struct Element {
     pub at: Position,
 }
 
-/// Reads the root element of a file in UTF-8 or ISO-8859-1.
+/// Reads the root element of a file. The file is in the encoding that it declares or, with a byte order mark, in
+/// UTF-16 or UTF-8; otherwise in UTF-8.
 ///
 /// # Errors
 ///
-/// [`ParseError`] with line and column if the file is not well-formed, has a document type declaration
-/// (which could define entities), elements nested too deeply, or too many attributes.
+/// [`ParseError`] if the file is too long, cannot be decoded, is not well-formed, has a document type declaration
+/// (which could define entities), elements nested too deeply, or too many elements or attributes.
 pub fn read(bytes: &[u8]) -> Result<Element, ParseError> {
     if exceeds(bytes.len(), MOST_BYTES) {
         return Err(ParseError::Length { limit: MOST_BYTES });

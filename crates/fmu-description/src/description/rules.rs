@@ -1,5 +1,5 @@
 //! The static rules of the standard that a readable model description can still break. This file has the
-//! rules on the root element, of which `fmi3` has those of FMI 3.0 only.
+//! rules on the root element and on texts; the rules of FMI 3.0 only are in `fmi3`.
 
 mod definitions;
 mod fmi3;

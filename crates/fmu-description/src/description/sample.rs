@@ -110,7 +110,7 @@ fn types() -> Vec<SimpleType> {
     ]
 }
 
-/// A Real variable with its table entries and start value.
+/// A Real variable with causality, variability and start value, and the value reference 0.
 pub(crate) fn real(
     name: &str,
     causality: Causality,
@@ -136,7 +136,7 @@ pub(crate) fn other(
     }
 }
 
-/// The state `x`, with every attribute of a Real but `derivative`.
+/// The state `x`, with every attribute of a Real except `derivative`.
 fn state() -> ScalarVariable {
     let kind = Kind::Real(RealType {
         declared_type: Some("Angle".to_owned()),
@@ -223,7 +223,7 @@ fn structure() -> ModelStructure {
     }
 }
 
-/// The same for FMI 3.0.
+/// Such a description of FMI 3.0: `sample/fmi3.xml`.
 pub(crate) fn complete_3() -> ModelDescription {
     let (description, warnings) =
         ModelDescription::read(include_str!("sample/fmi3.xml")).expect("readable");

@@ -35,7 +35,7 @@ const DUPLICATE: &str = "two entries have the same name";
 /// The reason for refusing an archive whose entries share bytes, as those of a ZIP bomb do.
 const OVERLAP: &str = "entries overlap";
 
-/// A reader that returns a limited number of bytes.
+/// A reader that fails after `left` bytes.
 pub(super) struct Metered<R> {
     inner: R,
     left: Rc<Cell<u64>>,
@@ -58,20 +58,29 @@ impl<R: Seek> Seek for Metered<R> {
     }
 }
 
+/// Entries whose names were normalised.
+struct Renamed {
+    count: usize,
+    /// The first of these names, as stated in the archive.
+    stated: String,
+    /// The same name after normalisation; empty for the root folder.
+    read: String,
+}
+
 /// An archive that is safe to unpack.
 pub(super) struct Archive {
     zip: ZipArchive<Metered<BufReader<File>>>,
     path: PathBuf,
-    /// All names in the order of the archive; names of folders end with a slash. Empty for the root
-    /// folder itself.
+    /// The normalised names of all entries in the order of the archive. Names of folders end with a slash; the
+    /// name of the root folder itself is empty.
     names: Vec<String>,
-    /// The number of names that were read differently, and the first of them with its reading.
-    renamed: Option<(usize, String, String)>,
+    renamed: Option<Renamed>,
+    /// The limit of unpacked bytes.
     capacity: u64,
 }
 
 impl Archive {
-    /// Opens the archive at `path` and checks its list of entries.
+    /// Opens the archive at `path` and checks its list of entries; writes nothing.
     pub(super) fn open(path: &Path) -> Result<Self, PackageError> {
         let file = File::open(path).map_err(file_error("open", path))?;
         let length = file.metadata().map_err(file_error("read", path))?.len();
@@ -83,11 +92,12 @@ impl Archive {
         let capacity = in_force(capacity);
         let (path, names) = (path.to_owned(), Vec::new());
         let mut archive = Self { zip, path, names, renamed: None, capacity };
-        archive.look()?;
+        archive.check_entries()?;
         Ok(archive)
     }
 
-    fn look(&mut self) -> Result<(), PackageError> {
+    /// Reads the names of all entries and checks names, kinds, stated sizes and positions.
+    fn check_entries(&mut self) -> Result<(), PackageError> {
         if exceeds(self.zip.len(), ENTRIES) {
             return Err(self.limit(ENTRIES as u64, "entries"));
         }
@@ -103,8 +113,8 @@ impl Archive {
             }
             total = total.saturating_add(entry.size());
             if name != stated {
-                let (count, ..) = self.renamed.get_or_insert((0, stated, name.clone()));
-                *count += 1;
+                let first = Renamed { count: 0, stated, read: name.clone() };
+                self.renamed.get_or_insert(first).count += 1;
             }
             self.names.push(name);
         }
@@ -128,9 +138,9 @@ impl Archive {
         &self.names
     }
 
-    /// Returns the violations of the rules for paths that were accepted, a sentence each.
+    /// Returns a sentence for each rule for paths that entries break and that is tolerated.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let sentence = |(count, stated, read): &(usize, String, String)| {
+        let sentence = |Renamed { count, stated, read }: &Renamed| {
             let entries = if *count == 1 { "entry has" } else { "entries have" };
             let example =
                 if read.is_empty() { "skipped".to_owned() } else { format!("read as {read:?}") };
@@ -145,7 +155,7 @@ impl Archive {
         self.renamed.iter().map(sentence).chain(repeated).collect()
     }
 
-    /// Unpacks the entries for which `is_needed` is true into `folder`.
+    /// Unpacks the entries for which `is_needed` is true into `folder`, up to the limit of the archive.
     pub(super) fn unpack(
         &mut self,
         folder: &Path,
@@ -154,7 +164,7 @@ impl Archive {
         self.unpack_up_to(folder, self.capacity, is_needed)
     }
 
-    /// The same with a limit of `capacity` bytes.
+    /// Unpacks the entries for which `is_needed` is true into `folder`; fails after `capacity` bytes.
     pub(super) fn unpack_up_to(
         &mut self,
         folder: &Path,
@@ -198,7 +208,7 @@ impl Archive {
     }
 }
 
-/// Whether two entries have the same name; a folder may occur twice.
+/// Whether two files have the same name; a folder may occur twice.
 fn has_duplicates(names: &[String]) -> bool {
     let mut earlier = HashSet::new();
     names
@@ -207,7 +217,7 @@ fn has_duplicates(names: &[String]) -> bool {
         .any(|name| !earlier.insert(name))
 }
 
-/// Returns a name that belongs to a file and a folder.
+/// Returns a name that belongs to a file and a folder, if there is one.
 fn file_and_folder(names: &[String]) -> Option<String> {
     let files: HashSet<&str> =
         names.iter().filter(|name| !name.ends_with('/')).map(String::as_str).collect();
@@ -230,9 +240,10 @@ fn file_and_folder(names: &[String]) -> Option<String> {
     None
 }
 
-/// A reader that remembers whether its last error came from the operating system.
+/// A reader that remembers whether the operating system caused its last error.
 struct Source<R> {
     inner: R,
+    /// Whether the last call failed with an error of the operating system.
     failed: bool,
 }
 
@@ -244,7 +255,8 @@ impl<R: Read> Read for Source<R> {
     }
 }
 
-/// Writes one file of `archive`, and stops after `limit` + 1 bytes whatever size the archive states.
+/// Writes one file of `archive` and returns the number of bytes. Stops after `limit` + 1 bytes, even if the archive
+/// states another size.
 fn write_entry(
     archive: &Path,
     entry: ZipFile<'_, Metered<BufReader<File>>>,

@@ -7,15 +7,17 @@ const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
 /// Names of the devices of Windows that have no number.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
+/// Folders at the root of an FMU.
 const FOLDERS: [&str; 6] =
     ["documentation", "sources", "binaries", "resources", "extra", "terminalsAndIcons"];
 
-/// Maximum length of a path in bytes, and maximum depth.
+/// Maximum length of a path in bytes.
 const LENGTH: usize = 1024;
+/// Maximum number of parts of a path.
 const DEPTH: usize = 64;
 
-/// Normalises a path: forward slashes, no parts `.`, which name the folder itself. Parts that lead
-/// out of the folder stay unchanged. Empty for the root folder.
+/// Normalises a path: forward slashes, without the parts `.`. Parts `..` stay unchanged. Empty for the root
+/// folder.
 pub(super) fn normalised(path: &str) -> String {
     let path = path.replace('\\', "/");
     let (inner, end) = path.strip_suffix('/').map_or((path.as_str(), ""), |inner| (inner, "/"));
@@ -26,7 +28,8 @@ pub(super) fn normalised(path: &str) -> String {
     parts.join("/") + end
 }
 
-/// Returns the violated rule if `path` could lead out of the folder into which it is unpacked.
+/// Returns the violated rule if `path` could lead out of the folder into which it is unpacked, has control
+/// characters, or is too long or too deep.
 pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     if path.contains('\\') {
         return Some("forward slashes between folders");

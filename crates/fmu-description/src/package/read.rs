@@ -11,7 +11,7 @@ use crate::limits::in_force;
 use crate::location::{LocationError, folder_path};
 use crate::{terminals, xml};
 
-/// The manifest of the layered standard for networks.
+/// The manifest of FMI-LS-BUS, the layered standard for networks.
 const BUS_MANIFEST: &str = "extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml";
 
 /// The folders of `binaries` that the standard defines.
@@ -40,15 +40,16 @@ const PLATFORMS: [&str; 18] = [
 #[derive(Debug)]
 pub struct Unpacked {
     folder: PathBuf,
-    /// The temporary folder, removed on drop; `None` if the FMU was given as a folder.
+    /// The temporary folder, removed on drop; `None` for an FMU in a folder.
     temporary: Option<TemporaryFolder>,
-    /// The names of the archive's entries, if there was an archive.
+    /// The names of the archive's entries; empty for an FMU in a folder.
     names: Vec<String>,
     /// The content of `modelDescription.xml`.
     pub description: ModelDescription,
-    /// The violations of the standard in it that were accepted.
+    /// The defects of `modelDescription.xml` that were tolerated.
     pub warnings: Vec<Warning>,
-    /// The same for the archive, a sentence each.
+    /// The defects of the archive, its terminals and the names of its libraries that were tolerated, a sentence
+    /// each.
     pub archive_warnings: Vec<String>,
 }
 
@@ -58,21 +59,23 @@ impl Unpacked {
     ///
     /// Only files that a simulation can need are unpacked: no documentation, sources, pictures, and
     /// no libraries of other platforms. Close a library that was loaded from the folder before you
-    /// drop the result. Backslashes in paths are read as slashes and parts `.` are skipped;
-    /// [`Unpacked::archive_warnings`] reports this.
+    /// drop the result. Backslashes in paths are read as slashes and parts `.` are skipped; of several
+    /// entries with one name the last is used. [`Unpacked::archive_warnings`] reports both.
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if the file is no ZIP archive, has entries that lead out of the folder,
-    /// links, duplicate names, a file and a folder of one name, overlapping or encrypted entries,
-    /// more than 100,000 entries, more than 4 GiB or more than 64 MiB and 100 times its own size,
-    /// or no readable `modelDescription.xml` at its root. Faults in the list of entries are found
-    /// before anything is written.
+    /// [`PackageError`] if the file is no ZIP archive, has paths that lead out of the folder, have control
+    /// characters, more than 1024 bytes or more than 64 levels, links, names that are equal only without
+    /// backslashes and parts `.`, a file and a folder of one name, overlapping or encrypted entries, another
+    /// compression than deflate, or no readable `modelDescription.xml` at its root. Also, unless
+    /// [`crate::limits`] are lifted, if it has more than 100,000 entries, more than 32 MiB in its list of
+    /// entries, or more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Defects in the
+    /// list of entries are found before anything is written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, is_needed)
     }
 
-    /// As [`Unpacked::open`], but unpacks all files: to pack them again, or to check them.
+    /// Unpacks the FMU as [`Unpacked::open`] does, but all files: to pack them again, or to check them.
     ///
     /// # Errors
     ///
@@ -103,7 +106,7 @@ impl Unpacked {
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if there is no readable `modelDescription.xml`.
+    /// [`PackageError`] if there is no such folder, or no readable `modelDescription.xml` in it.
     pub fn in_folder(folder: &Path) -> Result<Self, PackageError> {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
         let (mut description, warnings) = describe(&folder, &folder)?;
@@ -118,11 +121,11 @@ impl Unpacked {
     /// The folder with `modelDescription.xml`, as an absolute path.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        self.temporary.as_ref().map_or(&self.folder, TemporaryFolder::path)
+        &self.folder
     }
 
-    /// The names of all entries of the archive, with a slash at the end of folders; `None` if the
-    /// FMU was given as a folder.
+    /// The names of all entries of the archive, with a slash at the end of folders; empty for an FMU in a
+    /// folder.
     #[must_use]
     pub fn entries(&self) -> &[String] {
         &self.names
@@ -145,13 +148,14 @@ impl Unpacked {
         resources.is_dir().then(|| folder_path(&resources)).transpose()
     }
 
-    /// The path of the shared library `model_identifier` for the platform of this program, in a folder
-    /// that the version of the FMU has ([`platforms_of`]). If there is none, but exactly one library with
-    /// another name, its path; [`Unpacked::archive_warnings`] names it.
+    /// The path of the shared library `model_identifier` for the platform of this program, in the first
+    /// folder of [`platforms_of`] that has it. Without it, the path of the only library in these folders;
+    /// [`Unpacked::archive_warnings`] names that one.
     ///
     /// # Errors
     ///
-    /// [`PackageError::Missing`], which lists the libraries of the FMU.
+    /// [`PackageError::Missing`] if these folders have no library, or several with other names. It lists the
+    /// libraries of the FMU for all platforms.
     pub fn library(&self, model_identifier: &str) -> Result<PathBuf, PackageError> {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         let binaries = self.folder().join("binaries");
@@ -174,7 +178,7 @@ impl Unpacked {
         })
     }
 
-    /// The only library in the folders of this platform.
+    /// The only library in the folders of this platform; `None` if there are none or several.
     fn only_library(&self) -> Option<PathBuf> {
         let binaries = self.folder().join("binaries");
         let suffix = std::env::consts::DLL_SUFFIX;
@@ -208,14 +212,15 @@ impl Unpacked {
         }
     }
 
-    /// Whether the FMU has source code.
+    /// Whether the FMU has source code, in `sources`.
     #[must_use]
     pub fn has_sources(&self) -> bool {
         self.names.iter().any(|name| name.starts_with("sources/"))
             || self.folder().join("sources").is_dir()
     }
 
-    /// The files two levels below `binaries`, in any case of that name; at most 20, sorted.
+    /// The paths of the files in the folders of platforms in `binaries`, whose name may be in another case; sorted, at
+    /// most 20.
     fn libraries(&self) -> Vec<String> {
         let mut libraries = if self.temporary.is_some() {
             self.names.clone()
@@ -242,11 +247,12 @@ impl Unpacked {
     }
 }
 
+/// The paths of the files and folders in `folder`; none if it cannot be read.
 fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
-/// Whether a simulation on this platform can need the file; false only if it certainly cannot.
+/// Whether a simulation on this platform may need the entry called `name`.
 fn is_needed(name: &str) -> bool {
     let mut parts = name.split('/');
     match (parts.next(), parts.next()) {
@@ -261,8 +267,7 @@ fn is_needed(name: &str) -> bool {
 
 /// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.
 ///
-/// Returns the folder and the violations of the rules for paths that were accepted, a sentence
-/// each.
+/// Returns the folder, and a sentence for each rule for paths that entries break and that is tolerated.
 ///
 /// # Errors
 ///
@@ -278,9 +283,10 @@ fn folder() -> Result<TemporaryFolder, PackageError> {
     TemporaryFolder::new().map_err(file_error("create a folder in", std::env::temp_dir()))
 }
 
+/// Reads the model description in `folder`; errors name `path`, the archive or the folder.
 fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning>), PackageError> {
     let file = folder.join(DESCRIPTION);
-    let xml = match start(&file) {
+    let xml = match read_limited(&file) {
         Ok(xml) => xml,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let names =
@@ -293,19 +299,20 @@ fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning
         .map_err(|source| PackageError::Description { path: path.to_owned(), source })
 }
 
-/// Adds the terminals of an FMU of FMI 3.0, and whether it is a bus, to its description; returns a warning if the
-/// terminals cannot be read.
+/// Sets `terminals` and `is_bus_simulation` of a description of FMI 3.0. Returns a warning if the file of terminals
+/// exists and cannot be read; ignores an unreadable manifest.
 fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<String> {
     if description.version() != Version::V3 {
         return None;
     }
-    let manifest = start(&folder.join(BUS_MANIFEST)).ok().and_then(|xml| xml::read(&xml).ok());
+    let manifest = read_limited(&folder.join(BUS_MANIFEST)).ok();
+    let manifest = manifest.and_then(|xml| xml::read(&xml).ok());
     let is_bus = |(name, value): &(String, String)| {
         name == "isBusSimulationFMU" && matches!(value.as_str(), "true" | "1")
     };
     description.is_bus_simulation =
         manifest.is_some_and(|manifest| manifest.attributes.iter().any(is_bus));
-    let read = match start(&folder.join(terminals::PATH)) {
+    let read = match read_limited(&folder.join(terminals::PATH)) {
         Ok(xml) => terminals::read(&xml).map_err(|error| error.to_string()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
         Err(error) => Err(error.to_string()),
@@ -321,15 +328,15 @@ fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<St
     }
 }
 
-/// Reads a file up to a length that exceeds every valid model description.
-fn start(file: &Path) -> io::Result<Vec<u8>> {
+/// Reads a file, of a longer one the first [`ModelDescription::MOST_BYTES`] + 1 bytes.
+fn read_limited(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let most = in_force(u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX));
     fs::File::open(file)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// The error for an archive without model description: names a similar entry, or lists the entries.
+/// The error for an FMU without model description: names a similar entry, or up to 10 entries of its root.
 fn missing(names: &[String]) -> PackageError {
     let near = names.iter().find(|name| {
         let file = name.rsplit_once('/').map_or(name.as_str(), |(_, file)| file);

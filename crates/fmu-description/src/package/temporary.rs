@@ -1,4 +1,4 @@
-//! Temporary folders that are removed even if their process is killed.
+//! Temporary folders. On Unix, the next process removes those of a killed process.
 
 use std::fs::File;
 use std::io;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 /// Common prefix of the names of these folders.
 const PREFIX: &str = "fmi2-unpacked-";
-/// Number of attempts to make a folder if another process removes it before it is locked.
+/// Maximum number of attempts to create a folder, because another process may remove it before it is locked.
 const ATTEMPTS: usize = 10;
 
 /// The temporary folders of this process.
@@ -18,21 +18,22 @@ static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// A temporary folder, removed on drop.
 ///
 /// On Unix the folders of a killed process are removed too: the lock on a folder ends with its
-/// process, and the next process removes unlocked folders when it makes its first one.
+/// process, and the next process removes unlocked folders before it creates its first one.
 #[derive(Debug)]
 pub struct TemporaryFolder {
     folder: TempDir,
-    /// The lock that tells other processes that the folder is in use; released after the folder is
-    /// removed.
+    /// The lock by which other processes see that the folder is in use; released after the folder is
+    /// removed. `None` if there are no locks.
     _lock: Option<File>,
 }
 
 impl TemporaryFolder {
-    /// Makes a folder in the system's folder for temporary files.
+    /// Creates a folder in the system's folder for temporary files. On Unix, the first call of a process removes
+    /// the folders that killed processes left.
     ///
     /// # Errors
     ///
-    /// If an operation of the file system fails.
+    /// If the folder cannot be created, or if other processes remove 10 folders before they are locked.
     pub fn new() -> io::Result<Self> {
         static CLEARED: Once = Once::new();
         let parent = std::env::temp_dir();
@@ -48,7 +49,7 @@ impl TemporaryFolder {
         Err(io::Error::other("other processes remove the folders as soon as they are made"))
     }
 
-    /// The absolute path of the folder.
+    /// The path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.path()
@@ -62,15 +63,15 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Removes all temporary folders of this process.
+/// Removes all temporary folders of this process: for a process that is about to end without dropping its values.
+/// Libraries in the folders may still be loaded.
 ///
-/// For a process that is about to end without dropping its values. Libraries in the folders may
-/// still be loaded.
+/// Does nothing if another thread is creating or dropping such a folder. Ignores errors.
 pub fn remove_temporary_folders() {
     let folders = match FOLDERS.try_lock() {
         Ok(folders) => folders,
         Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-        // A thread that will never continue may hold the lock.
+        // The thread that holds the lock may never continue.
         Err(TryLockError::WouldBlock) => return,
     };
     for folder in folders.iter() {
@@ -79,12 +80,13 @@ pub fn remove_temporary_folders() {
     }
 }
 
-/// Removes the folders that processes have left which were killed.
+/// Removes the folders that killed processes left, on Unix; elsewhere does nothing.
 pub fn remove_abandoned_folders() {
     remove_abandoned(&std::env::temp_dir());
 }
 
-/// Locks the folder at `path`; an error if another process has locked or removed it.
+/// Locks the folder at `path`; `None` if the file system has no locks, an error if another process has locked or
+/// removed the folder.
 #[cfg(unix)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     use std::os::unix::fs::MetadataExt as _;
@@ -100,7 +102,7 @@ fn lock(path: &Path) -> io::Result<Option<File>> {
 }
 
 #[cfg(not(unix))]
-#[expect(clippy::unnecessary_wraps, reason = "as where folders can be locked")]
+#[expect(clippy::unnecessary_wraps, reason = "the signature is that of Unix")]
 fn lock(_: &Path) -> io::Result<Option<File>> {
     Ok(None)
 }

@@ -11,9 +11,9 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 use super::{DESCRIPTION, PackageError, archive_error, file_error, paths};
 use crate::description::Version;
 
-/// Maximum size in bytes of an archive without Zip64, less room for its directory.
+/// Maximum size in bytes of all files together, well below the 4 GiB of an archive without Zip64.
 const CAPACITY: u64 = 1 << 31;
-/// Maximum number of entries of an archive without Zip64.
+/// Maximum number of files besides the description, below the 65,535 entries of an archive without Zip64.
 const ENTRIES: u64 = 65_000;
 
 /// An FMU to be written.
@@ -43,7 +43,7 @@ impl Package {
         Package { version: Version::V2, description: description_xml, entries: Vec::new() }
     }
 
-    /// Sets the version of FMI whose rules on files the archive must keep.
+    /// Sets the version of FMI whose rules on files [`Package::write`] checks.
     #[must_use]
     pub fn for_version(self, version: Version) -> Self {
         Package { version, ..self }
@@ -58,8 +58,8 @@ impl Package {
     ///
     /// # Errors
     ///
-    /// [`PackageError::File`] if a file cannot be read, [`PackageError::Entry`] for a symbolic link
-    /// or a name that is not Unicode.
+    /// [`PackageError::File`] if a file or folder cannot be read, [`PackageError::Entry`] for a symbolic link
+    /// or a name that is not Unicode. Files before the error are added.
     pub fn add_folder(&mut self, path: &str, folder: &Path) -> Result<(), PackageError> {
         for entry in fs::read_dir(folder).map_err(file_error("read", folder))? {
             let entry = entry.map_err(file_error("read", folder))?;
@@ -83,10 +83,11 @@ impl Package {
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if the FMU breaks a rule of section 2.3, in FMI 3.0 of section 2.5 (paths,
-    /// duplicates ignoring case, neither `binaries` nor `sources`, `documentation` without
-    /// `index.html`, in FMI 3.0 `sources` without `buildDescription.xml` and `documentation/licenses`
-    /// without a license), is too large, or the file cannot be written.
+    /// [`PackageError`] if `target` has another extension, if the FMU breaks a rule of section 2.3, in FMI 3.0
+    /// of section 2.5 (paths, duplicates ignoring case, neither `binaries` nor `sources`, `documentation`
+    /// without `index.html`, in FMI 3.0 `sources` without `buildDescription.xml`, `documentation/licenses`
+    /// without a license and `icon.svg` without `icon.png`), is larger than 2 GiB or has more than 65,000
+    /// files, or if the file cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
         let is_named = target.extension().is_some_and(|extension| extension == "fmu");
         demand(is_named, "a file name ending in .fmu", &target.display().to_string())?;
@@ -112,6 +113,7 @@ impl Package {
         Ok(())
     }
 
+    /// Checks the rules on files, and the limits.
     fn check(&self, target: &Path) -> Result<(), PackageError> {
         let mut earlier = HashSet::new();
         for (path, _) in &self.entries {
@@ -124,8 +126,8 @@ impl Package {
                 return Err(PackageError::Entry { entry, expected });
             }
         }
-        let library = self.has_folder("binaries/") || self.has_folder("sources/");
-        demand(library, "binaries or sources", "neither")?;
+        let has_code = self.has_folder("binaries/") || self.has_folder("sources/");
+        demand(has_code, "binaries or sources", "neither")?;
         let documented =
             !self.has_folder("documentation/") || earlier.contains("documentation/index.html");
         demand(documented, "documentation/index.html", "documentation without it")?;
@@ -144,11 +146,12 @@ impl Package {
         Ok(())
     }
 
+    /// Whether a path starts with `name`, a folder with a slash at its end.
     fn has_folder(&self, name: &str) -> bool {
         self.entries.iter().any(|(path, _)| path.starts_with(name))
     }
 
-    /// Checks what FMI 3.0 demands of single folders (sections 2.4.10, 2.5.1.1, 2.5.1.2).
+    /// Checks the rules of FMI 3.0 on single folders (sections 2.4.10, 2.5.1.1, 2.5.1.2).
     fn check_folders_of_3(&self) -> Result<(), PackageError> {
         let has = |name: &str| self.entries.iter().any(|(path, _)| path == name);
         let described = !self.has_folder("sources/") || has("sources/buildDescription.xml");
@@ -163,6 +166,7 @@ impl Package {
         demand(pictured, "terminalsAndIcons/icon.png", "icon.svg without it")
     }
 
+    /// Returns the bytes of the archive.
     fn archive(&self) -> zip::result::ZipResult<Vec<u8>> {
         let mut entries: Vec<(&str, &[u8])> =
             self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
@@ -184,6 +188,7 @@ impl Package {
     }
 }
 
+/// Returns [`PackageError::Missing`] unless the rule `holds`.
 fn demand(holds: bool, expected: &str, actual: &str) -> Result<(), PackageError> {
     if holds {
         return Ok(());

@@ -4,7 +4,7 @@ use super::{Terminal, TerminalMember};
 use crate::description::ParseError;
 use crate::xml::{self, Element};
 
-/// Reads the terminals of a file: all of them, nested ones after the one that they are in.
+/// Reads the terminals of a file, each followed by its nested terminals. Skips members without `variableName`.
 ///
 /// ```
 /// let xml = br#"<fmiTerminalsAndIcons fmiVersion="3.0"><Terminals>
@@ -19,7 +19,7 @@ use crate::xml::{self, Element};
 ///
 /// # Errors
 ///
-/// [`ParseError`] with line and column if the file is not well-formed.
+/// Same as [`xml::read`].
 pub fn read(bytes: &[u8]) -> Result<Vec<Terminal>, ParseError> {
     let root = xml::read(bytes)?;
     let mut all = Vec::new();
@@ -33,7 +33,7 @@ fn named<'a>(element: &'a Element, name: &'a str) -> impl Iterator<Item = &'a El
     element.children.iter().filter(move |child| child.name == name)
 }
 
-/// Adds the terminals within `element`.
+/// Adds the terminals in `element` to `all`, with `prefix` before their names.
 fn add(element: &Element, prefix: &str, all: &mut Vec<Terminal>) {
     for terminal in named(element, "Terminal") {
         let name = format!("{prefix}{}", text(terminal, "name").unwrap_or_default());
@@ -45,14 +45,14 @@ fn add(element: &Element, prefix: &str, all: &mut Vec<Terminal>) {
                 kind: text(member_element, "variableKind").unwrap_or_default(),
             })
         };
-        let within = format!("{name}.");
+        let prefix = format!("{name}.");
         all.push(Terminal {
             name,
             matching_rule: text(terminal, "matchingRule").unwrap_or_default(),
             kind: text(terminal, "terminalKind"),
             members: named(terminal, "TerminalMemberVariable").filter_map(member).collect(),
         });
-        add(terminal, &within, all);
+        add(terminal, &prefix, all);
     }
 }
 

@@ -3,9 +3,10 @@
 use super::names::{self, Named};
 use super::{BaseUnit, UnitError};
 
-/// The product of the units parsed so far. Numerator, denominator and powers of ten are kept
-/// separately, so that `mm3` has exactly the factor of the literal 1e-9.
+/// The product of the units parsed so far, `numerator / denominator * 10^ten`. The parts are separate, so that `mm3`
+/// has exactly the factor of the literal 1e-9.
 struct Product {
+    /// Exponents of kg, m, s, A, K, mol, cd, rad.
     exponents: [i32; 8],
     numerator: f64,
     denominator: f64,
@@ -13,6 +14,7 @@ struct Product {
 }
 
 impl Product {
+    /// Multiplies by `unit` to the power `exponent`.
     fn multiply(&mut self, unit: &Named, exponent: i32) {
         for (sum, exponent_of_unit) in self.exponents.iter_mut().zip(unit.exponents) {
             *sum += exponent_of_unit * exponent;
@@ -25,6 +27,7 @@ impl Product {
         }
     }
 
+    /// Returns the conversion factor.
     fn factor(&self) -> f64 {
         let (mut numerator, mut denominator) = (self.numerator, self.denominator);
         if self.ten >= 0 {
@@ -69,7 +72,7 @@ impl<'a> Cursor<'a> {
         self.rest().chars().next()
     }
 
-    /// Takes the longest run of characters that `belongs` accepts.
+    /// Moves past the longest run of characters for which `belongs` is true, and returns the run.
     fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let rest = self.rest();
         let length = rest.find(|character| !belongs(character)).unwrap_or(rest.len());
@@ -77,26 +80,31 @@ impl<'a> Cursor<'a> {
         &rest[..length]
     }
 
+    /// Moves past the next character if it is one of `characters`; returns whether it is.
     fn accept(&mut self, characters: &[char]) -> bool {
         let character = self.peek().filter(|character| characters.contains(character));
         self.at += character.map_or(0, char::len_utf8);
         character.is_some()
     }
 
+    /// Moves past blanks; returns whether there are any.
     fn skip_blanks(&mut self) -> bool {
         !self.take(|character| character == ' ').is_empty()
     }
 
+    /// Returns the column of the byte `at`, counted in characters from 1.
     fn column(&self, at: usize) -> usize {
         self.expression[..at].chars().count() + 1
     }
 
+    /// Returns the syntax error at this position.
     fn syntax(&self, expected: &'static str) -> UnitError {
         let actual = self.peek().map_or("the end".to_owned(), |character| format!("{character:?}"));
         let column = self.column(self.at);
         UnitError::Syntax { expression: self.expression.to_owned(), column, expected, actual }
     }
 
+    /// Parses a whole expression: a unit with an offset, or a product with divisions.
     pub(super) fn unit(&mut self) -> Result<BaseUnit, UnitError> {
         self.skip_blanks();
         if let Some(scale) = names::scale(self.rest().trim_end()) {
@@ -115,7 +123,7 @@ impl<'a> Cursor<'a> {
         Ok(BaseUnit::from_exponents(product.exponents, factor, 0.0))
     }
 
-    /// `{ "/" ( factor | "(" product ")" ) }` up to the end.
+    /// Parses `{ "/" ( factor | "(" product ")" ) }` up to the end.
     fn denominators(&mut self, product: &mut Product) -> Result<(), UnitError> {
         loop {
             self.skip_blanks();
@@ -141,7 +149,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// `factor { ( "." | "*" | blank ) factor }` with the blanks after it.
+    /// Parses `factor { ( "." | "*" | blank ) factor }` with the blanks after it. `sign` is -1 in a denominator.
     fn product(&mut self, product: &mut Product, sign: i32) -> Result<(), UnitError> {
         self.factor(product, sign)?;
         loop {
@@ -156,7 +164,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// `"1" | name [ exponent ]`.
+    /// Parses `"1" | name [ exponent ]`.
     fn factor(&mut self, product: &mut Product, sign: i32) -> Result<(), UnitError> {
         if self.accept(&['1']) {
             return Ok(());
@@ -179,7 +187,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// `[ "^" ] [ "+" | "-" ] digit [ digit ]`, or nothing for 1.
+    /// Parses `[ "^" ] [ "+" | "-" ] digit [ digit ]`, or nothing, which is 1.
     fn exponent(&mut self) -> Result<i32, UnitError> {
         let caret = self.accept(&['^']);
         let negative = self.peek() == Some('-');
@@ -199,8 +207,9 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Letters, `%` and `_`. The letters beyond ASCII are ranges, as the table of all letters would be a part of each FMU and of
-/// the page in the browser: the micro sign, Latin to Greek and beyond, ohm, kelvin and angstrom, Chinese and Japanese.
+/// Whether the character is a letter, `%` or `_`. Letters beyond ASCII are ranges, because the table of all letters
+/// would be a part of each FMU and of the page in the browser: the micro sign, Latin to Greek and beyond, ohm, kelvin
+/// and angstrom, Chinese and Japanese.
 fn in_name(character: char) -> bool {
     matches!(
         character,

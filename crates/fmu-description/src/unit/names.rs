@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// A unit with its conversion `base = factor * 10^ten * unit`.
+/// A unit without offset, with its conversion `base = factor * 10^ten * unit`.
 #[derive(Clone, Copy)]
 pub(super) struct Named {
     name: &'static str,
@@ -10,6 +10,7 @@ pub(super) struct Named {
     pub(super) exponents: [i32; 8],
     pub(super) factor: f64,
     pub(super) ten: i32,
+    /// Whether SI prefixes are allowed.
     prefixes: bool,
 }
 
@@ -21,10 +22,12 @@ pub(super) struct Scale {
     pub(super) offset: f64,
 }
 
+/// A unit that allows SI prefixes, `10^ten` SI base units.
 const fn metric(name: &'static str, exponents: [i32; 8], ten: i32) -> Named {
     Named { name, exponents, factor: 1.0, ten, prefixes: true }
 }
 
+/// A unit without SI prefixes.
 const fn plain(name: &'static str, exponents: [i32; 8], factor: f64, ten: i32) -> Named {
     Named { name, exponents, factor, ten, prefixes: false }
 }
@@ -94,7 +97,7 @@ const PREFIXES: [(&str, i32); 11] = [
     ("p", -12),
 ];
 
-/// Finds the unit called `name`. A full match (`min`, `cd`) has priority over prefix and unit.
+/// Finds the unit called `name`, also with an SI prefix. A whole name (`min`, `cd`) has priority over prefix and unit.
 pub(super) fn find(name: &str) -> Option<Named> {
     let named = UNITS.iter().find(|unit| unit.name == name).copied();
     named.or_else(|| {

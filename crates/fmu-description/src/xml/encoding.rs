@@ -11,19 +11,23 @@ use crate::defect::{ParseError, Position, Warning};
 /// Length of the part that is searched for an XML declaration.
 const DECLARATION: usize = 256;
 
-/// Returns the text of an XML file, and a warning if it is not UTF-8, which FMI requires.
+/// Returns the text of an XML file, and a warning unless it is UTF-8 without a byte order mark, which FMI requires.
+///
+/// # Errors
+///
+/// [`ParseError::Encoding`] for an unknown encoding, and for bytes that the encoding does not have.
 pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), ParseError> {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         let rest = &bytes[mark..];
         if encoding == UTF_8 {
-            return Ok((utf8(rest)?, Some(other("a byte order mark".to_owned()))));
+            return Ok((utf8(rest)?, Some(encoding_warning("a byte order mark".to_owned()))));
         }
-        return converted(rest, encoding);
+        return decode_as(rest, encoding);
     }
     // Without a byte order mark, the first character "<" distinguishes the two forms of UTF-16.
     match bytes {
-        [b'<', 0, ..] => return converted(bytes, UTF_16LE),
-        [0, b'<', ..] => return converted(bytes, UTF_16BE),
+        [b'<', 0, ..] => return decode_as(bytes, UTF_16LE),
+        [0, b'<', ..] => return decode_as(bytes, UTF_16BE),
         _ => {}
     }
     let Some(declared) = declared(bytes) else {
@@ -31,21 +35,22 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
     };
     match Encoding::for_label(declared.as_bytes()) {
         Some(encoding) if encoding == UTF_8 => Ok((utf8(bytes)?, None)),
-        // In every supported encoding, ASCII bytes have their ASCII meaning.
+        // `for_label` reads ASCII as windows-1252, but it is a part of UTF-8.
         _ if declared.eq_ignore_ascii_case("us-ascii")
             || declared.eq_ignore_ascii_case("ascii") =>
         {
-            Ok((utf8(bytes)?, Some(other(format!("encoding {declared:?}")))))
+            Ok((utf8(bytes)?, Some(encoding_warning(format!("encoding {declared:?}")))))
         }
         // A file that declares UTF-16 in single bytes is not UTF-16.
         Some(encoding) if encoding != UTF_16LE && encoding != UTF_16BE => {
-            converted(bytes, encoding)
+            decode_as(bytes, encoding)
         }
         _ => Err(ParseError::Encoding { actual: format!("encoding {declared:?}") }),
     }
 }
 
-fn converted<'a>(
+/// Decodes bytes in another encoding than UTF-8, with a warning.
+fn decode_as<'a>(
     bytes: &'a [u8],
     encoding: &'static Encoding,
 ) -> Result<(Cow<'a, str>, Option<Warning>), ParseError> {
@@ -54,10 +59,11 @@ fn converted<'a>(
     let text = text.ok_or_else(|| ParseError::Encoding {
         actual: format!("{actual} with bytes that it does not have"),
     })?;
-    Ok((text, Some(other(actual))))
+    Ok((text, Some(encoding_warning(actual))))
 }
 
-fn other(actual: String) -> Warning {
+/// Returns the warning about a file that is not UTF-8 without a byte order mark.
+fn encoding_warning(actual: String) -> Warning {
     Warning {
         at: Position::START,
         place: "the file".to_owned(),
@@ -69,6 +75,7 @@ fn other(actual: String) -> Warning {
     }
 }
 
+/// Checks that bytes are UTF-8.
 fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
     std::str::from_utf8(bytes).map(Cow::Borrowed).map_err(|error| {
         let at = error.valid_up_to();
@@ -78,7 +85,7 @@ fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
     })
 }
 
-/// Returns the encoding in the XML declaration, if there is one.
+/// Returns the encoding in the XML declaration, if there is one in the first 256 bytes.
 fn declared(bytes: &[u8]) -> Option<String> {
     let start = &bytes[..bytes.len().min(DECLARATION)];
     let end = start.windows(2).position(|pair| pair == b"?>")? + 2;

@@ -16,18 +16,18 @@ use crate::limits::{HELP, exceeds};
 
 /// Maximum nesting; a model description needs 5.
 const DEPTH: usize = 64;
-/// Maximum number of attributes of one element; the standard has 15 at most.
+/// Maximum number of attributes of one element; the standard has fewer than 30.
 const ATTRIBUTES: usize = 256;
 /// Maximum number of elements; an output needs 4.
 const ELEMENTS: usize = 4_000_000;
 /// Maximum number of attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;
 
-/// An element: its attributes, child elements and text, which only FMI 1.0 uses.
+/// An element with its attributes, child elements and text, borrowed from the text of the file.
 #[derive(Debug)]
 pub(crate) struct Element<'a> {
     pub(crate) name: &'a str,
-    /// The first text that is more than white space, unchanged.
+    /// The first text that is not only white space, trimmed; entities are not resolved.
     pub(crate) text: &'a str,
     pub(crate) attributes: Vec<(&'a str, Cow<'a, str>)>,
     pub(crate) children: Vec<Element<'a>>,
@@ -36,8 +36,8 @@ pub(crate) struct Element<'a> {
 }
 
 impl Element<'_> {
-    /// Copies the element and its children out of the text. The reader limits the depth of the elements, and so of this
-    /// recursion.
+    /// Copies the element and its children. The depth of this recursion is limited, because the reader limits that of
+    /// elements.
     pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
         super::Element {
@@ -52,7 +52,7 @@ impl Element<'_> {
     }
 }
 
-/// Tracks the position in a text that is read once from start to end.
+/// The position in a text that is read once from start to end.
 struct Place<'a> {
     text: &'a [u8],
     offset: usize,
@@ -60,6 +60,7 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
+    /// Moves to the byte `offset`, and returns its position. Never moves back.
     fn advance(&mut self, offset: u64) -> Position {
         let end = usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len());
         for byte in self.text.get(self.offset..end).unwrap_or_default() {
@@ -85,8 +86,8 @@ struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    /// Checks that an element at `at`, or `inner` levels below, is not too deep.
-    fn go_down(&self, at: Position, inner: usize) -> Result<(), ParseError> {
+    /// Checks that an element at `at`, `inner` levels below the children of the open element, is not too deep.
+    fn check_depth(&self, at: Position, inner: usize) -> Result<(), ParseError> {
         if self.open.len() + inner >= DEPTH {
             let what = "levels of nested elements";
             return Err(ParseError::Limit { at, what, limit: DEPTH, help: "" });
@@ -94,11 +95,13 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
+    /// Closes the open element.
     fn end(&mut self) -> Result<(), ParseError> {
         // The reader has checked that there is a parent.
         self.open.pop().map_or(Ok(()), |element| self.add(element))
     }
 
+    /// Adds a closed element to its parent, or sets the root; a second root is an error.
     fn add(&mut self, element: Element<'a>) -> Result<(), ParseError> {
         if let Some(parent) = self.open.last_mut() {
             parent.children.push(element);
@@ -111,6 +114,7 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
+    /// Sets the text of the open element, unless it has one.
     fn text(&mut self, text: &'a str) {
         let text = text.trim();
         if let Some(element) = self.open.last_mut().filter(|element| element.text.is_empty()) {
@@ -118,6 +122,7 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// Returns the root at the end of the file; an error if an element is open or there is none.
     fn finish(self, at: Position) -> Result<Element<'a>, ParseError> {
         if let Some(element) = self.open.last() {
             let actual = format!("the end of the file inside <{}>", element.name);
@@ -135,7 +140,7 @@ impl<'a> Tree<'a> {
         offset: usize,
         at: Position,
     ) -> Result<Element<'a>, ParseError> {
-        self.go_down(at, 0)?;
+        self.check_depth(at, 0)?;
         self.elements += 1;
         if exceeds(self.elements, ELEMENTS) {
             return Err(limit(at, "elements", ELEMENTS));
@@ -168,12 +173,13 @@ fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
     ParseError::Limit { at, what, limit, help: HELP }
 }
 
-/// Reads the root element of `text`. Skips annotations of FMI.
+/// Reads the root element of `text`. Skips annotations of FMI that have content.
 pub(crate) fn read(text: &str) -> Result<Element<'_>, ParseError> {
     read_but(text, is_annotation)
 }
 
-/// Reads the root element of `text` without the elements in `skipped`.
+/// Reads the root element of `text`, without elements for which `skipped` is true. An empty-element tag is never
+/// skipped.
 pub(super) fn read_but(
     text: &str,
     skipped: impl Fn(&BytesStart<'_>) -> bool,
@@ -191,7 +197,7 @@ pub(super) fn read_but(
             }
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(tag)) if skipped(&tag) => {
-                tree.go_down(at, 0)?;
+                tree.check_depth(at, 0)?;
                 skip(&mut reader, &tree, at)?;
             }
             Ok(Event::Start(tag)) => {
@@ -212,7 +218,7 @@ pub(super) fn read_but(
     }
 }
 
-/// Skips the content of an element that starts at `at`, up to its end.
+/// Skips the content of an element that starts at `at`, up to its end. The content must be well-formed.
 fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(), ParseError> {
     let mut inner = 1;
     while inner > 0 {
@@ -220,10 +226,10 @@ fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(),
             Err(error) => return Err(ParseError::Xml { at, actual: error.to_string() }),
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(_)) => {
-                tree.go_down(at, inner)?;
+                tree.check_depth(at, inner)?;
                 inner += 1;
             }
-            Ok(Event::Empty(_)) => tree.go_down(at, inner)?,
+            Ok(Event::Empty(_)) => tree.check_depth(at, inner)?,
             Ok(Event::End(_)) => inner -= 1,
             Ok(Event::Eof) => {
                 let actual = "the end of the file inside an annotation".to_owned();
