@@ -50,7 +50,7 @@ impl ModelDescription {
     /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become
     /// indices; each `Alias` becomes a variable after the one that contains it. FMI 1.0: `internal` and
     /// `none` become local, the variability `parameter` becomes a parameter or, without start value, a
-    /// calculated parameter, whatever the causality; `fixed` of an output or local variable becomes
+    /// calculated parameter, for every causality; `fixed` of an output or local variable becomes
     /// `initial`, and `DirectDependency` the dependencies of an output.
     ///
     /// Content that breaks the standard gives a [`Warning`], which states the assumption made, if
