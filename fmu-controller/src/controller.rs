@@ -272,7 +272,8 @@ impl Model for AsoController {
         if let (Some(check), Some(of_direction)) =
             (&self.measurement_check, &direction.measurement_check)
         {
-            check.take_direction(of_direction, &mut direction.values);
+            let design = initial.then_some(&*direction.design);
+            check.take_direction(of_direction, design, &mut direction.values);
         }
         if initial {
             direction.start();

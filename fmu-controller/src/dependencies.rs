@@ -172,8 +172,12 @@ fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
         of_integral_slope(design, i - design.integral_at(0))
     } else {
         let k = i - n - q;
-        let measured = [design.measurements[k].name.clone()].into_iter();
-        let mut groups = vec![(Fixed, measured.chain(names::filtered(design).nth(k)).collect())];
+        let mut observed = vec![design.measurements[k].name.clone()];
+        // A direct term has y_f among the dependencies of the feedback, which D passes on.
+        if design.d.is_none() || design.p_f.is_none() {
+            observed.extend(names::filtered(design).nth(k));
+        }
+        let mut groups = vec![(Fixed, observed)];
         if design.d.is_some() {
             groups.extend(of_feedback(design, kinds_of_feedback(design, has_limits(design))));
         }
@@ -225,13 +229,18 @@ fn operating_command(design: &Design, j: usize) -> Option<String> {
     names::operating(design, "u_op", design.actuators.len()).nth(j)
 }
 
+/// The names `y_op`, where the design has an operating point.
+fn operating_measurements(design: &Design) -> impl Iterator<Item = String> {
+    names::operating(design, "y_op", design.measurements.len())
+}
+
 /// The dependencies of the initial innovations.
 fn of_innovations(design: &Design) -> Vec<String> {
     let mut names = measurements(design);
     names.extend(channels("x_hat_0", design.states.len()));
     names.extend(whole("C", &design.c));
     names.extend(operating_states(design));
-    names.extend(names::operating(design, "y_op", design.measurements.len()));
+    names.extend(operating_measurements(design));
     names
 }
 
@@ -287,6 +296,9 @@ fn of_references(design: &Design) -> Vec<String> {
 pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     let mut names = of_initial_deviation(design, j);
     names.extend(operating_command(design, j));
+    if may_start_at_rest(design) {
+        names.extend(measurements(design));
+    }
     by_schedule(design, names)
 }
 
@@ -344,13 +356,25 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     if i >= design.transfer_at(0) {
         return Vec::new();
     }
+    let may_rest = may_start_at_rest(design);
+    let mut names = if may_rest { measurements(design) } else { Vec::new() };
     if i >= design.integral_at(0) {
-        return names::starts(design).nth(n + q + i - design.integral_at(0)).into_iter().collect();
+        names.extend(names::starts(design).nth(n + q + i - design.integral_at(0)));
+        return names;
     }
     if i >= n + q {
-        return vec![design.measurements[i - n - q].name.clone()];
+        let k = i - n - q;
+        names.push(design.measurements[k].name.clone());
+        if design.checks_measurements() {
+            // Its operating point replaces a measurement that is not used.
+            names.extend(operating_measurements(design).nth(k));
+        }
+        return if may_rest { by_schedule(design, names) } else { names };
     }
-    let mut names: Vec<_> = names::starts(design).nth(i).into_iter().collect();
+    names.extend(names::starts(design).nth(i));
+    if may_rest && i < n {
+        names.extend(operating_states(design).nth(i));
+    }
     if is_current(design) {
         names.extend(of_innovations(design));
         if i < n {
@@ -362,9 +386,14 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
             // rho and delta of this fault.
             names.extend(sliding_mode(design).skip(i - n).step_by(q));
         }
-        return by_schedule(design, names);
     }
-    names
+    if may_rest || is_current(design) { by_schedule(design, names) } else { names }
+}
+
+/// Whether a controller may rest at sample 0: a last value of a measurement may not be used for one sample.
+fn may_start_at_rest(design: &Design) -> bool {
+    let is_lost = |period| design.measurements.iter().any(|y| y.most_held(period) == Some(0));
+    design.sample_time.is_some_and(is_lost)
 }
 
 /// The dependencies of the initial value of element `i` of z'.
@@ -405,7 +434,7 @@ fn of_initial_state_slope(design: &Design, i: usize) -> Vec<String> {
 
 fn of_initial_integral_slope(design: &Design, k: usize) -> Vec<String> {
     let mut names = measurements(design);
-    names.extend(names::operating(design, "y_op", design.measurements.len()));
+    names.extend(operating_measurements(design));
     names.extend(design.h.iter().flat_map(|h| row("H", h, k)));
     let referred = names::operating(design, "r_op", design.references.len());
     names.push(design.references[k].name.clone());

@@ -129,12 +129,22 @@ impl MeasurementCheck {
         }
     }
 
-    /// Takes a direction in the space of the measurements: nothing depends on one that is not used.
-    pub(crate) fn take_direction(&self, direction: &Self, values: &mut Values) {
+    /// Sets the measurements of `values` to the components of a direction. Nothing depends on a measurement that is not
+    /// used; in initialization mode its operating point replaces it, whose component `initial` has.
+    pub(crate) fn take_direction(
+        &self,
+        direction: &Self,
+        initial: Option<&Design>,
+        values: &mut Values,
+    ) {
+        let initial = initial.filter(|design| design.has_operating_point());
         for k in 0..self.y.len() {
-            let is_used = self.is_in_range(k, self.y[k]);
-            values.y[k] = if is_used { direction.y[k] } else { 0.0 };
-            values.y_slopes[k] = if is_used { direction.y_slopes[k] } else { 0.0 };
+            (values.y[k], values.y_slopes[k]) = if self.is_in_range(k, self.y[k]) {
+                (direction.y[k], direction.y_slopes[k])
+            } else {
+                let operating = initial.and_then(|design| design.measurements[k].operating);
+                (operating.unwrap_or_default(), 0.0)
+            };
         }
     }
 

@@ -92,10 +92,12 @@ fn elements(design: &KalmanDesign) -> Vec<Element> {
 fn estimates(design: &KalmanDesign) -> Vec<Variable> {
     let (n, q) = (design.states.len(), design.fault_states());
     let inputs = design.measurements.iter().chain(&design.commands);
+    // Sample 0, at the start time, corrects the initial estimates by the method.
     let known: Vec<String> = inputs
         .map(|signal| signal.name.clone())
         .chain(channels("x_hat_0", n))
         .chain(channels("f_hat_0", q))
+        .chain(["time", "method"].map(str::to_owned))
         .collect();
     let output = |variable: Variable| variable.output(&[]).discrete().initially(known.clone());
     let mut all = Vec::new();

@@ -172,7 +172,8 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
             for (kind, known) in
                 groups.iter().flat_map(|(kind, on)| on.iter().map(|on| (*kind, on)))
             {
-                listed.insert((unknown.to_owned(), known.clone()), kind);
+                let former = listed.insert((unknown.to_owned(), known.clone()), kind);
+                assert_eq!(former, None, "{of:?}: {unknown} lists {known} twice");
             }
         };
         for j in 0..of.0[1] {

@@ -1,6 +1,7 @@
 //! Measurements that are outside of their range, against runs of the controller with other inputs or another start.
 
 use super::*;
+use crate::dependencies;
 
 /// The small design with a filter and more entries of its measurement; `sampled` is the start of its file.
 fn held(sampled: &str, entries: &str) -> AsoController {
@@ -149,6 +150,47 @@ fn nothing_depends_on_a_measurement_that_is_not_used() {
         let expected = if is_used { 0.5 } else { 0.0 };
         assert!((slope(1.0) - slope(0.0) - expected).abs() < 1e-12, "{y}");
     }
+}
+
+#[test]
+fn a_filter_starts_at_the_operating_point_where_its_measurement_is_not_used() {
+    for sampled in ["", SAMPLED] {
+        for (y, start, by_operating_point) in [(0.4_f64, 0.4_f64, 0.0), (1e300, 0.5, 1.0)] {
+            let mut model = held(sampled, "range = [-2.0, 2.0]");
+            model.design.actuators[0].operating = Some(0.0);
+            model.design.measurements[0].operating = Some(0.5);
+            model.measurement_check.as_mut().unwrap().y[0] = y;
+            let model = ready(model);
+            assert_eq!(model.values.z[3].to_bits(), start.to_bits(), "{sampled:?} {y}");
+            assert_eq!(dependencies::of_initial_estimate(&model.design, 3), ["x", "y_op"]);
+            let derivative = |operating: f64| {
+                let mut direction = model.clone();
+                direction.design.measurements[0].operating = Some(operating);
+                model.differentiate(&At::Initialization, &mut direction).unwrap();
+                direction.values.z[3]
+            };
+            let actual = derivative(1.0) - derivative(0.0);
+            assert!((actual - by_operating_point).abs() < 1e-12, "{sampled:?} {y}: {actual}");
+        }
+    }
+}
+
+#[test]
+fn a_controller_that_may_rest_at_sample_0_depends_on_its_measurement_and_operating_point() {
+    let with_prediction = SAMPLED.replace("current", "prediction");
+    let mut model = held(&with_prediction, "range = [-2.0, 2.0]\nlongest_hold = 0.1");
+    model.design.actuators[0].operating = Some(0.0);
+    model.design.states[0].operating = Some(0.5);
+    model.x_hat_0[0] = 0.25;
+    for (y, is_lost) in [(0.4, false), (1e300, true)] {
+        model.measurement_check.as_mut().unwrap().y[0] = y;
+        model.initialize(&Experiment::default()).unwrap();
+        let start: f64 = if is_lost { 0.5 } else { 0.25 };
+        assert_eq!(model.values.z[0].to_bits(), start.to_bits(), "{y}");
+    }
+    let listed = dependencies::of_initial_estimate(&model.design, 0);
+    assert_eq!(listed, ["x", "x_hat_0[1]", "x_op[1]"]);
+    assert!(dependencies::of_initial_command(&model.design, 0).contains(&"x".to_owned()));
 }
 
 #[test]
