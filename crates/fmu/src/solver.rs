@@ -45,4 +45,5 @@ mod tests;
 
 pub use crossing::{Crossing, Quartic, locate, search};
 pub use dormand_prince::{Step, Vector};
+pub(crate) use integrator::TOLERANCE;
 pub use integrator::{Integrator, Reached, System};

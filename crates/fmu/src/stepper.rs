@@ -2,7 +2,7 @@
 
 use crate::interface::Interface;
 use crate::model::{Failure, Model, Step};
-use crate::solver::{Integrator, Reached, System};
+use crate::solver::{Integrator, Reached, System, TOLERANCE};
 use fmu_description::DefaultExperiment;
 
 /// Most events in one communication step.
@@ -30,7 +30,7 @@ pub(crate) struct Stop {
 pub(crate) struct Stepper {
     integrator: Integrator,
     /// The relative tolerance if the importer defines none.
-    tolerance: Option<f64>,
+    tolerance: f64,
     /// The longest communication step in s.
     longest: f64,
     has_equations: bool,
@@ -46,7 +46,7 @@ impl Stepper {
         let nominals = interface.nominals();
         let indicators = interface.event_indicators.unwrap_or_default();
         Self {
-            tolerance: experiment.tolerance,
+            tolerance: experiment.tolerance.unwrap_or(TOLERANCE),
             longest: LONGEST * unit,
             has_equations: !nominals.is_empty() || indicators > 0,
             state: vec![0.0; nominals.len()],
@@ -137,9 +137,7 @@ impl Stepper {
         tolerance: Option<f64>,
         body: impl FnOnce(&mut Self, &mut Equations<'_, M>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        if let Some(tolerance) = tolerance.or(self.tolerance) {
-            self.integrator.set_tolerance(tolerance);
-        }
+        self.integrator.set_tolerance(tolerance.unwrap_or(self.tolerance));
         let mut inputs = std::mem::take(&mut self.inputs);
         interface.read_interpolated(model, &mut inputs);
         let mut equations = Equations { model, interface, start: step.start, inputs: &inputs };

@@ -7,7 +7,7 @@ use super::{Crossing, Step, search};
 use crate::model::Failure;
 
 /// Relative tolerance unless [`Integrator::set_tolerance`] sets another one.
-const TOLERANCE: f64 = 1e-6;
+pub(crate) const TOLERANCE: f64 = 1e-6;
 
 /// Absolute tolerance of a state, as part of the relative tolerance and the nominal value of the state:
 /// the recommendation of FMI 2.0.5, section 2.1.6.

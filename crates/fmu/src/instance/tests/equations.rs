@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::callbacks::Callbacks;
 use crate::instance::Instance;
 use crate::room::room_of;
-use crate::{Event, Experiment, Failure, Log, Model, Variables};
+use crate::{Event, Experiment, Failure, Log, Model, Simulation, Variables};
 use fmu_description::abi::Status;
 use fmu_description::call_order::{Function, InterfaceType};
 
@@ -169,6 +169,39 @@ fn a_restored_state_continues_with_the_same_bits() {
         *place = instance.core.model.x.to_bits();
     }
     assert_eq!(bits[0], bits[1]);
+}
+
+/// x' = -x.
+#[derive(Clone, Variables, Serialize, Deserialize)]
+struct Decaying {
+    /// State
+    #[fmu(output, start = 1)]
+    x: f64,
+    /// Its derivative
+    #[fmu(derivative_of = x)]
+    rise: f64,
+}
+
+#[fmu::model]
+impl Model for Decaying {
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+        self.rise = -self.x;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_run_without_a_tolerance_does_not_use_the_one_of_the_run_before() {
+    let mut simulation = Simulation::<Decaying>::new(Path::new("")).unwrap();
+    let mut run = |tolerance| {
+        simulation.model_mut().x = 1.0;
+        simulation.start(Experiment { tolerance, ..Experiment::default() }).unwrap();
+        simulation.step(1.0).unwrap();
+        simulation.model().x.to_bits()
+    };
+    let bits = run(None);
+    assert_ne!(run(Some(1e-10)), bits);
+    assert_eq!(run(None), bits);
 }
 
 #[test]

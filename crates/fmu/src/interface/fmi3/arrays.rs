@@ -147,7 +147,7 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
     kind && alike == *other
 }
 
-/// Returns the start values of the elements, if they have any.
+/// Returns the start values of the elements; `None` for elements without start values, texts and binaries.
 pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
     let real = |variable: &ScalarVariable| variable.kind.as_real().and_then(|real| real.start);
     let integer =
@@ -163,7 +163,6 @@ pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
         kind if kind.as_real().is_some() => {
             elements.iter().map(real).collect::<Option<_>>().map(Elements::Real)
         }
-        Kind::Enumeration(_) => None,
         kind if kind.as_integer().is_some() => {
             elements.iter().map(integer).collect::<Option<_>>().map(Elements::Integer)
         }
@@ -173,6 +172,8 @@ pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
 
 #[cfg(test)]
 mod tests {
+    use fmu_description::IntegerType;
+
     use super::*;
 
     fn variables(names: &[&str]) -> Vec<ScalarVariable> {
@@ -211,6 +212,20 @@ mod tests {
         ] {
             assert!(blocks_of(names).iter().all(|block| block.2.is_empty()), "{names:?}");
         }
+    }
+
+    #[test]
+    fn each_element_of_an_array_of_enumerations_has_its_start_value() {
+        let mut modes = variables(&["mode[1]", "mode[2]"]);
+        for (mode, start) in modes.iter_mut().zip([2, 1]) {
+            mode.kind = Kind::Enumeration(IntegerType {
+                declared_type: Some("Mode".to_owned()),
+                start: Some(start),
+                ..IntegerType::default()
+            });
+        }
+        assert_eq!(blocks(&modes, |_| false).len(), 1);
+        assert_eq!(starts(&modes), Some(Elements::Integer(vec![2, 1])));
     }
 
     #[test]
