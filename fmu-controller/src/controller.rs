@@ -27,8 +27,9 @@ use crate::validity::MeasurementCheck;
 use aso_controller::Design;
 use aso_controller::design::Refusal;
 
-/// The part of the range of an actuator by which a free command passes a limit before that is an
-/// event: no event indicator is zero after an event, and rounding causes no second event.
+/// The part of the range of an actuator by which a free command passes a limit, and the part of a command by which a
+/// loss passes its fraction, before that is an event: no event indicator is zero after an event, and rounding causes no
+/// second event.
 const HYSTERESIS: f64 = 1e-9;
 
 /// A fault-tolerant controller with an augmented state observer, for a linear plant of any size.
@@ -44,16 +45,17 @@ pub struct AsoController {
     pub(crate) x_i_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
     pub(crate) values: Values,
-    /// The operating point of `design` at the start of the run.
+    /// The operating point of `design`; with a schedule, of `current`.
     operating_point: OperatingPoint,
     /// The signals as deviations from the operating point.
     pub(crate) deviations: Signals,
-    /// z' and u'; see `with_slopes`.
+    /// z'; see `with_slopes`.
     pub(crate) z_slopes: Vec<f64>,
     /// f_hat' of a design with a direct term; empty in others.
     pub(crate) f_slopes: Vec<f64>,
+    /// u'.
     pub(crate) u_slopes: Vec<f64>,
-    /// Whether z', u' and E_hat' belong to `deviations` and `mode`.
+    /// Whether z', f_hat', u' and E_hat' belong to `deviations` and `mode`.
     #[serde(skip)]
     has_slopes: bool,
     pub(crate) compensate: bool,
@@ -64,31 +66,32 @@ pub struct AsoController {
     /// The mode of u and z'. Whether it compensates is decided at the start, at the end of each step
     /// and at events; in a sampled controller at each sample.
     mode: Mode,
-    /// Model exchange: a channel reaches or leaves a limit at events only.
+    /// Whether a channel reaches or leaves a limit at events only, as in model exchange.
     frozen: bool,
     /// `None` for a continuous controller.
     sampler: Option<Sampler>,
     /// `None` without a detection of faults.
     detector: Option<Detector>,
-    /// `None` if every measurement is used; `values` has those that are.
+    /// `None` if every measurement is used; otherwise the inputs of the importer, and `values` has what replaces them.
     measurement_check: Option<MeasurementCheck>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,
     /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
     /// without a schedule.
     current: Option<Box<Design>>,
-    /// The scheduling variable as an input with its slope; the value that selected `current`, and this value
-    /// held within the grid.
+    /// The scheduling variable if it is an input, and its slope.
     pub(crate) schedule_input: f64,
     pub(crate) schedule_slope: f64,
+    /// The value of the scheduling variable for which `current` was computed.
     schedule_value: f64,
+    /// The same value held within the grid.
     pub(crate) schedule_at: f64,
     /// Co-simulation of a continuous controller with a schedule: the exporter integrates its equations.
     is_integrated: bool,
     /// Whether a value outside of the schedule was reported.
     outside_reported: bool,
     log: Log,
-    /// Derived from `design` in the first step, also after a state was read from bytes.
+    /// Made from `design` in the first step, and again after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
     /// Space for the derivatives of the interpolated design with respect to time, and of the signals.
@@ -229,8 +232,8 @@ impl Model for AsoController {
         Ok(())
     }
 
-    /// The matrices of a continuous controller with a schedule move during the step, which then has no closed
-    /// form: the exporter integrates the derivatives.
+    /// Returns [`Failure::Unsolved`] for a continuous controller with a schedule: its matrices change during the step,
+    /// which has no closed form, so the exporter integrates the derivatives.
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         if self.sampler.is_some() {
             self.sample(step.start, step.end());
@@ -243,8 +246,8 @@ impl Model for AsoController {
         self.integrate(step)
     }
 
-    /// The samples of a sampled controller are events. Those that no event has taken are taken at the start
-    /// of the next step.
+    /// Stops at the next sample of a sampled controller, which is an event. A sample at the start that no event has
+    /// taken is taken first. A continuous controller makes the whole step.
     fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
         if self.sampler.is_none() {
             return self.step(step).map(|()| None);
@@ -321,8 +324,8 @@ impl Model for AsoController {
         Some(&mut self.log)
     }
 
-    /// None for a continuous controller with a detection, as the states of its filter are integrated with the
-    /// observer's, and for one that checks its measurements at communication points.
+    /// `None` for a continuous controller with a detection, because the states of its filter are integrated with those
+    /// of the observer, and for one that checks its measurements, which it does at communication points.
     fn model_exchange(&self) -> Option<ModelExchange> {
         let is_stepped = self.detector.is_some() || self.measurement_check.is_some();
         if is_stepped && self.sampler.is_none() {

@@ -5,8 +5,8 @@
 //! time nothing depends on `compensate` or `time`. A command with limits is not linear in what it
 //! depends on.
 //!
-//! In a continuous controller with a schedule everything but y_f' depends on the scheduling variable, too, with
-//! which the factors change.
+//! In a continuous controller with a schedule everything but y_f' and u_t' depends on the scheduling variable, too,
+//! with which the factors change.
 //!
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
 //! so at a point in time they depend on nothing. Its initial values are the values of sample 0.
@@ -35,7 +35,7 @@ fn measurements(design: &Design) -> Vec<String> {
     design.measurements.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// The references that commands depend on: those with a feedforward.
+/// The references that commands depend on: all of them with a feedforward, none without.
 fn fed_forward(design: &Design) -> Vec<String> {
     let references = if design.n_r.is_some() { &design.references[..] } else { &[] };
     references.iter().map(|signal| signal.name.clone()).collect()
@@ -49,7 +49,7 @@ fn observed(design: &Design) -> Vec<String> {
     }
 }
 
-/// The kinds of dependency of a command on x_hat and on f_hat.
+/// The kinds of dependency of a command, `limited` or not, on x_hat and on f_hat.
 fn kinds_of_feedback(design: &Design, limited: bool) -> [DependencyKind; 2] {
     match (limited, !design.is_reconfigurable()) {
         (true, _) => [Dependent, Dependent],
@@ -78,7 +78,7 @@ fn of_feedback(design: &Design, kinds: [DependencyKind; 2]) -> Vec<Group> {
     groups
 }
 
-/// u_t of the commands with limits, or of those without.
+/// The dependencies on u_t of the commands with limits, or of those without; `None` if there is none.
 fn transfers(design: &Design, limited: bool) -> Option<Group> {
     let mut names = Vec::new();
     for (j, name) in names::transfers(design).enumerate() {
@@ -89,7 +89,7 @@ fn transfers(design: &Design, limited: bool) -> Option<Group> {
     (!names.is_empty()).then(|| (kinds_of_feedback(design, limited)[0], names))
 }
 
-/// What command `j` is computed from: of u_t only its own.
+/// The dependencies of command `j`, whose only u_t is its own: those of [`of_law`] and this u_t.
 fn of_feedback_of(design: &Design, j: usize, kinds: [DependencyKind; 2]) -> Vec<Group> {
     let mut groups = of_law(design, kinds);
     let kind = if kinds[0] == Fixed { Constant } else { kinds[0] };
@@ -97,7 +97,7 @@ fn of_feedback_of(design: &Design, j: usize, kinds: [DependencyKind; 2]) -> Vec<
     groups
 }
 
-/// The dependency on what the innovation is computed from, by a direct term.
+/// The dependency by a direct term on the signals of the innovation; `None` without a direct term.
 fn direct(design: &Design, kind: DependencyKind) -> Option<Group> {
     design.p_f.as_ref().map(|_| (kind, observed(design)))
 }
@@ -125,7 +125,7 @@ pub(crate) fn of_loss(design: &Design, loss: &Loss) -> Vec<Group> {
     groups_by_schedule(design, of_feedback_of(design, loss.actuator, [Dependent, Dependent]))
 }
 
-/// The name of u_t of command `j`.
+/// The name of u_t of command `j`, in a list.
 fn transfer(design: &Design, j: usize) -> Vec<String> {
     vec![channel("u_t", j, design.transfers())]
 }
@@ -141,7 +141,8 @@ pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     }
 }
 
-/// `groups` of a controller that uses every measurement; in others the factors change when a measurement is held.
+/// `groups`, without the kinds of constant factors in a controller that checks measurements: its factors change when a
+/// measurement is held.
 fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
     if design.checks_measurements() {
         for (kind, _) in &mut groups {
@@ -153,7 +154,7 @@ fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
     groups
 }
 
-/// The dependencies of element `i` of z' while the matrices stay.
+/// The dependencies of element `i` of z' with constant matrices and every measurement in use.
 fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
@@ -208,14 +209,17 @@ fn of_integral_slope(design: &Design, k: usize) -> Vec<Group> {
     groups
 }
 
+/// The names of the elements of one row of a matrix.
 fn row<'a>(name: &'a str, matrix: &'a Matrix, row: usize) -> impl Iterator<Item = String> + 'a {
     (0..matrix.columns).map(move |column| matrix.element(name, row * matrix.columns + column))
 }
 
+/// The names of all elements of a matrix.
 fn whole<'a>(name: &'a str, matrix: &'a Matrix) -> impl Iterator<Item = String> + 'a {
     (0..matrix.values.len()).map(move |k| matrix.element(name, k))
 }
 
+/// What decides whether the fault is compensated at the start.
 fn switches() -> Vec<String> {
     ["time", "compensate", "t_on"].map(str::to_owned).to_vec()
 }
@@ -225,6 +229,7 @@ fn operating_states(design: &Design) -> impl Iterator<Item = String> {
     names::operating(design, "x_op", design.states.len())
 }
 
+/// The name of `u_op` of command `j`, where the design has an operating point.
 fn operating_command(design: &Design, j: usize) -> Option<String> {
     names::operating(design, "u_op", design.actuators.len()).nth(j)
 }
@@ -244,6 +249,7 @@ fn of_innovations(design: &Design) -> Vec<String> {
     names
 }
 
+/// Whether the controller is sampled and its estimator uses the measurements of the same sample.
 fn is_current(design: &Design) -> bool {
     design.estimator == Some(Estimator::Current)
 }
@@ -280,7 +286,7 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     names
 }
 
-/// The bounds of a sliding-mode law.
+/// The names of rho and delta of a sliding-mode law, if the design has one.
 fn sliding_mode(design: &Design) -> impl Iterator<Item = String> {
     let count = design.sliding_mode.as_ref().map_or(0, |law| law.rho.len());
     channels("rho", count).chain(channels("delta", count))
@@ -288,8 +294,8 @@ fn sliding_mode(design: &Design) -> impl Iterator<Item = String> {
 
 /// The dependencies of the initial deviations of the references from the operating point.
 fn of_references(design: &Design) -> Vec<String> {
-    let referred = design.references.iter().map(|signal| signal.name.clone());
-    referred.chain(names::operating(design, "r_op", design.references.len())).collect()
+    let references = design.references.iter().map(|signal| signal.name.clone());
+    references.chain(names::operating(design, "r_op", design.references.len())).collect()
 }
 
 /// The dependencies of the initial value of command `j`.
@@ -302,8 +308,8 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     by_schedule(design, names)
 }
 
-/// `groups` of a controller without a schedule; with one, all names and the scheduling variable in a group of
-/// dependencies that are not linear.
+/// Same as [`groups_by_validity`] without a schedule; with one, a single group of dependencies that are not linear,
+/// with all names and the scheduling variable.
 pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Group> {
     if design.schedule.is_none() {
         return groups_by_validity(design, groups);
@@ -312,8 +318,7 @@ pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Gro
     vec![(Dependent, by_schedule(design, names))]
 }
 
-/// `names` of a controller without a schedule; with one, its variable replaces the matrices, which are
-/// no parameters then.
+/// `names`; with a schedule its variable replaces the matrices, which are no parameters then.
 fn by_schedule(design: &Design, mut names: Vec<String>) -> Vec<String> {
     let Some(schedule) = &design.schedule else { return names };
     let elements =

@@ -1,18 +1,17 @@
 //! Detection and isolation of faults: residuals, tests, the decision.
 //!
-//! The residuals follow the measurements and the commands that are really applied, whatever the observer
-//! does. A sampled controller computes and tests them in each sample. In a continuous one the filter is part
-//! of the piecewise linear system of the observer (`observer.rs`), stepped as exactly, and its residuals
-//! are averages over intervals of the detection's own sample time, which does not depend on the
-//! communication step:
+//! The residuals follow from the measurements and the commands that are really applied, not from the observer. A
+//! sampled controller computes and tests them in each sample. In a continuous one the filter is part of the piecewise
+//! linear system of the observer (`observer.rs`), stepped as exactly as the observer, and its residuals are averages
+//! over intervals of the detection's own sample time, which does not depend on the communication step:
 //!
 //! ```text
 //! [z; x_r; q]' = [M, 0, 0; B_u K, A, 0; D_u K, C, 0] [z; x_r; q] + [N; B_u S + B_y Y; D_u S + D_y Y] v
 //! r[k] = q(t_k) / T^(1/2),  q(t_k) is then set to 0
 //! ```
 //!
-//! v = [y; r; w], w the commands of the channels at a limit, u = K z + S v, y = Y v. The sample at the start of a run, which a
-//! sampled controller has, is not tested.
+//! v = [y; r; w], w the commands of the channels at a limit, u = K z + S v, y = Y v. A sampled controller also has a
+//! sample at the start of a run, which is not tested.
 
 mod decision;
 mod tests_of_residuals;
@@ -31,7 +30,7 @@ use tests_of_residuals::TestState;
 
 /// The part of the sample time by which a sample may be early: an importer adds up its steps with rounding.
 const TOLERANCE: f64 = 1e-6;
-/// Times between samples are rounded to this part of the sample time, so that equal ones are equal bits.
+/// Times between samples are rounded to this part of the sample time, so that equal times have equal bits.
 const RESOLUTION: f64 = 1.0 / 1_073_741_824.0;
 /// The most samples in one step.
 const MOST_SAMPLES: f64 = 1e7;
@@ -41,8 +40,9 @@ const MOST_SAMPLES: f64 = 1e7;
 pub(crate) struct Detector {
     /// [x_r; q], q in a continuous controller only.
     state: Vec<f64>,
-    /// Start of the run in s, and the number of samples since.
+    /// Start of the run, or end of the last rest, in s.
     start: f64,
+    /// Number of samples since.
     samples: f64,
     pub(crate) residuals: Vec<f64>,
     pub(crate) statistics: Vec<f64>,
@@ -72,7 +72,7 @@ pub(crate) struct Stretch<'a> {
     pub(crate) mode: Mode,
     /// The measurements at the start of the step, and their slopes.
     pub(crate) y: [&'a [f64]; 2],
-    /// The same of the references.
+    /// The references at the start of the step, and their slopes.
     pub(crate) r: [&'a [f64]; 2],
     /// Start of the step.
     pub(crate) start: f64,
@@ -118,7 +118,7 @@ impl Detector {
         self.decision = Decision::default();
     }
 
-    /// Rests at `time` in s: the next sample is the first one after a start from the operating point. The decision stays.
+    /// Restarts at `time` in s from the operating point. Residuals and statistics become 0; the decision stays.
     pub(crate) fn rest(&mut self, time: f64) {
         self.state.fill(0.0);
         (self.start, self.samples) = (time, 0.0);
@@ -127,7 +127,8 @@ impl Detector {
         self.tests.iter_mut().for_each(TestState::restart);
     }
 
-    /// One sample of a sampled controller at `time`, with the deviations of the commands applied from it on.
+    /// Takes a sample of a sampled controller at `time` in s, with the deviations of the measurements `y` and of the
+    /// commands `u` that are applied from this sample on. The first sample after a start is not tested.
     pub(crate) fn sample(&mut self, detection: &DetectionDesign, u: &[f64], y: &[f64], time: f64) {
         let first = self.samples < 1.0;
         if !first {
@@ -149,7 +150,7 @@ impl Detector {
         }
     }
 
-    /// Follows a part of a step of a continuous controller, with the samples in it.
+    /// Advances the filter over a part of a step of a continuous controller, and takes the samples in it.
     pub(crate) fn follow(
         &mut self,
         design: &Design,
@@ -187,7 +188,7 @@ impl Detector {
         Ok(())
     }
 
-    /// Advances [z; x_r; q] by `size` s, from `at` s after the start of the part.
+    /// Advances [z; x_r; q], in `before`, by `size` s from `at` s after the start of the part.
     fn propagate(
         &mut self,
         design: &Design,
@@ -217,12 +218,13 @@ impl Detector {
         Ok(())
     }
 
-    /// Tests the residuals at `time`.
+    /// Tests the residuals at `time` in s, unless it is before `detect_from`, and decides. Clears sums, windows and
+    /// decision first if a reset is asked for.
     fn decide(&mut self, detection: &DetectionDesign, time: f64) {
         if self.reset {
             self.clear();
         }
-        // With the rounding of a clock that an importer adds up.
+        // An importer adds up its steps with rounding.
         if time < self.start + detection.from - 8.0 * f64::EPSILON * time.abs() {
             return;
         }

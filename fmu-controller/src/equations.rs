@@ -1,7 +1,7 @@
 //! The equations of the controller, written once for plain and for dual numbers.
 //!
-//! With z = [x_hat; f_hat; y_f; x_i; u_t], measurements y, references r and the command u that is really applied (equations
-//! (1), (2), (4), (5), (18) of Patton and Klinkhieo (2009) in the general form)
+//! With z = [x_hat; f_hat; y_f; x_i; u_t], measurements y, references r and the command u that is really applied
+//! (equations (1), (2), (4), (5), (18) of Patton and Klinkhieo (2009) in the general form)
 //!
 //! ```text
 //! e      = y - C x_hat                                the innovation
@@ -44,8 +44,8 @@
 //! u_t' = -w u_t
 //! ```
 //!
-//! When the law changes (compensation, actuators that are gone, fall-back), u_t becomes the distance of the last commands
-//! from those of the new law, so that they start where they are.
+//! When the law changes (compensation, actuators that are gone, fall-back), u_t becomes the distance of the last
+//! commands from those of the new law, so that the commands do not jump.
 //!
 //! All signals, limits included, are deviations from the operating point, which is
 //! zero where the design states none. A sampled controller has the same terms (`sampled.rs`).
@@ -107,7 +107,7 @@ impl<'a, D: Number> Equations<'a, D> {
         Self { design, mode, states: states.len(), faults: faults.len(), filters, integrals }
     }
 
-    /// z as its parts.
+    /// Splits z into its parts.
     #[inline]
     pub(crate) fn estimate(self, z: D::In<'_, [f64]>) -> Estimate<'_, D> {
         let faults = self.states..self.states + self.faults;
@@ -121,7 +121,7 @@ impl<'a, D: Number> Equations<'a, D> {
         }
     }
 
-    /// The signals as they are now.
+    /// The present values of the signals on the right-hand sides.
     #[inline]
     pub(crate) fn knowns<'b>(self, signals: &'b D::Out<'_, Signals>) -> Knowns<'b, D> {
         let signals = D::read(signals);
@@ -134,7 +134,8 @@ impl<'a, D: Number> Equations<'a, D> {
         }
     }
 
-    /// Computes e, the free commands and z' from z, y and r. The commands at a limit are in u already.
+    /// Computes e, the estimates of a design with a direct term, the free commands and z' from z, y and r. The commands
+    /// at a limit must be in u already.
     pub(crate) fn evaluate(
         self,
         signals: &mut D::Out<'_, Signals>,
@@ -184,8 +185,8 @@ impl<'a, D: Number> Equations<'a, D> {
         observed - self.product(|design| design.c.row(k), x_hat)
     }
 
-    /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r + `stuck` + u_t, the second term while compensating; limits
-    /// ignored.
+    /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r + `stuck` + u_t without limits; the second term while
+    /// compensating, the others where the design states their matrix.
     #[inline]
     pub(crate) fn free_command(
         self,
@@ -228,7 +229,7 @@ impl<'a, D: Number> Equations<'a, D> {
         fault
     }
 
-    /// A row of a matrix times f_hat.
+    /// A row of a matrix times f_hat, which depends on z and y in a design with a direct term.
     #[inline]
     fn product_with_faults(
         self,
@@ -253,7 +254,8 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - D u - y_f); x_i'; -w u_t], the
-    /// second part 0 unless estimating.
+    /// second part 0 unless estimating. In a sampled controller, whose y is without D u, these are the terms of the
+    /// prediction.
     pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
         let Knowns { z: Estimate { x_hat, f_hat, y_f, u_t, .. }, y, e, u, .. } = knowns;
         let design = |matrix: fn(&Design) -> &Matrix| D::part(self.design, matrix);
@@ -277,7 +279,7 @@ impl<'a, D: Number> Equations<'a, D> {
             D::add_product::<false>(z_slopes, self.states, design(|design| &design.l_f), e);
         }
         let w = D::part(self.design, |design| design.filter.as_deref().unwrap_or_default());
-        // The measurements of a sampled controller are without D u already.
+        // D u was removed from the measurements of a sampled controller.
         let Design { d, sample_time, .. } = D::values(self.design);
         let has_feedthrough = d.is_some() && sample_time.is_none();
         for (k, w) in D::list(w).enumerate() {
@@ -372,8 +374,8 @@ impl<'a, D: Number> Equations<'a, D> {
 }
 
 impl Mode {
-    /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
-    /// (deviations) is beyond that limit.
+    /// The same mode with other channels at a limit: those whose free command at `z` and the inputs y and r
+    /// (deviations) is beyond the limit, and whose actuator is not gone.
     pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
         let mut mode = self;
         (mode.lower, mode.upper) = (0, 0);
@@ -390,7 +392,7 @@ impl Mode {
     }
 }
 
-/// A row of a matrix that a design may state.
+/// A row of a matrix; empty if the design does not state the matrix.
 fn row(matrix: Option<&Matrix>, row: usize) -> &[f64] {
     matrix.map_or(&[], |matrix| matrix.row(row))
 }

@@ -24,8 +24,9 @@ pub(crate) struct Loss {
     pub(crate) actuator: usize,
     /// u_e.
     least_command: f64,
-    /// E_hat, and its derivative with respect to time.
+    /// E_hat.
     pub(crate) estimate: f64,
+    /// The derivative of E_hat with respect to time.
     pub(crate) slope: f64,
 }
 
@@ -49,12 +50,13 @@ impl Loss {
         all
     }
 
-    /// The estimate of its fault: an element of `f_hat` in a design with a direct term, else of z behind `n` states.
+    /// The estimate of its fault: an element of `f_hat`, or, if `f_hat` is empty (no direct term), the element of `z`
+    /// after `n` states.
     pub(crate) fn fault_of(&self, f_hat: &[f64], z: &[f64], n: usize) -> f64 {
         *f_hat.get(self.fault).unwrap_or(&z[n + self.fault])
     }
 
-    /// `E_hat = -u f_hat / (u^2 + u_e^2)` of a command and an estimated fault.
+    /// E_hat = -u f_hat / (u^2 + u_e^2) for a command and an estimated fault.
     pub(crate) fn effectiveness_lost<D: Number>(&self, u: D, f_hat: D) -> D {
         let scale = (u * u + self.least_command * self.least_command).recip();
         -(u * scale) * f_hat

@@ -1,4 +1,4 @@
-//! Which of the linear systems is in force.
+//! The mode: which of the linear systems is in force.
 
 use serde::{Deserialize, Serialize};
 
@@ -54,8 +54,9 @@ impl Mode {
         (0..64).filter(move |j| self.is_gone(*j))
     }
 
-    /// The gains in force in place of those of the intact plant: the fall-back, those without the actuators
-    /// that are gone, or where the design has neither, those without the first of them.
+    /// The gains in force in place of those of the intact plant: the fall-back, those without the actuators that are
+    /// gone, or, where the design has neither, those without the first of them. `None` if the gains of the intact plant
+    /// are in force.
     pub(crate) fn gains(self, design: &Design) -> Option<GainSet<'_>> {
         if self.fallen_back {
             return design.fallback.as_ref().map(GainSet::Fallback);
@@ -85,14 +86,15 @@ impl Mode {
         self.is_at(0, j) || self.is_at(1, j) || self.is_gone(j)
     }
 
-    /// Whether the equations of both modes have the same matrices.
+    /// Whether the equations of both modes have the same matrices: it does not matter at which of its limits a channel
+    /// is.
     pub(crate) fn has_the_matrices_of(self, other: Self) -> bool {
         let free = |mode: Self| Self { lower: mode.lower | mode.upper, upper: 0, ..mode };
         free(self) == free(other)
     }
 
     /// The command of channel `j` if it is at a limit or stuck; `None` for a free channel.
-    pub(crate) fn held(self, design: &Design, j: usize) -> Option<f64> {
+    pub(crate) fn held_command(self, design: &Design, j: usize) -> Option<f64> {
         if self.is_gone(j) {
             return design.without(j).map(|reconfiguration| reconfiguration.stuck_at);
         }
@@ -100,12 +102,12 @@ impl Mode {
         Some(if self.is_at(0, j) { low } else { high })
     }
 
-    /// The same as a deviation from the operating point.
+    /// [`Mode::held_command`] as a deviation from the operating point.
     pub(crate) fn held_deviation(self, design: &Design, j: usize) -> Option<f64> {
-        Some(self.held(design, j)? - design.actuators[j].operating.unwrap_or(0.0))
+        Some(self.held_command(design, j)? - design.actuators[j].operating.unwrap_or(0.0))
     }
 
-    /// Sets the deviations `u` of the channels that are at a limit or stuck.
+    /// Sets the deviations `u` of the channels that are at a limit or stuck; the others stay.
     pub(crate) fn set_limited(self, design: &Design, u: &mut [f64]) {
         for (j, u) in u.iter_mut().enumerate() {
             if self.is_limited(j) {

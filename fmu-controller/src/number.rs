@@ -1,4 +1,4 @@
-//! The number types of the equations, and views of where their values are stored.
+//! The number types of the equations, and views of the structs that store their values.
 
 use num_dual::{Dual64, DualNum};
 
@@ -28,10 +28,10 @@ pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
     /// The numbers of a list, in order.
     fn list(numbers: Self::In<'_, [f64]>) -> impl Iterator<Item = Self>;
 
-    /// The numbers as they are now.
+    /// A view of the present numbers, to read them.
     fn read<'a, T: ?Sized>(numbers: &'a Self::Out<'_, T>) -> Self::In<'a, T>;
 
-    /// Writes one number.
+    /// Writes one number to the place that `place` borrows; of a dual number only its derivative.
     fn write<T: ?Sized>(
         numbers: &mut Self::Out<'_, T>,
         place: impl FnOnce(&mut T) -> &mut f64,

@@ -28,11 +28,11 @@ pub(crate) struct Propagators {
 }
 
 impl Propagators {
-    /// The propagator for a mode and a step size in s, computed from the matrices of `system` where it is
-    /// new.
+    /// The propagator for a mode and a step size in s. One that is not in the cache is computed from the matrices that
+    /// `system` returns, and replaces another one if the cache is full.
     ///
-    /// Sizes must be equal to the last bit: the content of the cache must not change results, so
-    /// that a restored instance, whose cache is empty, continues with the same bits.
+    /// Only a propagator for exactly this size is used: the content of the cache must not change results, so that a
+    /// restored instance, whose cache is empty, continues with the same bits.
     pub(crate) fn of(
         &mut self,
         mode: Mode,
@@ -62,10 +62,12 @@ impl Propagators {
 #[derive(Clone)]
 pub(crate) struct Observer {
     propagators: Propagators,
-    /// Space for [y; r; w] and its slope, for [y; r], and for z before and after a step.
+    /// Space for [y; r; w] and its slope.
     input: Vec<f64>,
     input_slope: Vec<f64>,
+    /// Space for [y; r].
     known: Vec<f64>,
+    /// z at the start and at the end of a part of a step.
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -87,25 +89,25 @@ impl Part {
     }
 }
 
-/// Takes z at the start of a part of a step, the mode in it, and the part.
+/// A callback for each part of a step in which the mode stays, with z at its start, the mode and the part.
 pub(crate) type Follow<'a> = &'a mut dyn FnMut(&[f64], Mode, Part) -> Result<(), control::Error>;
 
-/// What does not change during a step.
+/// The design, the inputs and the mode without limits, which do not change during a step.
 #[derive(Clone, Copy)]
 pub(crate) struct Conditions<'a> {
     /// The design; its matrices are the same in every step.
     pub(crate) design: &'a Design,
     /// The measurements at the start of the step, and their slopes.
     pub(crate) y: [&'a [f64]; 2],
-    /// The same of the references.
+    /// The references at the start of the step, and their slopes.
     pub(crate) r: [&'a [f64]; 2],
     /// The mode without limits.
     pub(crate) mode: Mode,
 }
 
 impl Conditions<'_> {
-    /// The mode in which z evolves from here, `time` s after the start of the step; `inputs` is space for
-    /// measurements and references.
+    /// The mode with the channels that are at a limit at `z`, `time` s after the start of the step; `inputs` is space
+    /// for measurements and references.
     fn mode_at(&self, time: f64, z: &[f64], inputs: &mut [f64]) -> Mode {
         let Self { y, r, .. } = self;
         let known = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
@@ -116,7 +118,8 @@ impl Conditions<'_> {
     }
 }
 
-/// z' and u at the unit vectors of z, y, r and w in turn, w the commands of the channels at a limit.
+/// z' and u at the unit vectors of z, y, r and w in turn, w the commands of the channels at a limit. The response to w
+/// of a free channel is 0.
 pub(crate) fn unit_responses(design: &Design, mode: Mode) -> Vec<[Vec<f64>; 2]> {
     let equations = Equations::<f64>::new(design, mode);
     let (n, p, m) = (design.order(), design.measurements.len(), design.actuators.len());
@@ -167,11 +170,10 @@ impl Observer {
 
     /// Advances `z` over a part of the step.
     ///
-    /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
-    /// is known to 2^-20 of the step. A channel that leaves its mode and returns to it before the
-    /// middle or the end of a part is not detected.
+    /// If a channel reaches or leaves a limit, the part is halved until that instant is known to 2^-20 of it. A channel
+    /// that reaches and leaves a limit before the middle of a part, or between its middle and its end, is not detected.
     ///
-    /// `follow` gets each part in which the mode stays, with z at its start and the mode.
+    /// Calls `follow` for each part in which the mode stays, with z at its start and the mode.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],
@@ -191,6 +193,7 @@ impl Observer {
         Ok(())
     }
 
+    /// Advances `before` over a part, halved at most `halvings` times.
     fn advance_part(
         &mut self,
         conditions: Conditions<'_>,
@@ -214,7 +217,7 @@ impl Observer {
         Ok(())
     }
 
-    /// Propagates over `part` into `after`; true if the mode is the same at its end.
+    /// Computes `after` from `before` over `part` in `mode`; returns whether the mode at its end is the same.
     fn keeps_mode(
         &mut self,
         mode: Mode,

@@ -38,7 +38,7 @@ use aso_controller::Design;
 pub(crate) struct Reconfigurator {
     /// The inputs, one for each actuator.
     pub(crate) reported: Vec<bool>,
-    /// For each reconfiguration of the design: since when its loss is above the stated fraction, in s.
+    /// For each reconfiguration of the design: the time in s since which its loss is above the stated fraction.
     above_since: Vec<Option<f64>>,
     /// The input that asks for the fall-back.
     pub(crate) fall_back: bool,
@@ -67,22 +67,23 @@ impl Reconfigurator {
         }
     }
 
-    /// Forgets all decisions; the inputs stay.
+    /// Clears all decisions; the inputs stay.
     pub(crate) fn start(&mut self) {
         self.above_since.fill(None);
         (self.decided, self.gone, self.output) = (0, 0, 0);
         self.fallen_back = false;
     }
 
-    /// Decides at `time`, in s; bit j of the result: actuator j is gone or back since the last decision.
+    /// Decides at `time`, in s, which actuators are gone and whether the fall-back is in force. Bit j of the result:
+    /// actuator j is gone or back since the last decision.
     pub(crate) fn decide(&mut self, design: &Design, losses: &[Loss], time: f64) -> u64 {
-        let before = self.gone;
+        let gone_before = self.gone;
         self.gone = 0;
-        let asked = self.fall_back && design.fallback.is_some();
+        let is_fall_back_set = self.fall_back && design.fallback.is_some();
         for (case, since) in design.reconfigurations.iter().zip(&mut self.above_since) {
             if let (Some(most), Some(least_time)) = (case.loss, case.time) {
                 let loss = losses.iter().find(|loss| loss.actuator == case.actuator);
-                let above = !asked && loss.is_some_and(|loss| loss.estimate > most);
+                let above = !is_fall_back_set && loss.is_some_and(|loss| loss.estimate > most);
                 *since = since.or(Some(time)).filter(|_| above);
                 // The importer adds up its steps with rounding.
                 let enough = since.is_some_and(|since| time - since >= least_time * (1.0 - 1e-9));
@@ -92,16 +93,17 @@ impl Reconfigurator {
             self.gone |= u64::from(gone) << case.actuator;
         }
         let uncovered = self.gone != 0 && design.gains_without(self.gone).is_none();
-        self.fallen_back = design.fallback.is_some() && (asked || uncovered);
+        self.fallen_back = design.fallback.is_some() && (is_fall_back_set || uncovered);
         self.output = match self.gone {
             _ if self.fallen_back => -1,
             0 => 0,
             gone => i32::try_from(gone.trailing_zeros() + 1).unwrap_or_default(),
         };
-        before ^ self.gone
+        gone_before ^ self.gone
     }
 
-    /// The time of the next decision by an estimate that is above its fraction now, in s.
+    /// The time in s of the next decision by an estimate that is above its fraction now; `None` if none is, or all of
+    /// these are decided.
     pub(crate) fn next_decision(&self, design: &Design) -> Option<f64> {
         let ends =
             design.reconfigurations.iter().zip(&self.above_since).filter_map(|(case, since)| {
@@ -111,7 +113,8 @@ impl Reconfigurator {
         ends.reduce(f64::min)
     }
 
-    /// The estimated losses less the fractions above which they decide, negative beyond them.
+    /// For each reconfiguration by a loss: the stated fraction less the estimated loss, and whether the loss was above
+    /// the fraction at the last decision.
     pub(crate) fn distances<'a>(
         &'a self,
         design: &'a Design,

@@ -17,12 +17,12 @@
 //! ```
 //!
 //! with K_i x_i[k] + N_r r[k] + u_t[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
-//! `equations.rs` for references. f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
-//! without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in place of f_hat, and
-//! f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law has
-//! f_hat[k|k] = rho L_f e[k] / (|L_f e[k]| + delta), element by element. All signals are deviations
-//! from the operating point. In a design with D, y[k] is the measurement less D u[k-1], which is in it; u[-1] is the
-//! command of the operating point.
+//! `equations.rs` for references. f_hat changes only while estimating, K_f f_hat is in u only while compensating, and u
+//! is kept within its limits. A design without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in
+//! place of f_hat, and f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law
+//! has f_hat[k|k] = rho L_f e[k] / (|L_f e[k]| + delta), element by element. All signals are deviations from the
+//! operating point. In a design with D, the measurement contains D u[k-1], and y[k] is the measurement without it;
+//! u[-1] is the command of the operating point.
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
@@ -47,15 +47,15 @@ pub(crate) struct Sampler {
     start: f64,
     /// k of the next sample: a whole number, exact up to 2^53.
     next: f64,
-    /// z[k|k-1] of the next sample as the importer will see it: a value that nothing adds to has no
-    /// rounding of the operating point.
+    /// z[k|k-1] of the next sample as the importer will see it, not as deviations: so an initial value has no rounding
+    /// of the operating point.
     prediction: Vec<f64>,
     /// The deviations z[k|k-1] of the last sample.
     last_prediction: Vec<f64>,
 }
 
 impl Sampler {
-    /// The sampler of `design`, if that is the design of a sampled controller.
+    /// The sampler of `design`; `None` for a continuous controller.
     pub(crate) fn new(design: &Design) -> Option<Self> {
         Some(Self {
             estimator: design.estimator?,
@@ -83,8 +83,8 @@ impl Sampler {
         self.prediction[position] = value;
     }
 
-    /// Takes the next sample of a controller that rests: the prediction for the sample after it is `z`, as the importer
-    /// sees it.
+    /// Takes the next sample of a controller that rests. The prediction for the sample after it becomes `z`, as the
+    /// importer sees it.
     pub(crate) fn rest(&mut self, z: &[f64]) {
         self.prediction.copy_from_slice(z);
         self.next += 1.0;
@@ -95,13 +95,14 @@ impl Sampler {
         self.start + self.next * self.period
     }
 
-    /// The instant in s of the next sample, if it is due until `end`; at most `end`.
+    /// The instant in s of the next sample, at most `end`; `None` if it is not due until `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.next_instant();
         (next <= end + TOLERANCE * self.period).then_some(next.min(end))
     }
 
-    /// The time in s from `start` to the next sample, if it is due until `end`.
+    /// The time in s from `start` to the next sample, negative if the sample was due before; `None` if it is not due
+    /// until `end`.
     pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
         let elapsed = self.next * self.period;
         let due = elapsed <= end - self.start + TOLERANCE * self.period;
@@ -143,16 +144,16 @@ impl Sampler {
         mode
     }
 
-    /// Computes the deviations z[k+1|k] from z, e and u of sample k.
+    /// Computes the deviations z[k+1|k], in `prediction`, from z, e and u of sample k.
     fn predict(&mut self, design: &Design, equations: Equations<'_, f64>, signals: &mut Signals) {
         let mut knowns = equations.knowns(&signals);
         if self.estimator == Estimator::Current {
             knowns = knowns.without_innovations();
         }
         equations.set_slopes(knowns, &mut &mut self.prediction[..]);
-        let first_kept =
+        let first_with_sum =
             if equations.has_fault_model() { design.filtered_at(0) } else { design.states.len() };
-        for (next, z) in self.prediction.iter_mut().zip(&signals.z).skip(first_kept) {
+        for (next, z) in self.prediction.iter_mut().zip(&signals.z).skip(first_with_sum) {
             *next += z;
         }
     }
@@ -172,7 +173,7 @@ impl Sampler {
     }
 }
 
-/// Computes e[k] from z[k|k-1], and with a current estimator z[k|k].
+/// Computes e[k] from `prediction`, the deviations z[k|k-1], and with a current estimator z[k|k].
 fn estimate<D: Number>(
     estimator: Estimator,
     equations: Equations<'_, D>,

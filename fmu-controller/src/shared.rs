@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A value that is copied when it is changed, not when its owner is. It is serialised like the value.
+/// A value that is copied when it is changed, not when its owner is copied. It is serialised like the value itself.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shared<T>(Arc<T>);
 

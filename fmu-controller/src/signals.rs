@@ -1,4 +1,4 @@
-//! The signals of the controller: as the importer sees them, and as the equations take them.
+//! The signals of the controller: as the importer sees them, and as the deviations of the equations.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,11 +18,11 @@ pub(crate) struct Values {
     pub(crate) r_slopes: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
-    /// The law that they follow; `None` before the first ones and at rest.
+    /// The law of the commands; `None` before the first commands and at rest.
     pub(crate) law: Option<Law>,
 }
 
-/// The operating point: zero where the design states none.
+/// The operating point, zero where the design states none; in a direction, its derivatives.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct OperatingPoint {
     /// [x_op; 0; y_op; 0; 0], the last parts where the design has a filter, integrals and a transfer.
@@ -49,8 +49,12 @@ pub(crate) struct Signals {
     pub(crate) u: Vec<f64>,
 }
 
-/// Applies `change_one` to each element of x_hat and y_f in z, of y and of r, with its operating point in `design`.
-fn change([z, y, r]: [&mut [f64]; 3], design: &Design, change_one: impl Fn(&mut f64, f64)) {
+/// Applies `change` to each element of x_hat and y_f in z, of y and of r, with its operating point in `design`.
+fn change_by_operating_point(
+    [z, y, r]: [&mut [f64]; 3],
+    design: &Design,
+    change: impl Fn(&mut f64, f64),
+) {
     let [x_hat, _, y_f, ..] = design.parts_mut(z);
     let states = design.states.iter().map(|signal| signal.operating);
     let measured = || design.measurements.iter().map(|signal| signal.operating);
@@ -58,7 +62,7 @@ fn change([z, y, r]: [&mut [f64]; 3], design: &Design, change_one: impl Fn(&mut 
     let of_z = x_hat.iter_mut().zip(states).chain(y_f.iter_mut().zip(measured()));
     let of_inputs = y.iter_mut().zip(measured()).chain(r.iter_mut().zip(referred));
     for (element, operating) in of_z.chain(of_inputs) {
-        change_one(element, operating.unwrap_or_default());
+        change(element, operating.unwrap_or_default());
     }
 }
 
@@ -71,10 +75,10 @@ impl OperatingPoint {
         point
     }
 
-    /// Takes the operating point from `design`, without allocation.
+    /// Sets the operating point to that of `design`, without allocation.
     pub(crate) fn read(&mut self, design: &Design) {
         let Self { z, y, r, .. } = self;
-        change([z, y, r], design, |element, operating| *element = operating);
+        change_by_operating_point([z, y, r], design, |element, operating| *element = operating);
         for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
             *to = actuator.operating.unwrap_or_default();
         }
@@ -100,7 +104,7 @@ impl Signals {
         self.set_inputs(values, point, offset);
     }
 
-    /// Takes D u off the measurements, u being the commands of the sample before.
+    /// Subtracts D u from the measurements, u being the commands of the sample before. Does nothing without D.
     pub(crate) fn remove_feedthrough(&mut self, design: &Design) {
         let Some(d) = &design.d else { return };
         for (k, y) in self.y.iter_mut().enumerate() {
@@ -108,17 +112,17 @@ impl Signals {
         }
     }
 
-    /// Sets z, y and r to the derivatives of their deviations: those of the signals less those of the operating
-    /// point, which `design` has in place of an operating point.
+    /// Sets z, y and r to the derivatives of their deviations with respect to time: z' and the slopes in `values`, less
+    /// the derivatives of the operating point, which `design` has in its place.
     pub(crate) fn set_rates(&mut self, z: &[f64], values: &Values, design: &Design) {
         self.z.copy_from_slice(z);
         self.y.copy_from_slice(&values.y_slopes);
         self.r.copy_from_slice(&values.r_slopes);
         let Self { z, y, r, .. } = self;
-        change([z, y, r], design, |slope, operating| *slope -= operating);
+        change_by_operating_point([z, y, r], design, |slope, operating| *slope -= operating);
     }
 
-    /// Sets y and r only, `offset` s after the inputs in `values` were given.
+    /// Sets y and r to the deviations of the inputs, `offset` s after those in `values` were given.
     pub(crate) fn set_inputs(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
         let referred = values.r.iter().zip(&values.r_slopes).zip(&point.r);
@@ -136,23 +140,24 @@ impl Values {
         Self { z, y_slopes: y.clone(), y, r_slopes: r.clone(), r, u, law: None }
     }
 
-    /// Sets z, or its first parts, to the operating point plus the deviations `z`.
+    /// Sets z, or as many of its first elements as `z` has, to the operating point plus the deviations `z`.
     pub(crate) fn set_estimate(&mut self, z: &[f64], point: &OperatingPoint) {
         for ((value, deviation), point) in self.z.iter_mut().zip(z).zip(&point.z) {
             *value = deviation + point;
         }
     }
 
-    /// Sets z to the operating point.
+    /// Sets z to the operating point, and no law.
     pub(crate) fn rest(&mut self, point: &OperatingPoint) {
         self.law = None;
         for (value, point) in self.z.iter_mut().zip(&point.z) {
-            // As the sum of a deviation and the operating point.
+            // The sum has the bits of other estimates: -0 becomes 0.
             *value = 0.0 + point;
         }
     }
 
-    /// Sets u to the operating point plus the deviations `u`, and the channels at a limit to that limit.
+    /// Sets u to the operating point plus the deviations `u`, channels at a limit to that limit, and stuck ones to
+    /// their stuck command.
     pub(crate) fn set_commands(
         &mut self,
         u: &[f64],
@@ -162,7 +167,7 @@ impl Values {
     ) {
         let free = u.iter().zip(&point.u).map(|(u, point)| u + point);
         for (j, (value, free)) in self.u.iter_mut().zip(free).enumerate() {
-            *value = mode.held(design, j).unwrap_or(free);
+            *value = mode.held_command(design, j).unwrap_or(free);
         }
     }
 }

@@ -1,13 +1,15 @@
-//! Which measurements the controller uses.
+//! The check of the measurements: which of them the controller uses.
 //!
-//! A measurement is used if it is in its range, at the start of a communication step and, by its input derivative, at
-//! its end; a sampled controller looks at its value at each sample. The last value that was used replaces any other one.
+//! A continuous controller uses a measurement that is in its range at the start of a communication step, and its input
+//! derivative if the measurement is then in its range at the end of the step, too. A sampled controller uses a
+//! measurement that is in its range at the sample. The last value that was used replaces a measurement that is not
+//! used.
 //!
-//! While it does so for longer than `longest_hold` of the measurement, the controller rests: commands and estimates are those
-//! of the operating point, without faults, integrals are 0, an actuator that is gone has the command at which it is stuck. A
-//! detection keeps its decision, and its residuals and statistics are 0. As soon as no measurement is held for too long, the
-//! controller continues like one that starts at the operating point: y_f from the measurements, tests of the detection after
-//! `detect_from`.
+//! If it replaces a measurement for longer than `longest_hold`, the controller rests: commands and estimates are those
+//! of the operating point, without faults; integrals are 0; an actuator that is gone has the command at which it is
+//! stuck. A detection keeps its decision, and its residuals and statistics are 0. As soon as no measurement is replaced
+//! for too long, the controller continues like one that starts at the operating point: y_f starts from the
+//! measurements, and the detection tests after `detect_from`.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +18,7 @@ use aso_controller::Design;
 use aso_controller::design::HOLD_ROUNDING;
 use aso_controller::sample::measurements::Validity;
 
-/// The measurements as the importer gives them, and what is known about them; a number for each measurement.
+/// The measurements as the importer sets them, and their holds: lists with an element for each measurement.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(crate) struct MeasurementCheck {
     /// The measurements and their derivatives with respect to time.
@@ -29,20 +31,20 @@ pub(crate) struct MeasurementCheck {
     last: Vec<f64>,
     /// The values at a sample.
     sampled: Vec<f64>,
-    /// The number of samples for which the last value is used, and the most of them.
+    /// The number of samples for which a sampled controller uses the last value, and the largest number.
     held: Vec<u32>,
     most_held: Vec<u32>,
-    /// Since when a continuous controller uses the last value, and the longest time, in s.
+    /// The time in s since which a continuous controller uses the last value, and the longest duration in s.
     held_since: Vec<Option<f64>>,
     longest: Vec<f64>,
-    /// Whether the last value of a measurement is used.
+    /// Whether the last value replaces any measurement.
     pub(crate) is_held: bool,
-    /// Whether it is used for too long: the controller rests.
+    /// Whether it replaces one for too long: the controller rests.
     pub(crate) is_lost: bool,
 }
 
 impl MeasurementCheck {
-    /// The check of the measurements of `design`, if they have ranges or longest times of holds.
+    /// The check of the measurements of `design`; `None` if none has a range or a longest time of a hold.
     pub(crate) fn new(design: &Design) -> Option<Self> {
         if !design.checks_measurements() {
             return None;
@@ -69,7 +71,7 @@ impl MeasurementCheck {
         })
     }
 
-    /// Before the first measurement the last values are those of the operating point.
+    /// Ends all holds, and sets the last values to the operating point.
     pub(crate) fn start(&mut self, design: &Design) {
         for (last, signal) in self.last.iter_mut().zip(&design.measurements) {
             *last = signal.operating.unwrap_or_default();
@@ -79,7 +81,7 @@ impl MeasurementCheck {
         (self.is_held, self.is_lost) = (false, false);
     }
 
-    /// Takes the measurements of a sample, `offset` s after they were given.
+    /// Checks the measurements of a sample, `offset` s after they were given, and sets those of `values`.
     pub(crate) fn take_sample(&mut self, values: &mut Values, offset: f64) {
         for (k, sampled) in self.sampled.iter_mut().enumerate() {
             *sampled = self.y[k] + self.y_slopes[k] * offset;
@@ -95,7 +97,8 @@ impl MeasurementCheck {
         }
     }
 
-    /// Takes the measurements of a step of a continuous controller, times in s.
+    /// Checks the measurements of a step of a continuous controller of `size` s from `start`, and sets those of
+    /// `values`.
     pub(crate) fn take_step(&mut self, values: &mut Values, start: f64, size: f64) {
         for k in 0..self.y.len() {
             let (mut y, mut slope) = (self.y[k], self.y_slopes[k]);
@@ -118,7 +121,8 @@ impl MeasurementCheck {
         });
     }
 
-    /// Shows the measurements as they are given now; the next step decides which of them are held.
+    /// Sets the measurements of `values` between steps, without a decision: a value in its range, otherwise the last
+    /// one.
     pub(crate) fn show(&self, values: &mut Values) {
         for k in 0..self.y.len() {
             (values.y[k], values.y_slopes[k]) = if self.is_in_range(k, self.y[k]) {
@@ -148,6 +152,7 @@ impl MeasurementCheck {
         }
     }
 
+    /// Whether `value` is in the range of measurement `k`; false for NaN and infinity.
     fn is_in_range(&self, k: usize, value: f64) -> bool {
         (self.low[k]..=self.high[k]).contains(&value)
     }

@@ -9,29 +9,29 @@ use aso_controller::Design;
 use aso_controller::design::schedule::Schedule;
 
 impl AsoController {
-    /// Computes u', and f_hat' with a direct term, of a controller with a schedule: a part of them comes from gains
-    /// and operating point, which move with the scheduling variable.
+    /// Computes u', and f_hat' with a direct term, of a controller with a schedule, whose gains and operating point
+    /// change with the scheduling variable. Does nothing without a schedule.
     pub(super) fn set_scheduled_slopes(&mut self) {
         let Self {
             design, current, values, deviations, z_slopes, f_slopes, u_slopes, mode, ..
         } = self;
         let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
         let space = || Box::new(((**current).clone(), Signals::zero(current)));
-        let (rates, moves) = &mut **self.rates.get_or_insert_with(space);
+        let (design_rates, signal_rates) = &mut **self.rates.get_or_insert_with(space);
         let slope = match schedule.measurement(design) {
             Some(k) => values.y_slopes[k],
             None => self.schedule_slope,
         };
-        schedule.differentiate(self.schedule_value, slope, rates);
-        moves.set_rates(z_slopes, values, rates);
-        let equations = Equations::<Dual64>::new([current, rates], *mode);
+        schedule.differentiate(self.schedule_value, slope, design_rates);
+        signal_rates.set_rates(z_slopes, values, design_rates);
+        let equations = Equations::<Dual64>::new([current, design_rates], *mode);
         let (z, inputs) = (
-            equations.estimate([&deviations.z, &moves.z]),
-            [[&deviations.y[..], &moves.y], [&deviations.r[..], &moves.r]],
+            equations.estimate([&deviations.z, &signal_rates.z]),
+            [[&deviations.y[..], &signal_rates.y], [&deviations.r[..], &signal_rates.r]],
         );
         for (j, slope) in u_slopes.iter_mut().enumerate().filter(|(j, _)| !mode.is_limited(*j)) {
-            let point = rates.actuators[j].operating.unwrap_or_default();
-            *slope = point + equations.free_command(j, z, inputs, Dual64::from_re(-0.0)).eps;
+            let point_rate = design_rates.actuators[j].operating.unwrap_or_default();
+            *slope = point_rate + equations.free_command(j, z, inputs, Dual64::from_re(-0.0)).eps;
         }
         for (i, slope) in f_slopes.iter_mut().enumerate() {
             *slope = equations.fault(i, z, inputs[0]).eps;
@@ -39,7 +39,7 @@ impl AsoController {
     }
 
     /// Sets matrices and operating point of a scheduled controller for `time`, `offset` s after the
-    /// measurements were given.
+    /// measurements were given. Warns once if the scheduling variable is outside of the schedule.
     pub(super) fn interpolate(&mut self, offset: f64, time: f64) {
         let input = self.schedule_input + self.schedule_slope * offset;
         let Self { design, current, values, operating_point, .. } = self;
@@ -72,7 +72,7 @@ impl AsoController {
         current.take_parameters(design);
     }
 
-    /// The design of the last sample, or of now.
+    /// The design at the scheduling variable of the last sample, or of now; without a schedule the design itself.
     pub(super) fn design_in_force(&self) -> &Design {
         self.current.as_deref().unwrap_or(&self.design)
     }

@@ -20,14 +20,15 @@ impl AsoController {
         self.compensate && time >= self.design.t_on - clock_rounding(time)
     }
 
-    /// The mode with no channel at a limit.
+    /// The mode with no channel at a limit, without the actuators that are gone now.
     pub(super) fn free_mode(&self, compensating: bool) -> Mode {
         let Reconfigurator { gone, fallen_back, .. } = self.reconfigurator;
         Mode::free(compensating, compensating || self.design.monitor, gone, fallen_back)
     }
 
-    /// Decides at `time` which actuators are gone; the estimates of the faults of those that are gone or
-    /// back since the last decision restart at 0. Returns whether there are such estimates.
+    /// Decides at `time` which actuators are gone. The estimates of the faults of those that are gone or
+    /// back since the last decision restart at 0, also in the prediction of `sampler`. Returns whether there are such
+    /// estimates.
     pub(super) fn reconfigure(&mut self, time: f64, mut sampler: Option<&mut Sampler>) -> bool {
         let Self { design, values, deviations, reconfigurator, losses, .. } = self;
         let changed = reconfigurator.decide(design, losses, time);
@@ -45,15 +46,15 @@ impl AsoController {
         restarted
     }
 
-    /// Sets u_t if `mode` has another law than the last commands; see [`Values::transfer`].
+    /// Sets u_t if `mode` has another law than the last commands, and returns whether it has; see [`Values::transfer`].
     pub(super) fn transfer(&mut self, mode: Mode) -> bool {
         let Self { design, current, values, operating_point, deviations, .. } = self;
         let design = current.as_deref().unwrap_or(design);
         values.transfer(design, mode, operating_point, deviations)
     }
 
-    /// The same within a step, at `time` and `offset` s after its start, if the law compensates from there on, or no longer:
-    /// the last commands are those of the deviations z by the law before.
+    /// Sets u_t where compensation starts or ends within a step, at `time`, `offset` s after its start. The last
+    /// commands are then those of the law before at the deviations z.
     fn transfer_at(&mut self, compensating: bool, time: f64, offset: f64) {
         let after = self.free_mode(compensating);
         if self.design.transfer.is_none() || self.values.law == Some(after.law(&self.design)) {
@@ -66,7 +67,7 @@ impl AsoController {
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
     }
 
-    /// Sets the estimate to its initial value.
+    /// Sets the estimate to its initial value, y_f to the measurements, and the operating point to that of the design.
     pub(super) fn start(&mut self) {
         let [x_hat, f_hat, y_f, x_i, u_t] = self.design.parts_mut(&mut self.values.z);
         x_hat.copy_from_slice(&self.x_hat_0);
@@ -79,7 +80,7 @@ impl AsoController {
         self.operating_point.read(&self.design);
     }
 
-    /// Advances the deviations of the estimate over a part of a step that starts at `start`.
+    /// Advances the deviations of the estimate, and the detection, over a part of the step that starts at `start`.
     fn advance(&mut self, compensating: bool, start: f64, part: Part) -> Result<(), Failure> {
         let mode = self.free_mode(compensating);
         let Self { design, values, deviations, observer, detector, .. } = self;
@@ -99,12 +100,12 @@ impl AsoController {
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
     }
 
-    /// The detector of a design with a detection.
+    /// The detector; an empty one without a detection.
     pub(crate) fn detector_mut(&mut self) -> &mut Detector {
         self.detector.get_or_insert_default()
     }
 
-    /// The check of the measurements of a design with ranges or longest times of holds.
+    /// The check of the measurements; an empty one without ranges and longest times of holds.
     pub(crate) fn measurement_check_mut(&mut self) -> &mut MeasurementCheck {
         self.measurement_check.get_or_insert_default()
     }
@@ -114,8 +115,8 @@ impl AsoController {
         self.measurement_check.as_ref().is_some_and(|check| check.is_lost)
     }
 
-    /// Takes the measurements by `take`; at `time` in s, after a rest, y_f starts from them and the detection anew. Returns
-    /// whether that is so.
+    /// Sets the measurements by `take`. Returns whether they end a rest: the detection then restarts at `time` in s,
+    /// and y_f has to start from them.
     fn take_measurements(
         &mut self,
         time: f64,
@@ -132,7 +133,8 @@ impl AsoController {
         resumes
     }
 
-    /// Rests at `time`, in s: commands and estimates are those of the operating point.
+    /// Rests at `time`, in s: commands and estimates are those of the operating point; an actuator that is gone has its
+    /// stuck command.
     pub(super) fn rest(&mut self, time: f64) {
         self.mode = self.free_mode(self.is_compensating(time));
         let Self { design, current, values, operating_point, deviations, mode, .. } = self;
@@ -150,12 +152,12 @@ impl AsoController {
         self.has_slopes = false;
     }
 
-    /// The detection of a design that has one.
+    /// The detection of the design; an empty one if it has none.
     pub(crate) fn detection_mut(&mut self) -> &mut DetectionDesign {
         self.design.detection.get_or_insert_default()
     }
 
-    /// Starts the detection at `time` from the initial estimate.
+    /// Starts the detection, if there is one, at `time` from the initial estimate.
     pub(super) fn start_detection(&mut self, time: f64) {
         let Self { design, values, operating_point, deviations, detector, .. } = self;
         if let (Some(detector), Some(detection)) = (detector, &design.detection) {
@@ -164,7 +166,11 @@ impl AsoController {
         }
     }
 
-    /// Makes a step of a continuous controller.
+    /// Makes a step of a continuous controller without a schedule.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if too many samples of the detection are due, or if the observer cannot be stepped.
     pub(super) fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
         if let (Some(detector), Some(detection)) = (&self.detector, &self.design.detection)
             && detector.has_too_many_samples(detection, step.end())
@@ -194,7 +200,7 @@ impl AsoController {
                 deviations.z[at] = values.z[at] - operating_point.z[at];
             }
         }
-        // z has its deviations from the step before, or from the start.
+        // The deviations z are those of the end of the step before, or of the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         self.transfer(self.free_mode(!inside && self.is_compensating(step.start)));
         if inside {
@@ -214,7 +220,8 @@ impl AsoController {
         Ok(())
     }
 
-    /// Computes e, u and E_hat at the state reached and at `time`, `offset` s after the inputs were set.
+    /// Computes e, u and E_hat at the state reached and at `time`, `offset` s after the inputs were set. Does nothing
+    /// while the controller rests.
     pub(super) fn evaluate(&mut self, time: f64, offset: f64) {
         if self.is_resting() {
             return;
@@ -233,8 +240,8 @@ impl AsoController {
         self.has_slopes = false;
     }
 
-    /// The controller with z', u' and E_hat', which are computed when they are read. Those of a
-    /// sampled controller are zero.
+    /// The controller with z', f_hat', u' and E_hat', which are computed when they are read. Those of a sampled
+    /// controller and of one that rests are zero.
     pub(crate) fn with_slopes(&mut self) -> &mut Self {
         if !self.has_slopes && self.sampler.is_none() {
             if self.is_resting() {
@@ -250,7 +257,7 @@ impl AsoController {
         self
     }
 
-    /// Computes z', u' and E_hat'.
+    /// Computes z', f_hat', u' and E_hat'.
     fn set_slopes(&mut self) {
         let Self { current, values, deviations, z_slopes, f_slopes, u_slopes, mode, .. } = self;
         let design = current.as_deref().unwrap_or(&*self.design);
@@ -285,7 +292,8 @@ impl AsoController {
         }
     }
 
-    /// Takes the samples that are due until `end`, with the measurements given at `start`, in s.
+    /// Takes the samples that are due until `end`, with the measurements given at `start`, in s. Does nothing in a
+    /// continuous controller.
     pub(super) fn sample(&mut self, start: f64, end: f64) {
         let Some(mut sampler) = self.sampler.take() else { return };
         while let Some(offset) = sampler.time_to_sample(start, end) {

@@ -33,7 +33,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable> {
     all
 }
 
-/// The clock of a sampled controller, which FMI 2.0 does not have.
+/// The clock of a sampled controller; FMI 2.0 has no clocks.
 fn sample_clock(design: &Design) -> Option<Variable> {
     let text = "Clock of the samples";
     let clock = |period| {
@@ -49,14 +49,14 @@ fn with_unit(variable: Variable, unit: Option<&String>) -> Variable {
     }
 }
 
-/// The unit per second, if it can be written: `m` gives `m/s`, `m/s` gives `m/s2`.
+/// The unit per second: `m` gives `m/s`, `m/s` gives `m/s2`. `None` without a unit, or if FMI cannot write it.
 fn per_second(unit: Option<&String>) -> Option<String> {
     let unit = unit?;
     let slope = if unit.ends_with("/s") { format!("{unit}2") } else { format!("{unit}/s") };
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// The unit times a second, if it can be written: `m` gives `m.s`.
+/// The unit times a second: `m` gives `m.s`. `None` without a unit, or if FMI cannot write it.
 fn times_second(unit: Option<&String>) -> Option<String> {
     let integral = format!("{}.s", unit?);
     Unit::parse(&integral).is_ok().then_some(integral)
@@ -124,7 +124,7 @@ fn inputs(design: &Design) -> Vec<Variable> {
     inputs
 }
 
-/// The scheduling variable, if it is no measurement.
+/// The scheduling variable as an input; `None` if it is a measurement, or without a schedule.
 fn schedule_input(design: &Design) -> Option<Variable> {
     let schedule =
         design.schedule.as_ref().filter(|schedule| schedule.measurement(design).is_none())?;
@@ -136,7 +136,8 @@ fn schedule_input(design: &Design) -> Option<Variable> {
     Some(variable.derivative(|model| &mut model.schedule_slope))
 }
 
-/// The value of the scheduling variable that the last sample used, or that a continuous controller uses.
+/// The value of the scheduling variable that the last sample used, or that a continuous controller uses; `None` without
+/// a schedule.
 fn schedule_at(design: &Design) -> Option<Variable> {
     let schedule = design.schedule.as_ref()?;
     let unit = match schedule.measurement(design) {
@@ -151,7 +152,7 @@ fn schedule_at(design: &Design) -> Option<Variable> {
     Some(output(design, with_unit(variable, unit), groups).initially(initial))
 }
 
-/// The actuator that the controller does without.
+/// The output with the actuator that the controller does without, if the design has reconfigurations or a fall-back.
 fn reconfiguration(design: &Design) -> Option<Variable> {
     let mut text =
         "Number of the actuator that the controller does without; 0 if there is none".to_owned();
@@ -170,7 +171,8 @@ fn validity(signal: &Measurement) -> String {
     range.into_iter().chain(hold).collect()
 }
 
-/// Whether measurements are held, and whether they are held for too long.
+/// The outputs that state whether measurements are held, and whether one is held for too long; none if every
+/// measurement is used.
 fn measurement_flags(design: &Design) -> Vec<Variable> {
     if !design.checks_measurements() {
         return Vec::new();

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use aso_controller::design::detection::DetectionDesign;
 
-/// The value of the times before an alarm.
+/// The value of both times before an alarm.
 const NEVER: f64 = -1.0;
 
 /// The decision, which stays until it is reset.
@@ -26,14 +26,15 @@ impl Default for Decision {
 }
 
 impl Decision {
-    /// Takes the alarm of a test at `time`.
+    /// Records an alarm at `time` of a fault that started at `onset`, both in s. Later alarms change nothing.
     pub(super) fn alarm(&mut self, time: f64, onset: f64) {
         if !self.detected {
             *self = Self { detected: true, time, onset, ..*self };
         }
     }
 
-    /// Finds the one fault to which exactly the tests react that have given an alarm.
+    /// Sets `isolated` to the only fault to which exactly the tests react that have given an alarm; -1 if there is none
+    /// or there are several. Does nothing before an alarm.
     pub(crate) fn isolate(
         &mut self,
         detection: &DetectionDesign,

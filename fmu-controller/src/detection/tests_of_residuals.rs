@@ -14,7 +14,7 @@ use aso_controller::design::detection::TestDesign;
 pub(super) struct TestState {
     /// S+ and S-, or the sums of the window.
     sums: Vec<f64>,
-    /// The times in s since which S+ and S- are above 0, or since which the window lasts.
+    /// The times in s since which S+ and S- are above 0, or the start of the window.
     since: Vec<f64>,
     /// Samples in the window.
     count: u32,
@@ -36,22 +36,24 @@ impl TestState {
         }
     }
 
+    /// Clears the sums and the alarm.
     pub(super) fn clear(&mut self) {
         self.restart();
         self.has_alarmed = false;
     }
 
-    /// Clears the sums.
+    /// Clears the sums and the statistic; an alarm stays.
     pub(super) fn restart(&mut self) {
         self.sums.fill(0.0);
         (self.count, self.statistic) = (0, 0.0);
     }
 
-    /// Takes the residuals of the sample at `time`; returns the estimated onset in s if there is an alarm.
+    /// Tests the residuals of the sample at `time` in s; returns the estimated onset in s if there is an alarm. A test
+    /// with a window has alarms at the end of its windows only.
     pub(super) fn take(&mut self, test: &TestDesign, residuals: &[f64], time: f64) -> Option<f64> {
         let onset = match test.drift {
-            Some(drift) => self.add(drift, residuals[0], time),
-            None => self.widen(test.window.unwrap_or(1), residuals, time)?,
+            Some(drift) => self.add_to_sums(drift, residuals[0], time),
+            None => self.add_to_window(test.window.unwrap_or(1), residuals, time)?,
         };
         if self.statistic > test.threshold {
             self.has_alarmed = true;
@@ -61,7 +63,7 @@ impl TestState {
     }
 
     /// Updates the cumulative sums; returns the time since which the larger one is above 0.
-    fn add(&mut self, drift: f64, residual: f64, time: f64) -> f64 {
+    fn add_to_sums(&mut self, drift: f64, residual: f64, time: f64) -> f64 {
         let signed = [residual, -residual];
         for ((sum, since), signed_residual) in self.sums.iter_mut().zip(&mut self.since).zip(signed)
         {
@@ -75,8 +77,8 @@ impl TestState {
         self.since[larger]
     }
 
-    /// Adds to the window; returns its start if it is complete.
-    fn widen(&mut self, window: u32, residuals: &[f64], time: f64) -> Option<f64> {
+    /// Adds residuals to the window of `window` samples; returns the time of its first sample if it is complete.
+    fn add_to_window(&mut self, window: u32, residuals: &[f64], time: f64) -> Option<f64> {
         if self.count == 0 {
             self.sums.fill(0.0);
             self.since[0] = time;

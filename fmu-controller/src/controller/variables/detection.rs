@@ -5,7 +5,7 @@ use aso_controller::Design;
 use aso_controller::channel;
 use aso_controller::design::detection::{DetectionDesign, TestDesign};
 
-/// The variables of a design with a detection.
+/// The variables of the detection; none in a design without one.
 pub(super) fn of(design: &Design) -> Vec<Variable> {
     let Some(detection) = &design.detection else { return Vec::new() };
     let mut all = vec![

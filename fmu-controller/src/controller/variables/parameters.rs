@@ -8,11 +8,11 @@ use aso_controller::design::{
     Actuator, Design, Estimator, Fault, Label, Measurement, Reconfiguration, Signal, SlidingMode,
 };
 
-/// Returns one matrix of a design.
+/// A function that borrows one matrix of a design.
 type Accessor = fn(&mut Design) -> &mut Matrix;
 
 /// Meaning and accessor of a matrix of [`Design::matrices`].
-fn described(name: &str) -> (&'static str, Accessor) {
+fn meaning_and_accessor(name: &str) -> (&'static str, Accessor) {
     match name {
         "A" => ("system matrix A of (1)", |design| &mut design.a),
         "B" => ("input matrix B of (1)", |design| &mut design.b),
@@ -50,10 +50,10 @@ pub(super) fn of(design: &Design) -> Vec<Variable> {
         return all;
     }
     for (name, matrix) in design.matrices() {
-        let (meaning, place) = described(name);
+        let (meaning, accessor) = meaning_and_accessor(name);
         all.extend((0..matrix.values.len()).map(|k| {
             Variable::real(matrix.element(name, k), meaning, move |model| {
-                &mut place(&mut model.design).values[k]
+                &mut accessor(&mut model.design).values[k]
             })
             .parameter()
         }));
@@ -61,7 +61,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable> {
     all
 }
 
-/// The parameters of the activation and the sample time of a sampled controller.
+/// `t_on` and `monitor`, and the sample time of a sampled controller.
 fn switches(design: &Design) -> Vec<Variable> {
     let text = "Compensation starts at this time";
     let mut all = vec![
@@ -85,7 +85,7 @@ fn switches(design: &Design) -> Vec<Variable> {
     all
 }
 
-/// Initial estimates.
+/// Initial estimates and integrals.
 fn starts(design: &Design) -> Vec<Variable> {
     let (n, q) = (design.states.len(), design.faults.len());
     let labels = design.states.iter().map(Signal::label);
@@ -124,18 +124,18 @@ fn filter(design: &Design) -> Vec<Variable> {
         .collect()
 }
 
-/// The bounds of a sliding-mode law.
+/// rho and delta of a sliding-mode law, if the design has one.
 fn sliding_mode(design: &Design) -> Vec<Variable> {
     let Some(SlidingMode { rho, delta }) = &design.sliding_mode else {
         return Vec::new();
     };
-    let bounds = |name, text, list: &[f64], place: fn(&mut SlidingMode) -> &mut Vec<f64>| {
+    let bounds = |name, text, list: &[f64], accessor: fn(&mut SlidingMode) -> &mut Vec<f64>| {
         let count = list.len();
         (0..count).map(move |k| {
             let Label { unit, meaning } = design.faults[k].label();
             let (name, text) = (channel(name, k, count), format!("{text}: {meaning}"));
             let variable = Variable::real(name, text, move |model| {
-                &mut place(model.design.sliding_mode.get_or_insert_default())[k]
+                &mut accessor(model.design.sliding_mode.get_or_insert_default())[k]
             });
             with_unit(variable, unit).parameter()
         })
@@ -145,7 +145,7 @@ fn sliding_mode(design: &Design) -> Vec<Variable> {
         .collect()
 }
 
-/// Returns the value of one signal at the operating point.
+/// A function that borrows the value of one signal at the operating point.
 type Operating = fn(&mut Design, usize) -> &mut Option<f64>;
 
 fn operating_point(design: &Design) -> Vec<Variable> {
@@ -165,12 +165,12 @@ fn operating_point(design: &Design) -> Vec<Variable> {
         }),
     ];
     let mut all = Vec::new();
-    for (start, labels, place) in signals {
-        let names = names::operating(design, start, labels.len());
+    for (name, labels, accessor) in signals {
+        let names = names::operating(design, name, labels.len());
         for (k, (name, Label { unit, meaning })) in names.zip(labels).enumerate() {
             let text = format!("Operating point: {meaning}");
             let variable = Variable::real(name, text, move |model| {
-                place(&mut model.design, k).get_or_insert_default()
+                accessor(&mut model.design, k).get_or_insert_default()
             });
             all.push(with_unit(variable, unit).parameter());
         }
