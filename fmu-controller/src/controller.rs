@@ -72,7 +72,7 @@ pub struct AsoController {
     sampler: Option<Sampler>,
     /// `None` without a detection of faults.
     detector: Option<Detector>,
-    /// `None` if every measurement is used; otherwise the inputs of the importer, and `values` has what replaces them.
+    /// The measurements that the importer sets, while `values` has those that are used; `None` if every one is used.
     measurement_check: Option<MeasurementCheck>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,

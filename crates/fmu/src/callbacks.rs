@@ -1,4 +1,4 @@
-//! The functions of the importer that a model calls.
+//! The functions of the importer that an instance calls.
 #![expect(unsafe_code, reason = "functions of C")]
 
 use std::ffi::CString;
@@ -11,7 +11,7 @@ use fmu_description::abi3::{
 
 use crate::fence::outside;
 
-/// The importer's logger, with what it takes besides a message.
+/// The importer's logger, with the arguments that are the same for every message.
 #[derive(Clone)]
 pub(crate) enum Callbacks {
     /// FMI 2.0.
@@ -35,14 +35,14 @@ impl Callbacks {
 
     /// Whether the importer receives a message with this status whatever its logging settings are.
     ///
-    /// FMI 3.0.2 says that `fmi3Error` and a failed instantiation are explained, and that nothing is logged
-    /// while `loggingOn` is false (section 2.3.1). Its next release lets errors through.
+    /// FMI 3.0.2 demands both that `fmi3Error` and a failed instantiation are explained, and that nothing is logged
+    /// while `loggingOn` is false (section 2.3.1). In its next release errors are logged.
     pub(crate) fn needs(&self, status: Status) -> bool {
         matches!(self, Self::Version3 { .. }) && matches!(status, Status::Error | Status::Fatal)
     }
 
-    /// Sends a message to the importer's logger. The format string of FMI 2.0 is `%s`; `#`, by which the
-    /// standard marks value references, is doubled.
+    /// Sends a message to the importer's logger, if there is one. The format string of FMI 2.0 is `%s`; `#`, by which
+    /// the standard marks value references, is doubled, and zeros are removed.
     pub(crate) fn log(&self, status: Status, category: &str, message: &str) {
         if let Self::Linked(messages) = self {
             return messages
@@ -101,7 +101,7 @@ impl IntermediateUpdate {
         Self { environment: std::ptr::null_mut(), function: nothing }
     }
 
-    /// Asks for the inputs at `time`; the importer can neither read outputs nor return early.
+    /// Calls the callback for the inputs at `time` in s; the importer can neither read outputs nor return early.
     pub(crate) fn ask(self, time: f64) {
         let (mut return_requested, mut return_time) = (0, time);
         let (request, result) = (&raw mut return_requested, &raw mut return_time);

@@ -28,7 +28,7 @@ type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 struct Fence {
     /// Depth of nested fences.
     depth: Cell<u32>,
-    /// The last panic inside a fence. It has no destructor: a destructor in thread-local storage would
+    /// The last panic inside a fence. It is never dropped with the thread: a destructor in thread-local storage would
     /// keep the library loaded until the thread ends.
     last: Cell<ManuallyDrop<Option<Panic>>>,
 }
@@ -46,7 +46,7 @@ thread_local! {
 }
 
 impl Fence {
-    /// Replaces the last panic.
+    /// Replaces the last panic, and returns the one before.
     fn replace(&self, panic: Option<Panic>) -> Option<Panic> {
         ManuallyDrop::into_inner(self.last.replace(ManuallyDrop::new(panic)))
     }
@@ -77,9 +77,9 @@ pub(crate) fn guarded<T, E: From<Failure>>(body: impl FnOnce() -> Result<T, E>) 
     }
     FENCE.with(|fence| {
         fence.depth.set(fence.depth.get() + 1);
-        let done = catch_unwind(AssertUnwindSafe(body));
+        let result = catch_unwind(AssertUnwindSafe(body));
         fence.depth.set(fence.depth.get() - 1);
-        done.unwrap_or_else(|payload| Err(fence.failure(&*payload).into()))
+        result.unwrap_or_else(|payload| Err(fence.failure(&*payload).into()))
     })
 }
 
@@ -87,9 +87,9 @@ pub(crate) fn guarded<T, E: From<Failure>>(body: impl FnOnce() -> Result<T, E>) 
 pub(crate) fn outside<T>(callback: impl FnOnce() -> T) -> T {
     FENCE.with(|fence| {
         let depth = fence.depth.replace(0);
-        let done = callback();
+        let result = callback();
         fence.depth.set(depth);
-        done
+        result
     })
 }
 
@@ -143,7 +143,7 @@ fn address(hook: &Hook) -> usize {
 
 fn install() -> Installed {
     let previous = Arc::new(panic::take_hook());
-    let others = Arc::clone(&previous);
+    let previous_hook = Arc::clone(&previous);
     let hook: Hook = Box::new(move |panic| {
         let inside = FENCE.with(|fence| {
             let inside = fence.depth.get() > 0;
@@ -154,7 +154,7 @@ fn install() -> Installed {
             inside
         });
         if !inside {
-            others(panic);
+            previous_hook(panic);
         }
     });
     let address = address(&hook);

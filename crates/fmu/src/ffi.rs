@@ -57,7 +57,7 @@ unsafe fn ask_for_inputs<M: Model>(component: fmi2Component, start: f64, size: f
 /// The target of `fmi2Component` and `fmi3Instance`: an instance that allows one call at a time.
 struct Component<M: Model> {
     busy: AtomicBool,
-    /// Whether the importer sets inputs within a step; the instance must not be freed.
+    /// Whether the importer is setting inputs within a step: the instance must not be freed then.
     asking: AtomicBool,
     instance: UnsafeCell<Instance<M>>,
 }
@@ -128,7 +128,7 @@ unsafe fn borrow_state<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMU
     unsafe { pointer.as_mut() }.ok_or_else(|| null_pointer("FMUstate"))
 }
 
-/// Returns the snapshot to which an FMU state points.
+/// Returns the snapshot to which an FMU state points; an error for null.
 unsafe fn snapshot<'a, M: Model>(state: fmi2FMUstate) -> Result<&'a Snapshot<M>, Failure> {
     // SAFETY: a state that is not null is a snapshot that this library made.
     unsafe { state.cast::<Snapshot<M>>().as_ref() }.ok_or_else(|| null_pointer("FMUstate"))
@@ -144,7 +144,7 @@ unsafe fn store<M: Model>(place: &mut fmi2FMUstate, snapshot: Snapshot<M>) {
     }
 }
 
-/// Frees the snapshot in `place` and sets the FMU state to null.
+/// Frees the snapshot in `place`, if there is one, and sets the FMU state to null.
 unsafe fn free_state<M: Model>(place: &mut fmi2FMUstate) {
     if !place.is_null() {
         let state = std::mem::replace(place, std::ptr::null_mut());
@@ -153,6 +153,7 @@ unsafe fn free_state<M: Model>(place: &mut fmi2FMUstate) {
     }
 }
 
+/// Copies a string; an error if it is null or no UTF-8.
 unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
     if pointer.is_null() {
         return Err(null_pointer(what));
@@ -184,7 +185,8 @@ pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
 
-/// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] if it is null or empty.
+/// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] if it is null or empty, an error if it is no URI of
+/// a file.
 unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
     if location.is_null() {
         return Ok(PathBuf::from(NO_FOLDER));
@@ -259,7 +261,8 @@ fn into_component<M: Model>(
     .cast()
 }
 
-/// Frees the instance. Does nothing during another call of the instance (stepInProgress).
+/// Frees the instance. Does nothing for null, during another call of the instance (stepInProgress), and while the
+/// importer sets inputs within a step.
 pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     let component = component.cast::<Component<M>>();
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
@@ -289,7 +292,8 @@ fn render(description: &ModelDescription) -> Result<String, Failure> {
     Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
 }
 
-/// Passes the model description that `make` makes, or an error message, to `sink`.
+/// Passes the model description that `make` makes, or an error message, to `sink`. Returns 0 for a description and 1
+/// for an error.
 unsafe fn pass_description(
     resources: *const c_char,
     context: *mut c_void,

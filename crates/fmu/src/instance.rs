@@ -66,7 +66,7 @@ pub(crate) struct Instance<M: Model> {
     /// Integrates a model that has no step of its own.
     stepper: Stepper,
     callbacks: Callbacks,
-    /// Whether debug logging is on: whether messages of the model that are no warnings are sent.
+    /// Whether messages of the model that are no warnings are sent.
     debug_logging: bool,
     /// Messages of the model that are not sent yet.
     messages: Vec<Message>,
@@ -76,9 +76,10 @@ pub(crate) struct Instance<M: Model> {
     strings: Vec<std::ffi::CString>,
     /// Buffer for `fmi2GetDirectionalDerivative`, created by its first call.
     direction: Option<M>,
-    /// What an instance of FMI 3.0 has in addition.
+    /// The additional part of an instance of FMI 3.0; `None` in FMI 2.0.
     session: Option<Box<Session>>,
-    /// FMI 3.0 only. As a pointer: a program that makes no instance of FMI 3.0 does not contain the function.
+    /// [`Instance::lay_out`], in FMI 3.0 only. It is a pointer so that a program that makes no instance of FMI 3.0 does
+    /// not contain the function.
     lay_out: Option<LayOut<M>>,
     hook_guard: HookGuard,
 }
@@ -148,8 +149,8 @@ impl<M: Model> Instance<M> {
         Ok(instance.into_type(interface_type))
     }
 
-    /// Makes the model and its interface. `session` makes the part of FMI 3.0, and refuses what the
-    /// importer may not ask for: inside of the fence, because the model is dropped then.
+    /// Makes the model and its interface inside the panic fence. `session` checks the arguments of the importer and
+    /// makes the part of FMI 3.0; it runs inside the fence, too, because the model is dropped if it fails.
     fn build(
         make: impl FnOnce() -> Result<M, Failure>,
         callbacks: Callbacks,
@@ -160,7 +161,7 @@ impl<M: Model> Instance<M> {
     ) -> Result<Self, Failure> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
-        let build = guarded(|| {
+        let complete = guarded(|| {
             let mut fresh = make()?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, mut description) = Interface::new(&mut fresh)?;
@@ -183,7 +184,7 @@ impl<M: Model> Instance<M> {
                 hook_guard,
             })
         })?;
-        Ok(build(hook_guard))
+        Ok(complete(hook_guard))
     }
 
     /// An instance for co-simulation of `model` in the same program, with its model description of FMI 2.0.
@@ -222,26 +223,27 @@ impl<M: Model> Instance<M> {
             return Status::Fatal;
         }
         // A boxed failure keeps the result of a successful call in one register.
-        let done = if function.is_allowed(self.core.interface_type, state) {
+        let result = if function.is_allowed(self.core.interface_type, state) {
             guarded(|| {
-                let done = body(self).map_err(Box::new);
+                let result = body(self).map_err(Box::new);
                 if let Some(log) = self.core.model.log().filter(|log| !log.is_empty()) {
                     self.messages = log.take();
                 }
-                done
+                result
             })
         } else {
             Err(Box::new(Failure::Error(format!("must not be called in state {state:?}"))))
         };
         let warned = !self.messages.is_empty() && self.send_messages();
-        match done {
+        match result {
             Ok(()) if warned => Status::Warning,
             Ok(()) => Status::OK,
             Err(failure) => self.fail(function, &failure),
         }
     }
 
-    /// Sends the messages of the model to the importer. Returns whether one is a warning.
+    /// Sends the messages of the model to the importer, the ones that are no warnings only if debug logging is on.
+    /// Returns whether one is a warning.
     #[cold]
     pub(crate) fn send_messages(&mut self) -> bool {
         let mut warned = false;
@@ -258,6 +260,7 @@ impl<M: Model> Instance<M> {
         warned
     }
 
+    /// Changes the state after a failure, logs it, and returns its status.
     #[cold]
     fn fail<F: Function>(&mut self, function: F, failure: &Failure) -> Status {
         let (status, category) = match failure {
@@ -289,8 +292,8 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Frees the instance. Drops its models one after another, so that a panic in one destructor does
-    /// not abort the process in another.
+    /// Frees the instance, and logs a panic of the model. Drops the models one after another, so that a panic in one
+    /// destructor does not abort the process in another.
     pub(crate) fn free(self) {
         let Self { core, fresh, direction, callbacks, categories, session, hook_guard, .. } = self;
         let dropped =
@@ -308,13 +311,14 @@ impl<M: Model> Instance<M> {
         log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
 
-    /// Turns the messages of the model on or off that are no warnings: `loggingOn`.
+    /// `loggingOn`: turns the messages of the model that are no warnings on or off.
     pub(crate) fn set_logging_on(&mut self, on: bool) {
         self.debug_logging = on;
     }
 
-    /// `fmi2SetDebugLogging`. Messages that explain a status are sent even if debug logging is off
-    /// (section 2.1.3). If categories are given, only their messages are sent.
+    /// The categories of `fmi2SetDebugLogging`: only their messages are sent; all messages if `categories` is empty. An
+    /// error for an unknown category. Messages that explain a status are sent even if debug logging is off (section
+    /// 2.1.3).
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
         self.check_categories(&categories)?;
         self.categories = (!categories.is_empty()).then_some(categories);
@@ -333,7 +337,8 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// `fmi2SetupExperiment`.
+    /// `fmi2SetupExperiment`. An error for a start time that is not finite, a stop time before it, and a tolerance that
+    /// is not finite and above zero.
     pub(crate) fn setup_experiment(&mut self, experiment: Experiment) -> Result<(), Failure> {
         let Experiment { start_time, stop_time, tolerance } = experiment;
         if !start_time.is_finite() {
@@ -353,7 +358,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2EnterInitializationMode`.
+    /// `fmi2EnterInitializationMode`: computes the initial values.
     pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), Failure> {
         self.core.state = State::InitializationMode;
         self.core.stale = true;
@@ -382,7 +387,7 @@ impl<M: Model> Instance<M> {
         self.fit_layout()
     }
 
-    /// Recomputes the outputs if a value was set since the last computation.
+    /// Recomputes the outputs if a value was set since the last computation; in initialization mode the initial values.
     #[inline]
     fn refresh(&mut self) -> Result<(), Failure> {
         if self.core.stale { self.recompute() } else { Ok(()) }
@@ -404,7 +409,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Returns the step from the present time, and the time of its end, if the model may make it.
+    /// Checks a communication step and the parameters. Returns the step from the present time, and the time of its end.
     #[inline]
     fn begin_step(&mut self, start: f64, size: f64) -> Result<(Step, f64), Failure> {
         let core = &mut self.core;
@@ -453,7 +458,7 @@ impl<M: Model> Instance<M> {
     }
 }
 
-/// Checks the GUID or the token that the importer read in the description.
+/// Checks that the GUID or token that the importer read in the description is the one of the library.
 fn check_guid<M: Model>(
     guid_of_library: Guid,
     what: &str,
@@ -479,15 +484,16 @@ fn drop_inside_fence<T>(value: T) -> Result<(), Failure> {
     })
 }
 
+/// Logs a message if `selected` has its category or is `None`, or if its status needs an explanation.
 fn log(
     callbacks: &Callbacks,
-    chosen: Option<&[String]>,
+    selected: Option<&[String]>,
     status: Status,
     category: &str,
     message: &str,
 ) {
-    let is_chosen = chosen.is_none_or(|names| names.iter().any(|name| name == category));
-    if is_chosen || callbacks.needs(status) {
+    let is_selected = selected.is_none_or(|names| names.iter().any(|name| name == category));
+    if is_selected || callbacks.needs(status) {
         callbacks.log(status, category, message);
     }
 }
@@ -498,7 +504,7 @@ fn time_tolerance(time: f64) -> f64 {
     1e-9 * time.abs().max(1.0)
 }
 
-/// Returns the step from the instance's `time` to `start + size`.
+/// Returns the step from the instance's `time` to `start + size`; an error if there is none.
 ///
 /// If `start` differs from `time` only by rounding, the step has the given size, so that the model
 /// sees equal communication steps as equal.

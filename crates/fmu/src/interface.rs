@@ -27,7 +27,7 @@ pub(crate) use slot::Slot;
 use slot::SlotBuilder;
 pub(crate) use typed::Native;
 
-/// A continuous state: positions of state and derivative among the Reals, and the nominal value.
+/// A continuous state: the positions of state and derivative in [`Interface::reals`], and the nominal value.
 pub(crate) struct ContinuousState {
     pub(crate) state: usize,
     pub(crate) derivative: usize,
@@ -47,13 +47,14 @@ pub(crate) struct Interface<M> {
     /// Number of event indicators; `None` without model exchange.
     pub(crate) event_indicators: Option<usize>,
     pub(crate) max_output_derivative_order: u32,
-    /// Positions of the inputs with derivatives among the Reals.
+    /// Positions in `reals` of the inputs with derivatives.
     pub(crate) interpolated: Vec<usize>,
     /// The names of the log categories.
     pub(crate) log_categories: Vec<String>,
     pub(crate) guid: Guid,
     /// The structural parameters that are the extents of arrays.
     sizes: sizes::Sizes,
+    /// The clocks of clocked variables.
     pub(crate) clocks: clocks::Clocks,
 }
 
@@ -61,8 +62,8 @@ pub(crate) struct Interface<M> {
 type TypedReference = (Kind, u32);
 
 impl<M: Model> Interface<M> {
-    /// Assigns slots and value references to the variables of `model` and makes their description with
-    /// start values.
+    /// Assigns slots and value references to the variables of `model` and makes the model description with start
+    /// values. It has the variables of every version of FMI; see [`Interface::restrict`] and [`Interface::convert`].
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
         let (variables, fields) = split(model.variables());
         let mut description = general::general::<M>(model);
@@ -125,7 +126,7 @@ impl<M: Model> Interface<M> {
         }
     }
 
-    /// Assigns slot, value reference and type to each variable. An alias shares the value reference and
+    /// Assigns slot, value reference and type to each variable. An alias has no slot, and the value reference and
     /// type of its variable.
     fn assign_references(
         &mut self,
@@ -152,7 +153,7 @@ impl<M: Model> Interface<M> {
     }
 
     /// Assigns the next value reference of its type to the variable. Returns it with the type, whose start
-    /// value is the field's value if the variable has a start value.
+    /// value is the value of the field, unless the variable has `initial = calculated`.
     fn assign_reference(
         &mut self,
         model: &mut M,
@@ -199,8 +200,8 @@ impl<M: Model> Interface<M> {
     }
 }
 
-/// Splits the variables into what describes them and their fields. Those that FMI 2.0 leaves out come last:
-/// the indices of the others must not change.
+/// Splits the variables into their declarations and their fields. Variables that descriptions of FMI 2.0 leave out come
+/// last, so that the others keep their indices without them.
 fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
     let (last, first): (Vec<_>, Vec<_>) =
         variables.into_iter().partition(|variable| variable.declaration.is_left_out_of_2());
@@ -236,7 +237,8 @@ fn integer(number: Number) -> Result<IntegerType, String> {
     Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
 }
 
-/// Returns the continuous state at position `state` of the variables, with its derivative.
+/// Returns the continuous state at position `state` of the variables, with the derivative at position `derivative`; an
+/// error if one of them is no Real.
 fn continuous_state(
     description: &ModelDescription,
     state: usize,
@@ -256,13 +258,14 @@ fn continuous_state(
     Ok(ContinuousState { state, derivative, nominal: nominal.unwrap_or(1.0) })
 }
 
-/// Makes the model description of `M`, with the folder `resources`, as packing writes it to
+/// Makes the model description of FMI 2.0 of `M`, with the folder `resources`, as packing writes it to
 /// `modelDescription.xml`.
 ///
 /// # Errors
 ///
 /// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration
-/// that cannot be described, such as a type that FMI 2.0 does not have; the failure of [`Model::new`].
+/// that cannot be described, such as a type that FMI 2.0 does not have (clocks and structural parameters are left out);
+/// the failure of [`Model::new`].
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     let (mut interface, mut description) = Interface::new(&mut new_model::<M>(resources)?)?;
     interface.restrict(&mut description)?;
@@ -301,15 +304,17 @@ fn is_of_3(variable: &ScalarVariable) -> bool {
 ///
 /// # Errors
 ///
-/// Same as [`describe`].
+/// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration that cannot be
+/// described, and for an array whose extents are not the values of its structural parameters; the failure of
+/// [`Model::new`].
 pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
     Ok(interface.convert(&description, InterfaceType::CoSimulation)?.1)
 }
 
 impl<M> Interface<M> {
-    /// Restricts to FMI 2.0, which has neither clocks nor structural parameters, whose arrays have the
-    /// present extents.
+    /// Removes clocks and structural parameters, which FMI 2.0 does not have, from the description, and sets the GUID
+    /// of what remains. Arrays have their present extents.
     ///
     /// # Errors
     ///
@@ -334,13 +339,14 @@ impl<M> Interface<M> {
         expressible_in_2(description)
     }
 
-    /// Converts to FMI 3.0: the GUID becomes the `instantiationToken`, and in model exchange continuous states
-    /// may be set in event mode unless an event changes them (section 2.3.5).
+    /// Converts the description to FMI 3.0, and sets when each Real may be set in an instance of `interface_type`. The
+    /// GUID becomes the `instantiationToken`. In model exchange continuous states may be set in event mode unless an
+    /// event changes them (section 2.3.5).
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] if the extents of an array are not the values of its structural parameters, or a
-    /// clock of a variable is none.
+    /// [`Failure::Error`] if the extents of an array are not the values of its structural parameters, or if a name in
+    /// the clocks of a variable is not the name of a clock.
     pub(crate) fn convert(
         &mut self,
         description: &ModelDescription,
@@ -374,7 +380,7 @@ impl<M> Interface<M> {
     }
 }
 
-/// Calls [`Model::new`]. If it fails and the importer named no folder, the message says so.
+/// Calls [`Model::new`]. If it fails and the importer named no folder, the message adds that.
 pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
     M::new(resources).map_err(|failure| {
         if resources != std::path::Path::new(NO_FOLDER) {
@@ -395,7 +401,7 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 ///
 /// # Errors
 ///
-/// Same as [`describe`].
+/// Same as [`describe_3`].
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
     if description.variables.iter().any(is_of_3) {

@@ -14,7 +14,7 @@ use fmu_description::call_order::Function;
 /// An instance for co-simulation in the same program, where no library can be loaded.
 ///
 /// Each function is the one of FMI 2.0 with this name: the same checks, call order, panic fence and
-/// numbers as in the FMU. It returns the status of FMI; [`Linked::take_messages`] has the reasons.
+/// numbers as in the FMU. It returns the status of FMI; [`Linked::take_messages`] returns the reasons.
 pub struct Linked<M: Model> {
     instance: Instance<M>,
     description: ModelDescription,
@@ -33,11 +33,12 @@ macro_rules! calls {
 }
 
 impl<M: Model> Linked<M> {
-    /// An instance of `model`.
+    /// Creates an instance of `model`.
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] if the variables of the model cannot be described.
+    /// [`Failure::Error`] if the variables of the model cannot be described in FMI 2.0; [`Failure::Fatal`] if the model
+    /// panics.
     pub fn new(model: M) -> Result<Self, Failure> {
         let messages = Arc::new(Mutex::new(Vec::new()));
         let (instance, description) = Instance::linked(model, Callbacks::Linked(messages.clone()))?;
@@ -49,7 +50,7 @@ impl<M: Model> Linked<M> {
         &self.description
     }
 
-    /// Returns the messages since the last call, and forgets them.
+    /// Returns and removes the messages since the last call of this function.
     pub fn take_messages(&mut self) -> Vec<String> {
         std::mem::take(&mut *self.messages.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -104,7 +105,7 @@ impl<M: Model> Linked<M> {
         self.instance.is_terminated()
     }
 
-    /// `fmi2GetFMUstate`: saves the state in `slot` (0, 1, 2, ...).
+    /// `fmi2GetFMUstate`: saves the state in `slot` (0, 1, 2, ...), which is empty after a failure.
     pub fn save_state(&mut self, slot: usize) -> Status {
         let mut saved = None;
         let status = self.instance.call(Function::GetFMUstate, |instance| {
@@ -118,7 +119,7 @@ impl<M: Model> Linked<M> {
         status
     }
 
-    /// `fmi2SetFMUstate`: restores the state of `slot`.
+    /// `fmi2SetFMUstate`: restores the state of `slot`; [`Status::Error`] if it is empty.
     pub fn restore_state(&mut self, slot: usize) -> Status {
         let saved = self.saved.get(slot).and_then(Option::as_ref);
         self.instance.call(Function::SetFMUstate, |instance| match saved {
@@ -135,7 +136,7 @@ impl<M: Model> Linked<M> {
         })
     }
 
-    /// `fmi2DeSerializeFMUstate` and `fmi2SetFMUstate`.
+    /// `fmi2DeSerializeFMUstate` and `fmi2SetFMUstate`: restores the state in `bytes`.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Status {
         self.instance.call(Function::SetFMUstate, |instance| {
             let snapshot = instance.read_snapshot(bytes)?;

@@ -3,7 +3,7 @@
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Most messages of one call; further ones are counted.
+/// The largest number of messages of one call; further ones are dropped and counted.
 const LIMIT: usize = 1000;
 
 /// The messages of a model to the importer's logger.
@@ -11,7 +11,7 @@ const LIMIT: usize = 1000;
 /// A model that logs has a field of this type, and [`Model::log`](crate::Model::log) returns it
 /// (`#[fmu::model]` does so). After each call the exporter sends the messages and empties the field, so it
 /// is not part of the FMU state: its serialised form is empty. A message that is repeated within a call is
-/// sent once.
+/// sent once; messages beyond 1000 in one call are only counted.
 ///
 /// [`Model::update`](crate::Model::update) also runs at states that an integrator only tries; messages about
 /// what has happened belong to the other functions.
@@ -50,6 +50,7 @@ impl Log {
         self.add(None, text.into());
     }
 
+    /// Adds a message, unless it is there.
     fn add(&mut self, category: Option<&'static str>, text: String) {
         let message = Message { category, text };
         if self.messages.contains(&message) {
@@ -73,7 +74,7 @@ impl Log {
         self.messages.iter().map(|message| message.text.as_str())
     }
 
-    /// Removes and returns all messages.
+    /// Removes and returns all messages, with a warning that states how many were dropped.
     pub(crate) fn take(&mut self) -> Vec<Message> {
         let mut messages = std::mem::take(&mut self.messages);
         let dropped = std::mem::take(&mut self.dropped);

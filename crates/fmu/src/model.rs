@@ -111,8 +111,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// follow their polynomials. A model without states needs no step either: only its events happen,
     /// and `update` runs at the end.
     ///
-    /// A step is at most as long as 1e7 steps of the default experiment, which are 1 s if it states none, or
-    /// 1e7 intervals of a periodic clock; the exporter discards a longer one.
+    /// A step is at most as long as 1e7 steps of the default experiment, which are 1 s if it states none, and as 1e7
+    /// intervals of each periodic clock; the exporter discards a longer one.
     ///
     /// # Errors
     ///
@@ -193,8 +193,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     ///
     /// It may be called when nothing has happened, and several times at one time: importers do so, and the
     /// default [`Model::step`]. So it decides from the values of the fields what to change. If there are clocked
-    /// variables ([`Variable::clocked_by`]), values that are read while a clock ticks are those that this function
-    /// gives to a copy of the model.
+    /// variables ([`Variable::clocked_by`]), the exporter also calls it to read values while a clock ticks, and then
+    /// restores the model.
     ///
     /// # Errors
     ///
@@ -207,14 +207,14 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// Sets the fields of the triggered clocks that tick in the event at `time` (in s), and that are no
     /// inputs ([`Variable::triggered_clock`]). The fields are false before, and after the event.
     ///
-    /// Called where event mode begins, when the importer has set its clocks, and where discrete states are
+    /// Called when event mode starts, when the importer has set its clocks, and when discrete states are
     /// updated again, each time before [`Model::event`]. The default implementation does nothing.
     fn tick(&mut self, time: f64) {
         let _ = time;
     }
 
-    /// Takes from `current`, the model of the instance, what a state that was read from bytes lacks: fields that are not
-    /// serialised because they follow from the files of the FMU. The default implementation does nothing.
+    /// Takes from `current`, the model of the instance, what a state that was read from bytes lacks: fields that are
+    /// not serialised because they follow from the files of the FMU. The default implementation does nothing.
     fn complete(&mut self, current: &Self) {
         let _ = current;
     }
@@ -319,7 +319,7 @@ pub enum Failure {
         message: String,
     },
     /// The model has no step of its own, or not for this step, and has not changed: the exporter
-    /// integrates its equations. Only [`Model::step`] returns it.
+    /// integrates its equations. Only [`Model::step`] and [`Model::step_to_event`] return it.
     #[error("the model has no step of its own; fmu::Simulation integrates its equations")]
     Unsolved,
     /// `fmi2Error`: the instance can only be read, reset, restored to a saved state, or freed.

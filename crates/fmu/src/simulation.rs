@@ -39,8 +39,8 @@ impl<M: Model> Simulation<M> {
         &self.model
     }
 
-    /// The model, for setting parameters before the start and inputs between steps. Outputs follow with
-    /// the next call of [`Model::update`] or [`Simulation::step`].
+    /// The model, for setting parameters before the start and inputs between steps. The next call of
+    /// [`Model::update`] or [`Simulation::step`] computes the outputs.
     pub fn model_mut(&mut self) -> &mut M {
         &mut self.model
     }
@@ -69,8 +69,9 @@ impl<M: Model> Simulation<M> {
     ///
     /// # Errors
     ///
-    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations;
-    /// [`Failure::Discard`] for a step as long as 1e7 steps of the default experiment.
+    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations; [`Failure::Discard`]
+    /// for a step that is too long ([`Model::step`] states how long it may be); in the first step the failures of
+    /// [`Simulation::start`].
     pub fn step(&mut self, size: f64) -> Result<(), Failure> {
         if !self.is_started {
             self.start(Experiment::default())?;
@@ -80,7 +81,7 @@ impl<M: Model> Simulation<M> {
         stepper.check_size(size)?;
         match model.step(&step) {
             Err(Failure::Unsolved) => stepper.run(model, interface, &step, experiment.tolerance)?,
-            done => done?,
+            result => result?,
         }
         self.time = step.end();
         interface.clear_input_derivatives(model);

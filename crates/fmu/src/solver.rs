@@ -6,7 +6,7 @@
 //! * [`Integrator`] integrates a [`System`] of any size with an adaptive step and stops at the first
 //!   state event.
 //! * [`Step`] is one step of the method, for arrays (`[f64; 4]`) and vectors.
-//! * [`Quartic`] and [`search`] locate the first point at which a margin becomes negative.
+//! * [`Quartic`] estimates the first point at which a margin becomes negative; [`search`] and [`locate`] find it.
 //!
 //! Method: Dormand-Prince of order 5(4). It suits systems that are not stiff; an importer integrates a
 //! stiff model better by model exchange.

@@ -33,6 +33,7 @@ pub(crate) struct Stepper {
     tolerance: f64,
     /// The longest communication step in s.
     longest: f64,
+    /// Whether the model has states or event indicators.
     has_equations: bool,
     state: Vec<f64>,
     /// The inputs with derivatives at the start of the step.
@@ -65,12 +66,12 @@ impl Stepper {
         if size <= self.longest { Ok(()) } else { Err(too_long(size, self.longest)) }
     }
 
-    /// Checks that the importer handles an event at `time` in s before too many are due since `next`, the
-    /// time in s of the next one.
+    /// Checks that an event at `time` is at most as long after `next`, the time for which an event was announced, as a
+    /// communication step may be; both in s. A model that samples might not return from a later one.
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] if it is too late.
+    /// [`Failure::Error`] if it is later.
     pub(crate) fn check_delay(&self, next: f64, time: f64) -> Result<(), Failure> {
         if time - next <= self.longest {
             return Ok(());
@@ -81,7 +82,7 @@ impl Stepper {
 
     /// Advances the model over the step: handles the event at its start, and then integrates from event
     /// to event. Inputs with derivatives follow their polynomials; after the step they have their values
-    /// of before.
+    /// at its start.
     ///
     /// # Errors
     ///
@@ -95,12 +96,12 @@ impl Stepper {
         tolerance: Option<f64>,
     ) -> Result<(), Failure> {
         self.with_equations(model, interface, step, tolerance, |stepper, equations| {
-            stepper.follow(equations, step)
+            stepper.run_with_events(equations, step)
         })
     }
 
-    /// Advances the model to the end of the step, or to the first state event or to the event at `next`
-    /// (in s). It handles no event.
+    /// Advances the model to the end of the step, to the first state event or to the event at `next` in s, whichever is
+    /// first. It handles no event, and does nothing if `next` is not after the start of the step.
     ///
     /// # Errors
     ///
@@ -141,20 +142,21 @@ impl Stepper {
         let mut inputs = std::mem::take(&mut self.inputs);
         interface.read_interpolated(model, &mut inputs);
         let mut equations = Equations { model, interface, start: step.start, inputs: &inputs };
-        let done = body(self, &mut equations);
+        let result = body(self, &mut equations);
         interface.write_interpolated(model, &inputs);
         self.inputs = inputs;
-        done
+        result
     }
 
-    fn follow<M: Model>(
+    /// Integrates over the step and handles its events.
+    fn run_with_events<M: Model>(
         &mut self,
         equations: &mut Equations<'_, M>,
         step: &Step,
     ) -> Result<(), Failure> {
         let (mut time, end) = (step.start, step.end());
         for _ in 0..EVENT_LIMIT {
-            let next = equations.settle(time).map_err(|failure| stopped(failure, time))?;
+            let next = equations.handle_event(time).map_err(|failure| stopped(failure, time))?;
             let target = next.map_or(end, |next| next.min(end));
             let reached = self.integrate(equations, time, target)?;
             time = if reached == Reached::End { target } else { self.integrator.time() };
@@ -162,7 +164,7 @@ impl Stepper {
                 return Ok(());
             }
             if time >= end {
-                equations.settle(time).map_err(|failure| stopped(failure, time))?;
+                equations.handle_event(time).map_err(|failure| stopped(failure, time))?;
                 return equations.model.update(time).map_err(|failure| stopped(failure, time));
             }
         }
@@ -203,7 +205,8 @@ fn too_long(size: f64, longest: f64) -> Failure {
     ))
 }
 
-/// Returns the failure of a step that reached `time`, which a call that does only a part must name.
+/// Returns the failure of a step that reached `time`: [`Failure::Discard`] becomes [`Failure::Incomplete`], because the
+/// model has changed.
 fn stopped(failure: Failure, time: f64) -> Failure {
     match failure {
         Failure::Discard(message) => Failure::Incomplete { time, message },
@@ -227,8 +230,9 @@ impl<M: Model> Equations<'_, M> {
         self.model.update(time)
     }
 
-    /// Handles an event and returns the time of the next one, if the model knows it.
-    fn settle(&mut self, time: f64) -> Result<Option<f64>, Failure> {
+    /// Handles the event at `time`, until no new discrete states are needed, and returns the time of the next one, if
+    /// the model states it.
+    fn handle_event(&mut self, time: f64) -> Result<Option<f64>, Failure> {
         for _ in 0..ITERATION_LIMIT {
             let event = self.model.event(time)?;
             if let Some(message) = event.terminate_simulation {

@@ -57,7 +57,7 @@ impl Enumeration {
     }
 }
 
-/// Attributes that depend on the type of a variable.
+/// The attributes of a variable that only some types have.
 #[derive(Clone, Default)]
 pub(crate) struct Number {
     pub(crate) unit: Option<String>,
@@ -92,7 +92,7 @@ pub(crate) struct Fields<M> {
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
-/// Defines constructors of local variables, each with the value in the field that `field` borrows.
+/// Defines constructors of local variables. `field` borrows the field with the value.
 macro_rules! constructors {
     ($($(#[$documentation:meta])*
         $constructor:ident($access:ident::$variant:ident($native:ty), $variability:ident);)*) => {
@@ -176,8 +176,8 @@ impl<M> Variable<M> {
     /// [`tunable`](Variable::tunable), in reconfiguration mode as well. After that
     /// [`Model::resize`](crate::Model::resize) runs. State the largest value with [`Variable::max`].
     ///
-    /// FMI 2.0 has no structural parameters: there it is no variable, and the arrays have the extents of
-    /// [`Model::new`](crate::Model::new).
+    /// FMI 2.0 has no structural parameters: its description leaves them out, and the arrays have the extents that they
+    /// have after [`Model::new`](crate::Model::new).
     pub fn structural<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut u64 + Send + Sync + 'static,
@@ -191,8 +191,8 @@ impl<M> Variable<M> {
     /// 2.2.8; `intervalVariability = constant`). The importer ticks it in event mode: the field is true in the
     /// next call of [`Model::event`](crate::Model::event), and false afterwards.
     ///
-    /// FMI 2.0 has no clocks: there it is no variable. Nor does an importer without event mode tick it. A
-    /// model that also runs there states its ticks by
+    /// FMI 2.0 has no clocks: its description leaves them out. An importer without event mode does not tick them
+    /// either. A model that also runs there states its ticks by
     /// [`Event::next_event_time`](crate::Event::next_event_time) as well.
     pub fn periodic_clock<F>(
         name: impl Into<String>,
@@ -209,7 +209,7 @@ impl<M> Variable<M> {
     }
 
     /// Creates an input clock whose intervals the model determines (FMI 3.0.2, section 2.2.8): `interval` is the field
-    /// with an interval in s. The clock is otherwise as a [`Variable::periodic_clock`].
+    /// with an interval in s. In all other respects the clock is like a [`Variable::periodic_clock`].
     ///
     /// * `Fixed` and `Tunable`: the clock is periodic, with an interval that depends on parameters; for `Tunable` they
     ///   may change during the run, and the next tick starts the new interval.
@@ -238,7 +238,7 @@ impl<M> Variable<M> {
     ///
     /// The importer ticks an input clock in event mode: the field is true in the next call of
     /// [`Model::event`](crate::Model::event), and false afterwards. [`Model::tick`](crate::Model::tick) sets the
-    /// field of another clock when it ticks. FMI 2.0 has no clocks: there it is no variable.
+    /// field of another clock when it ticks. FMI 2.0 has no clocks: its description leaves them out.
     pub fn triggered_clock<F>(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -305,7 +305,7 @@ impl<M> Variable<M> {
         self.any_parameter(Variability::Tunable)
     }
 
-    /// Makes the variable a parameter of this variability; a structural parameter remains one.
+    /// Makes the variable a parameter of this variability; a structural parameter remains a structural one.
     fn any_parameter(mut self, variability: Variability) -> Self {
         let declaration = &mut self.declaration;
         if declaration.causality != Causality::StructuralParameter {
@@ -323,7 +323,7 @@ impl<M> Variable<M> {
         self
     }
 
-    /// States for an element of an array which structural parameters are the extents of the array, one
+    /// States the structural parameters that are the extents of the array with this element, one
     /// name for each dimension. All elements of the array state the same names.
     ///
     /// ```
@@ -331,8 +331,8 @@ impl<M> Variable<M> {
     /// struct Filter { n: u64, gains: Vec<f64> }
     /// # impl Filter {
     /// fn variables(&self) -> Vec<Variable<Self>> {
-    ///     let mut all = vec![Variable::structural("n", "Order", |own: &mut Self| &mut own.n).max(9.0)];
-    ///     let gains = Variable::real_array("K", "Gain", &[self.gains.len()], |own: &mut Self| &mut own.gains[..]);
+    ///     let mut all = vec![Variable::structural("n", "Order", |model: &mut Self| &mut model.n).max(9.0)];
+    ///     let gains = Variable::real_array("K", "Gain", &[self.gains.len()], |model: &mut Self| &mut model.gains[..]);
     ///     all.extend(gains.map(|element| element.parameter().sized_by(&["n"])));
     ///     all
     /// }
@@ -496,7 +496,7 @@ impl<M> Variable<M> {
     }
 }
 
-/// Variables of the types that FMI 2.0 does not have. A model with one of them leaves as FMI 3.0
+/// Variables of the types that FMI 2.0 does not have. A model with one of them can be exported for FMI 3.0
 /// only: `aso-ftc pack --fmi 3`.
 impl<M> Variable<M> {
     constructors! {
@@ -521,7 +521,8 @@ impl<M> Variable<M> {
     }
 }
 
-/// Returns the name of the element at a position in row-major order.
+/// Returns the name of the element of an array at a position in row-major order: `name[1,2]`, or `der(x[1,2])` of
+/// `der(x)`.
 pub(crate) fn element_name(name: &str, extents: &[usize], position: usize) -> String {
     let mut left = position;
     let mut indices: Vec<_> = extents

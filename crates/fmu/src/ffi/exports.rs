@@ -3,8 +3,8 @@
 /// Exports a [`Model`](crate::Model) with all C functions of FMI 2.0 and FMI 3.0. Write it as the last line of the
 /// model's library, which must be a `cdylib`.
 ///
-/// The library also has the functions of model exchange if the model has no such interface;
-/// `fmi2Instantiate` for model exchange then fails.
+/// The library also exports the functions of model exchange if the model does not offer it; `fmi2Instantiate` for model
+/// exchange then fails.
 ///
 /// ```
 /// use std::path::Path;
@@ -159,8 +159,7 @@ macro_rules! export {
     };
 }
 
-/// Defines exported C functions, which call the generic functions for the model, from the types of their
-/// arguments.
+/// Defines exported C functions from the types of their arguments. They call the generic functions for the model.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {

@@ -16,7 +16,7 @@ pub use values::*;
 use std::ffi::{c_char, c_void};
 
 use super::{fmi2Integer, pass_description};
-use crate::model::{Failure, Model};
+use crate::model::Model;
 use fmu_description::abi::DescribeSink;
 use fmu_description::abi3::{self, fmi3String};
 
@@ -54,9 +54,4 @@ pub unsafe fn describe<M: Model>(
 ) -> fmi2Integer {
     // SAFETY: the arguments are passed on unchanged.
     unsafe { pass_description(resources, context, sink, crate::interface::describe_3::<M>) }
-}
-
-/// The failure of a function that a model without clocks or with one interface cannot fulfil.
-fn unavailable(reason: &str) -> Failure {
-    Failure::Error(reason.to_owned())
 }

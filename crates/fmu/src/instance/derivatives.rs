@@ -18,7 +18,8 @@ fn is_known<M>(slot: &Slot<M, f64>, initializing: bool) -> bool {
 }
 
 impl<M: Model> Instance<M> {
-    /// `fmi2GetDirectionalDerivative`: `to = (dh/dv) delta` for the unknowns h and the knowns v.
+    /// `fmi2GetDirectionalDerivative`: `to = (dh/dv) delta` for the unknowns h and the knowns v. An error if the model
+    /// has no derivatives, or if a variable is no unknown or known in the present mode.
     pub(crate) fn get_directional_derivative(
         &mut self,
         unknowns: &[u32],

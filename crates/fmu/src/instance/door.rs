@@ -1,5 +1,5 @@
-//! What [`Instance::call`](super::Instance::call), the door of every C function with an instance, knows of
-//! a function: the rules of its version of FMI.
+//! The rules of both versions of FMI for a C function with an instance, which
+//! [`Instance::call`](super::Instance::call) applies.
 
 use crate::model::Failure;
 use fmu_description::call_order::{self, InterfaceType, State};
@@ -19,7 +19,7 @@ pub(crate) trait Function: Copy {
     /// Whether the function returns `fmi2Discard` or `fmi3Discard` for `failure`.
     fn discards(self, interface: InterfaceType, failure: &Failure) -> bool;
 
-    /// Whether a discarded call may have done a part of the step.
+    /// Whether a discarded call may have advanced the model by a part of the step.
     fn keeps_partial_step(self) -> bool;
 }
 

@@ -6,7 +6,7 @@ use crate::room::{Room, filled};
 use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::{InterfaceType, State};
 
-/// Checks that the length of an array is as the model description states.
+/// Checks that the length of an array is the number of `what` in the model description.
 fn check_length(what: &str, actual: usize, expected: usize) -> Result<(), Failure> {
     if actual == expected {
         return Ok(());
@@ -15,7 +15,7 @@ fn check_length(what: &str, actual: usize, expected: usize) -> Result<(), Failur
 }
 
 impl<M: Model> Instance<M> {
-    /// `fmi2EnterEventMode`.
+    /// `fmi2EnterEventMode`. An error after `stopTime`, and in model exchange too long after the next event.
     pub(crate) fn enter_event_mode(&mut self) -> Result<(), Failure> {
         let core = &mut self.core;
         core.before_stop(core.time)?;
@@ -36,7 +36,8 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Handles an event: `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
+    /// Handles an event, for `fmi2NewDiscreteStates` and `fmi3UpdateDiscreteStates`. Logs the reason if the model ends
+    /// the simulation.
     pub(crate) fn update_discrete_states(&mut self) -> Result<Event, Failure> {
         let core = &mut self.core;
         core.check()?;
@@ -68,9 +69,9 @@ impl<M: Model> Instance<M> {
         self.core.stale = true;
     }
 
-    /// `fmi2SetTime`. Allowed in event mode only for an FMU without continuous states (condition 8).
+    /// `fmi2SetTime`. In event mode it is allowed only for an FMU without continuous states (condition 8).
     ///
-    /// The importer may go back to the second last completed step, not over an event (FMI 3.0.2, section 3.2.1).
+    /// The importer may go back to the second last completed step, but not beyond an event (FMI 3.0.2, section 3.2.1).
     /// Integrators that interpolate, such as those of FMPy and fmusim, evaluate the model after `stopTime`; a
     /// completed step or an event there is an error.
     pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {

@@ -20,10 +20,10 @@ use fmu_description::{ModelDescription, NativeType};
 pub(crate) use derivatives::Jacobian;
 use intermediate::Intermediate;
 
-/// The most scalars of one call whose places need no buffer.
+/// The largest number of scalars in one call whose places need no buffer.
 const FEW: usize = 8;
 
-/// What an instance of FMI 3.0 has besides the parts of every instance.
+/// The part of an instance that only FMI 3.0 has.
 pub(crate) struct Session {
     table: Table,
     event_mode_used: bool,
@@ -55,7 +55,7 @@ pub(crate) struct Instantiation<'a> {
 }
 
 impl<M: Model> Instance<M> {
-    /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`.
+    /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`: reads the resources and checks the arguments.
     pub(crate) fn new_3(
         arguments: &Instantiation<'_>,
         callbacks: Callbacks,
@@ -111,7 +111,7 @@ impl<M: Model> Instance<M> {
         Ok(instance.into_type(arguments.interface_type))
     }
 
-    /// Returns the part of FMI 3.0.
+    /// Returns the part of FMI 3.0; an error for an instance of FMI 2.0.
     fn session(&self) -> Result<&Session, Failure> {
         self.session.as_deref().ok_or_else(other_version)
     }
@@ -125,7 +125,8 @@ impl<M: Model> Instance<M> {
         self.session.as_ref().is_some_and(|session| session.event_mode_used)
     }
 
-    /// `fmi3SetDebugLogging`: turns categories on or off, all of them if none is given.
+    /// `fmi3SetDebugLogging`: turns the categories on or off, all of them if `categories` is empty. An error for an
+    /// unknown category.
     pub(crate) fn set_debug_logging_3(
         &mut self,
         on: bool,
@@ -158,7 +159,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3EnterEventMode`.
+    /// `fmi3EnterEventMode`. An error in co-simulation without event mode.
     pub(crate) fn enter_event_mode_3(&mut self) -> Result<(), Failure> {
         if self.core.interface_type == InterfaceType::CoSimulation && !self.uses_event_mode() {
             return Err(Failure::Error("eventModeUsed is false".to_owned()));
@@ -203,7 +204,7 @@ impl<M: Model> Instance<M> {
         self.interface.event_indicators.unwrap_or_default()
     }
 
-    /// `fmi3GetVariableDependencies`: those of the initial values until initialization mode has ended.
+    /// `fmi3GetVariableDependencies`: until initialization mode has ended, the dependencies of the initial value.
     pub(crate) fn dependencies(&self, reference: u32) -> Result<Vec<Dependency>, Failure> {
         let initial = matches!(
             self.core.state,
@@ -212,7 +213,8 @@ impl<M: Model> Instance<M> {
         self.session()?.table.dependencies(reference, initial)
     }
 
-    /// Finds the places of variables of one type, in row-major order, and runs `body` with them.
+    /// Finds the places of the elements of variables of one type, in row-major order, and runs `body` with them. An
+    /// error for a variable of another type, and if there are not `count` elements.
     pub(crate) fn located(
         &mut self,
         kind: NativeType,
@@ -229,7 +231,7 @@ impl<M: Model> Instance<M> {
         self.located_in_arrays(kind, references, count, body)
     }
 
-    /// [`Instance::located`] for a function that sets.
+    /// [`Instance::located`] for a function that sets; an error for a calculated variable.
     pub(crate) fn set_located(
         &mut self,
         kind: NativeType,
@@ -241,7 +243,8 @@ impl<M: Model> Instance<M> {
         self.located(kind, references, count, set)
     }
 
-    /// [`Instance::located`] for a function that reads.
+    /// [`Instance::located`] for a function that reads. While a clock ticks, in a model with clocked variables, it
+    /// reads the values after the event.
     pub(crate) fn read_located(
         &mut self,
         kind: NativeType,
@@ -267,14 +270,13 @@ impl<M: Model> Instance<M> {
         let session = self.session_mut()?;
         let mut places = std::mem::take(&mut session.places);
         let located = session.table.locate(kind, references, count, &mut places);
-        let done = located.and_then(|()| body(self, &places));
+        let result = located.and_then(|()| body(self, &places));
         self.session_mut()?.places = places;
-        done
+        result
     }
 }
 
-/// Checks that the variables that the importer intends to access in intermediate update mode are marked for
-/// it (section 2.3.1).
+/// Checks that the variables of `requiredIntermediateVariables` have `intermediateUpdate = true` (section 2.3.1).
 fn check_required(required: &[u32], description: &ModelDescription) -> Result<(), Failure> {
     for &reference in required {
         let variable =

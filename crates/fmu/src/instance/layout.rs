@@ -25,12 +25,12 @@ pub(super) type Layout = [u8; 8];
 ///
 /// [`Refusal`] if the value's `Serialize` implementation fails.
 pub(super) fn layout(value: &impl Serialize) -> Result<Layout, Refusal> {
-    let mut walk = LayoutHasher(0);
-    value.serialize(&mut walk)?;
-    Ok(walk.0.to_le_bytes())
+    let mut hasher = LayoutHasher(0);
+    value.serialize(&mut hasher)?;
+    Ok(hasher.0.to_le_bytes())
 }
 
-/// The error of a value that cannot be serialised.
+/// The message of a value that cannot be serialised.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct Refusal(String);
@@ -87,7 +87,7 @@ impl LayoutHasher {
     }
 }
 
-/// Serialises types without parts by their names.
+/// Defines functions that hash the name of a type without parts.
 macro_rules! plain {
     ($($function:ident $type:ty;)*) => {
         $(fn $function(self, _: $type) -> Hashed {
@@ -97,7 +97,7 @@ macro_rules! plain {
     };
 }
 
-/// Serialises the start of collections: the words that it adds.
+/// Defines functions that start a collection: they hash its kind and name.
 macro_rules! collections {
     ($($function:ident($($argument:ident: $type:ty),*) => $start:ident($($word:expr),*);)*) => {
         $(fn $function(self, $($argument: $type),*) -> Result<Self, Refusal> {
@@ -201,13 +201,13 @@ impl ser::Serializer for &mut LayoutHasher {
         Ok(())
     }
 
-    /// False, as in postcard, which writes the bytes.
+    /// Returns false, as the serialiser of postcard does, which writes the bytes.
     fn is_human_readable(&self) -> bool {
         false
     }
 }
 
-/// Serialises collections whose parts have no names.
+/// Defines the serialisation of collections whose parts have no names.
 macro_rules! elements {
     ($($collection:ident $function:ident;)*) => {
         $(impl $collection for &mut LayoutHasher {
@@ -233,7 +233,7 @@ elements! {
     SerializeTupleVariant serialize_field;
 }
 
-/// Serialises collections whose parts have names.
+/// Defines the serialisation of collections whose parts have names.
 macro_rules! fields {
     ($($collection:ident)*) => {
         $(impl $collection for &mut LayoutHasher {

@@ -38,7 +38,8 @@ impl<M: Model> Instance<M> {
         Ok(snapshot)
     }
 
-    /// `fmi2SetFMUstate`.
+    /// `fmi2SetFMUstate`. An error for a state of another FMU or interface type, and for a state in event mode if the
+    /// instance of co-simulation does not use it.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot<M>) -> Result<(), Failure> {
         if snapshot.guid != self.guid() {
             let (of, expected) = (snapshot.guid, self.guid());
@@ -75,7 +76,7 @@ impl<M: Model> Snapshot<M> {
         core.map(|core| HEAD + core + CHECKSUM).map_err(|error| failed(&error))
     }
 
-    /// Writes the state to the first bytes of `room`.
+    /// Writes the state to the first bytes of `room`; an error if it has too few.
     pub(crate) fn write(&self, room: &mut Room<u8>) -> Result<(), Failure> {
         let bytes = self.to_bytes()?;
         let (available, needed) = (room.len(), bytes.len());
@@ -88,8 +89,7 @@ impl<M: Model> Snapshot<M> {
         Ok(())
     }
 
-    /// Serialises the state: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all
-    /// before.
+    /// Serialises the state: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all bytes before it.
     pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
         let layout = layout(&self.core).map_err(|error| failed(&error))?;
         let head = [MAGIC.as_slice(), &self.guid.0, &layout].concat();
@@ -102,8 +102,9 @@ impl<M: Model> Snapshot<M> {
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] if `bytes` is truncated or altered, belongs to an FMU other than `guid`, or was
-    /// written by a build whose model has other fields.
+    /// [`Failure::Error`] if `bytes` is truncated or altered, has another version of the format, belongs to an FMU
+    /// other than `guid`, was written by a build whose model has other fields, or is a state that no instance can
+    /// reach.
     pub(crate) fn from_bytes(bytes: &[u8], guid: Guid) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
         if !bytes.starts_with(&MAGIC[..6]) {
@@ -141,7 +142,7 @@ impl<M: Model> Snapshot<M> {
 }
 
 impl<M: Model> Core<M> {
-    /// Checks that an instance can reach this state.
+    /// Whether an instance can reach this state.
     fn is_reachable(&self) -> bool {
         let reached = match self.state {
             State::Instantiated

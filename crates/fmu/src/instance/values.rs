@@ -10,7 +10,7 @@ use fmu_description::Causality;
 use fmu_description::abi::fmi2String;
 use fmu_description::call_order::State;
 
-/// Returns the slot with value reference `reference`.
+/// Returns the slot with value reference `reference`; an error if there is none.
 fn slot<'a, M, T>(
     slots: &'a [Slot<M, T>],
     reference: u32,
@@ -22,7 +22,7 @@ fn slot<'a, M, T>(
 }
 
 impl<M> Interface<M> {
-    /// Returns the Real with value reference `reference`; `None` for time.
+    /// Returns the Real with value reference `reference`; `None` for time, an error for an unknown reference.
     pub(super) fn real(&self, reference: u32) -> Result<Option<&Slot<M, f64>>, Failure> {
         match reference.checked_sub(1) {
             None => Ok(None),
@@ -43,7 +43,7 @@ impl<M> Interface<M> {
 }
 
 /// Checks that the variable may be set in `state`.
-fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
+fn check_settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
     if slot.settable & state.bit() != 0 {
         return Ok(());
     }
@@ -54,8 +54,8 @@ fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
     )))
 }
 
-/// Checks that `value` is in the variable's range, which is finite.
-fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
+/// Checks that `value` is in the variable's range, which excludes infinity.
+fn check_real<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     let (min, max) = slot.range;
     if min <= value && value <= max {
         return Ok(());
@@ -68,7 +68,7 @@ fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
 }
 
 /// Checks that `value` is in the range of the Integer or an item of the Enumeration.
-fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
+fn check_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
     let (min, max) = slot.range;
     let name = &slot.name;
     if f64::from(value) < min || f64::from(value) > max {
@@ -82,12 +82,13 @@ fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure>
 }
 
 impl<M: Model> Core<M> {
+    /// Records that the variable of `slot` was set.
     fn mark_stale<T>(&mut self, slot: &Slot<M, T>) {
         self.stale = true;
         self.unchecked |= slot.causality == Causality::Parameter;
     }
 
-    /// Checks that all `values` can be set.
+    /// Checks that all `values` can be set: the variables exist, may be set in this state, and `accept` the values.
     pub(super) fn check_all<T, V>(
         &self,
         slots: &[Slot<M, T>],
@@ -98,7 +99,7 @@ impl<M: Model> Core<M> {
     ) -> Result<(), Failure> {
         for (&reference, value) in references.iter().zip(values) {
             let slot = slot(slots, reference, kind)?;
-            settable(slot, self.state)?;
+            check_settable(slot, self.state)?;
             accept(slot, value)?;
         }
         Ok(())
@@ -189,13 +190,13 @@ impl<M: Model> Instance<M> {
         let Self { core, interface, .. } = self;
         let reals = interface.reals.as_slice();
         let slot = |reference: u32| reals.get((reference as usize).wrapping_sub(1));
-        let now = core.state.bit();
+        let state = core.state.bit();
         let mut parameters = false;
         for (&reference, &value) in to.iter().zip(values) {
-            let takes = |slot: &&Slot<M, f64>| {
-                slot.settable & now != 0 && slot.range.0 <= value && value <= slot.range.1
+            let is_accepted = |slot: &&Slot<M, f64>| {
+                slot.settable & state != 0 && slot.range.0 <= value && value <= slot.range.1
             };
-            let Some(slot) = slot(reference).filter(takes) else {
+            let Some(slot) = slot(reference).filter(is_accepted) else {
                 return self.rejection(to, values);
             };
             parameters |= slot.causality == Causality::Parameter;
@@ -216,15 +217,15 @@ impl<M: Model> Instance<M> {
     fn rejection(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
         for (&reference, &value) in to.iter().zip(values) {
             let slot = self.interface.real(reference)?.ok_or_else(time_is_independent)?;
-            settable(slot, self.core.state)?;
-            acceptable(slot, value)?;
+            check_settable(slot, self.core.state)?;
+            check_real(slot, value)?;
         }
         Ok(())
     }
 
     /// `fmi2SetInteger`: sets all values or, after a failure, none.
     pub(crate) fn set_integer(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
-        let accept = |slot: &Slot<M, i32>, value: &i32| acceptable_integer(slot, *value);
+        let accept = |slot: &Slot<M, i32>, value: &i32| check_integer(slot, *value);
         self.core.set(&self.interface.integers, to, values, i32::clone_from, accept, "Integer")
     }
 
@@ -240,7 +241,8 @@ impl<M: Model> Instance<M> {
         self.core.set(&self.interface.strings, to, values, String::clone_from, accept, "String")
     }
 
-    /// `fmi2SetRealInputDerivatives`. Orders that the model does not use have no effect.
+    /// `fmi2SetRealInputDerivatives`: sets all derivatives or, after a failure, none. Orders that the model does not
+    /// use have no effect.
     pub(crate) fn set_real_input_derivatives(
         &mut self,
         to: &[u32],
@@ -272,7 +274,8 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2GetRealOutputDerivatives`.
+    /// `fmi2GetRealOutputDerivatives`. A derivative that the model does not have is 0, up to the highest order of any
+    /// output; an error for other orders, and for a variable that is no output.
     pub(crate) fn get_real_output_derivatives(
         &mut self,
         from: &[u32],

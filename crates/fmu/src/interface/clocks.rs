@@ -13,7 +13,7 @@ impl Clocks {
         Self(clocked.map(|variable| (variable.name.clone(), variable.clocks.clone())).collect())
     }
 
-    /// Whether a variable is clocked.
+    /// Whether any variable is clocked.
     pub(crate) fn any(&self) -> bool {
         !self.0.is_empty()
     }
@@ -22,7 +22,7 @@ impl Clocks {
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] for a clock that is none.
+    /// [`Failure::Error`] for a name that is not the name of a clock.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         for (name, clocks) in &self.0 {
             let index = |clock: &String| {

@@ -20,13 +20,16 @@ pub(super) fn describe_variables(
     for variable in variables {
         define_unit(&mut description.units, variable)?;
         define_type(&mut description.types, variable)?;
-        description.variables.push(described(variables, variable)?);
+        description.variables.push(describe_variable(variables, variable)?);
     }
     Ok(())
 }
 
 /// Describes the variable; type and value reference are set later.
-fn described(variables: &[Declaration], variable: &Declaration) -> Result<ScalarVariable, Failure> {
+fn describe_variable(
+    variables: &[Declaration],
+    variable: &Declaration,
+) -> Result<ScalarVariable, Failure> {
     let (mut variability, mut initial) = (variable.variability, variable.initial);
     if let Base::Alias(of) = &variable.base {
         let target = structure::find(variables, &variable.name, of)?;
@@ -70,6 +73,7 @@ fn time() -> ScalarVariable {
     }
 }
 
+/// Adds the unit of the variable to `units`, unless it is there.
 fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Failure> {
     let Some(name) = &variable.number.unit else { return Ok(()) };
     if units.iter().all(|unit| unit.name != *name) {
@@ -82,6 +86,7 @@ fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Fail
     Ok(())
 }
 
+/// Adds the enumeration of the variable to `types`, unless it is there; an error if it has other items there.
 fn define_type(types: &mut Vec<SimpleType>, variable: &Declaration) -> Result<(), Failure> {
     let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
     match types.iter().find(|known| known.name == *name) {
@@ -107,7 +112,8 @@ fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {
     items.iter().map(|(name, value)| (name.clone(), (*value).into())).collect()
 }
 
-/// Gives aliases, by index, the value references and types of their variables, by name.
+/// Gives each alias the value reference and the type of its variable. A pair is the index of an alias and the name of
+/// its variable.
 pub(super) fn describe_aliases(aliases: Vec<(usize, String)>, description: &mut ModelDescription) {
     for (index, of) in aliases {
         let target =

@@ -24,7 +24,7 @@ pub(crate) struct Entry {
     first: u32,
     /// Number of elements.
     count: u32,
-    /// Whether the variable is calculated: it has the value of another variable and no start value.
+    /// Whether the variable has the value of another variable and no start value: it must not be set.
     is_calculated: bool,
 }
 
@@ -44,11 +44,17 @@ pub(crate) struct Table {
     knowns: [Vec<u32>; 2],
 }
 
-/// One dependency: element of the unknown, value reference and element of the known, kind.
-pub(crate) type Dependency = (usize, u32, usize, DependencyKind);
+/// The dependency of an element of an unknown on an element of a known. Elements count from 1; 0 is a scalar.
+pub(crate) struct Dependency {
+    pub(crate) element: usize,
+    /// Value reference of the known.
+    pub(crate) known: u32,
+    pub(crate) element_of_known: usize,
+    pub(crate) kind: DependencyKind,
+}
 
 impl Table {
-    /// Returns the variable with a value reference.
+    /// Returns the variable with a value reference; an error if there is none.
     fn entry(&self, reference: u32, function_type: &str) -> Result<&Entry, Failure> {
         self.entries.get(reference as usize).ok_or_else(|| {
             Failure::Error(format!(
@@ -65,7 +71,7 @@ impl Table {
         variables(self) == variables(other)
     }
 
-    /// Checks that the variables may be set: none is calculated from another one with the same value.
+    /// Checks that no variable is calculated, that is, repeats the value of another one. Ignores unknown references.
     ///
     /// # Errors
     ///
@@ -114,8 +120,8 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the places of scalars of one type; returns false if a reference is no such scalar, or if
-    /// there are not as many references as places.
+    /// Writes the places of scalars of one type. Returns false if a reference is no such scalar, or if
+    /// there are not as many references as places; `places` then has no meaning.
     pub(crate) fn locate_scalars(
         &self,
         kind: NativeType,
@@ -134,7 +140,7 @@ impl Table {
             })
     }
 
-    /// Returns the error for a function that does not access the variable's type.
+    /// Returns the error for a function that does not access the variable's type, or for an unknown reference.
     #[cold]
     pub(crate) fn wrong_type(&self, reference: u32, function_type: &str) -> Failure {
         match self.entry(reference, function_type) {
@@ -146,6 +152,7 @@ impl Table {
         }
     }
 
+    /// Returns the error for a number of values that is not the number of elements.
     #[cold]
     fn wrong_count(&self, references: &[u32], expected: usize, actual: usize) -> Failure {
         let names = references.iter().filter_map(|&reference| self.entries.get(reference as usize));
@@ -164,8 +171,8 @@ impl Table {
             .map(|&reference| self.entries.get(reference as usize).map_or(0, |entry| entry.count))
     }
 
-    /// Returns the dependencies of a variable, those of the initial values if `initial`; none for a
-    /// variable that is no unknown.
+    /// Returns the dependencies of a variable, or of its initial value if `initial`. There are none for a variable that
+    /// is no unknown. An output or a derivative also depends on all parameters, except a state.
     ///
     /// # Errors
     ///
@@ -203,8 +210,10 @@ impl Table {
         Ok(dependencies)
     }
 
-    fn dependency(&self, element: usize, known: u32, kind: Option<DependencyKind>) -> Dependency {
-        let (reference, of_known) = self.elements[known as usize - 1];
-        (element, reference, of_known, kind.unwrap_or(DependencyKind::Dependent))
+    /// Returns the dependency on the known with this 1-based index in FMI 2.0.
+    fn dependency(&self, element: usize, index: u32, kind: Option<DependencyKind>) -> Dependency {
+        let (known, element_of_known) = self.elements[index as usize - 1];
+        let kind = kind.unwrap_or(DependencyKind::Dependent);
+        Dependency { element, known, element_of_known, kind }
     }
 }

@@ -15,7 +15,8 @@ const CATEGORIES: [(&str, &str); 4] = [
 /// The category of the warnings of a model.
 pub(crate) const WARNING: &str = "logStatusWarning";
 
-/// Log categories of an FMU with the model's `of_model` ones; with warnings if it `logs`.
+/// Returns the log categories of an FMU: those of every FMU, the one of warnings if the model `logs`, and its own ones,
+/// `of_model`.
 pub(super) fn categories(logs: bool, of_model: &[(&str, &str)]) -> Vec<LogCategory> {
     let warning = logs.then_some((WARNING, "Calls that succeeded, with a warning of the model"));
     let category = |(name, description): (&str, &str)| LogCategory {
@@ -25,12 +26,13 @@ pub(super) fn categories(logs: bool, of_model: &[(&str, &str)]) -> Vec<LogCatego
     CATEGORIES.into_iter().chain(warning).chain(of_model.iter().copied()).map(category).collect()
 }
 
+/// Returns the general part of the description of FMI 2.0 of a model.
 pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
     let indicators = model.model_exchange().map(|interface| interface.event_indicators);
     description(M::IDENTIFIER, model.about(), indicators, M::PROVIDES_DIRECTIONAL_DERIVATIVE)
 }
 
-/// The general part for a model with this number of event indicators, `None` without model exchange.
+/// Returns the general part for a model with this number of event indicators, `None` without model exchange.
 fn description(
     identifier: &str,
     about: About,

@@ -9,7 +9,7 @@ use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariab
 /// The structural parameters of a model.
 #[derive(Default)]
 pub(super) struct Sizes {
-    /// For each element of an array, by its name: the structural parameters that are the extents.
+    /// For each element that states structural parameters, by its name: these parameters, the extents of its array.
     by_element: HashMap<String, Vec<String>>,
 }
 
@@ -25,8 +25,8 @@ impl Sizes {
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] if an extent is not the value of its structural parameter, or if elements that
-    /// state one are no array of that many dimensions.
+    /// [`Failure::Error`] if an extent is not the value of its structural parameter, or if elements that state
+    /// structural parameters do not form arrays with one dimension for each of them.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         if self.by_element.is_empty() {
             return Ok(());
@@ -54,7 +54,7 @@ impl Sizes {
     }
 }
 
-/// Returns name, value reference and value of a structural parameter.
+/// Returns name, value reference and value of a structural parameter; `None` for other variables.
 fn parameter(variable: &ScalarVariable) -> Option<(String, (u32, i128))> {
     match &variable.kind {
         Kind::UInt64(kind) if variable.causality == Causality::StructuralParameter => Some((
@@ -65,6 +65,7 @@ fn parameter(variable: &ScalarVariable) -> Option<(String, (u32, i128))> {
     }
 }
 
+/// Returns the extent of a dimension; 0 for a reference to a structural parameter.
 fn extent(dimension: &Dimension) -> u64 {
     match dimension {
         Dimension::Fixed(extent) => *extent,

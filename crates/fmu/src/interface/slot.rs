@@ -4,7 +4,7 @@ use crate::variable::{Declaration, Field};
 use fmu_description::{Causality, Initial, IntervalVariability, Variability};
 use fmu_description::{call_order::settable, call_order3};
 
-/// A variable of base type `T`; its position in [`Interface`] follows from its value reference.
+/// A variable of base type `T`; its position in [`Interface`](super::Interface) follows from its value reference.
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
 pub(crate) struct Slot<M, T> {
     pub(crate) name: String,
@@ -25,15 +25,16 @@ pub(crate) struct Slot<M, T> {
     pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.
     pub(crate) items: Vec<i32>,
-    /// The interval of a periodic clock in s, and how the model determines the intervals of another one.
+    /// The constant interval of a periodic clock in s.
     pub(crate) interval: Option<f64>,
+    /// How the model determines the intervals of a timed clock.
     pub(crate) interval_variability: Option<IntervalVariability>,
     pub(crate) field: Field<M, T>,
     /// The derivatives of a Real; the interval of a clock that the model determines.
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
-/// A slot without its field, which determines the base type.
+/// A slot without its field. The field determines the base type.
 pub(crate) struct SlotBuilder<M> {
     name: String,
     causality: Causality,

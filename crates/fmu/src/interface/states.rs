@@ -1,4 +1,4 @@
-//! The continuous states of a model as vectors.
+//! The continuous states and the inputs with derivatives of a model as vectors.
 
 use super::Interface;
 use super::typed::Native;
@@ -25,7 +25,7 @@ impl<M> Interface<M> {
         }
     }
 
-    /// Returns the shortest interval of the periodic clocks in s; infinity without one.
+    /// Returns the shortest constant interval of the periodic clocks in s; infinity without one.
     pub(crate) fn shortest_interval(&self) -> f64 {
         let clocks = bool::slots(&self.typed);
         clocks.iter().filter_map(|clock| clock.interval).fold(f64::INFINITY, f64::min)
@@ -35,15 +35,15 @@ impl<M> Interface<M> {
     pub(crate) fn nominals(&self) -> Vec<f64> {
         self.states.iter().map(|state| state.nominal).collect()
     }
-}
 
-/// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
-impl<M> Interface<M> {
     /// Whether the model offers model exchange.
     pub(crate) fn offers_exchange(&self) -> bool {
         self.event_indicators.is_some()
     }
+}
 
+/// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
+impl<M> Interface<M> {
     /// Whether the variable called `name` is an input with derivatives.
     pub(crate) fn interpolates(&self, name: &str) -> bool {
         self.interpolated.iter().any(|&position| self.reals[position].name == name)
@@ -63,8 +63,9 @@ impl<M> Interface<M> {
         }
     }
 
-    /// Sets the derivatives of the inputs for a step of `size` s by their values at its start, its middle
-    /// and its end. Returns whether one is not zero.
+    /// Sets the derivatives of the inputs for a step of `size` s from their values at its start, its middle and its
+    /// end: of the parabola through them, or of the line from start to end for an input with one derivative. Returns
+    /// whether one is not zero.
     pub(crate) fn interpolate(
         &self,
         model: &mut M,

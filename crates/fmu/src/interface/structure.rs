@@ -4,12 +4,13 @@ use crate::model::Failure;
 use crate::variable::{Base, Declaration};
 use fmu_description::{Causality, DependencyKind, Initial, ModelStructure, Unknown};
 
-/// Returns the 1-based index of the variable at `position`. Index 1 is `time`.
+/// Returns the 1-based index in the description of the variable at `position`. Index 1 is `time`.
 pub(super) fn index(position: usize) -> u32 {
     u32::try_from(position + 2).unwrap_or(u32::MAX)
 }
 
-/// Returns the position of the variable called `name`, to which `of` refers.
+/// Returns the position of the variable called `name`; an error, which names the variable `of` that refers to it, if
+/// there is none.
 pub(super) fn find(variables: &[Declaration], of: &str, name: &str) -> Result<usize, Failure> {
     let position = variables.iter().position(|variable| variable.name == name);
     position.ok_or_else(|| {
@@ -29,7 +30,7 @@ pub(super) fn states(variables: &[Declaration]) -> Result<Vec<(usize, usize)>, F
 }
 
 /// Returns `ModelStructure`. `InitialUnknowns` are the outputs, derivatives, states and calculated
-/// parameters without an exact start value.
+/// parameters that have `initial = calculated` or `approx`, and output clocks.
 pub(super) fn structure(variables: &[Declaration]) -> Result<ModelStructure, Failure> {
     let mut structure = ModelStructure::default();
     let states = states(variables)?;
@@ -61,7 +62,8 @@ pub(super) fn structure(variables: &[Declaration]) -> Result<ModelStructure, Fai
     Ok(structure)
 }
 
-/// Returns the position of the state, if the variable is a state or an alias of a state.
+/// Returns the position of the variable with the value of the one at `position`: of the target of an alias, of a Real
+/// itself; `None` for other types.
 fn resolve_alias(variables: &[Declaration], position: usize) -> Result<Option<usize>, Failure> {
     let variable = &variables[position];
     match &variable.base {
@@ -71,8 +73,8 @@ fn resolve_alias(variables: &[Declaration], position: usize) -> Result<Option<us
     }
 }
 
-/// Returns the row of an output or derivative. If the variable is a state or an alias of a state, it
-/// depends on that state.
+/// Returns the row of an output or derivative. A variable that is a state, or an alias of one, depends on this state,
+/// `own_state`. Of several dependencies on one known the first one counts.
 fn dependency_row(
     variables: &[Declaration],
     position: usize,

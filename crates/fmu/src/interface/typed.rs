@@ -8,7 +8,7 @@ use fmu_description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, NativeType, RealType,
 };
 
-/// The Rust type of the field of such a variable.
+/// A Rust type of the fields of such variables.
 pub(crate) trait Native: Clone + Sized + 'static {
     /// The type of FMI 3.0.
     const TYPE: NativeType;
@@ -20,10 +20,11 @@ pub(crate) trait Native: Clone + Sized + 'static {
     ///
     /// # Errors
     ///
-    /// Returns a message for a limit that is no value of the type.
+    /// Returns a message for a limit that is no value of the type, for an interval of a clock that is not positive, and
+    /// for a timed clock with a constant or triggered interval.
     fn kind(start: Option<Self>, number: Number) -> Result<Kind, String>;
 
-    /// Returns the value of a number.
+    /// Returns the value of a number; `None` for a clock and a binary.
     fn number(&self) -> Option<f64> {
         None
     }

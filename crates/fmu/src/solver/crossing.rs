@@ -3,7 +3,7 @@
 /// The most halvings of the unit interval in `Quartic::first_negative`.
 const DEPTH: u32 = 20;
 
-/// The most evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
+/// The largest number of evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
 const EVALUATIONS: u32 = 100;
 
 /// A polynomial of degree 4 on `[0, 1]` by its Bernstein coefficients.
@@ -71,9 +71,9 @@ impl Quartic {
         self.0.iter().all(|&coefficient| coefficient >= 0.0)
     }
 
-    /// A point with a negative value, at most `2^-20` behind the first crossing.
+    /// A point with a negative value, at most `2^-20` after the first crossing.
     ///
-    /// `None` where the polynomial is nowhere negative, or only within less than `2^-20`.
+    /// `None` if the polynomial is nowhere negative, or only within less than `2^-20`.
     /// Method: subdivision after de Casteljau.
     #[inline]
     #[must_use]
@@ -81,6 +81,8 @@ impl Quartic {
         if self.is_surely_not_negative() { None } else { self.search(0.0, 1.0, DEPTH) }
     }
 
+    /// [`Quartic::first_negative`] of this part, which starts at `from` and has this `width`, by at most `depth`
+    /// halvings.
     fn search(&self, from: f64, width: f64, depth: u32) -> Option<f64> {
         if self.is_surely_not_negative() {
             return None;
@@ -94,6 +96,7 @@ impl Quartic {
         root.or_else(|| right.search(from + half, half, depth - 1))
     }
 
+    /// The polynomial over both halves of the interval.
     fn halves(&self) -> (Self, Self) {
         let mut row = self.0;
         let mut left = [0.0; 5];
@@ -114,12 +117,13 @@ impl Quartic {
 pub enum Crossing {
     /// The margin is negative at this length, and not negative at most `width` before it.
     At(f64),
-    /// The margin is negative at none of the lengths that were tried; this is the longest one.
+    /// The margin is negative at none of the lengths that were tried, of which this is the longest one, or it is NaN
+    /// there.
     NoneUpTo(f64),
 }
 
-/// Searches the first crossing of `margin`, a function of the length of a step, from the estimate
-/// `fraction` of the step of `length` on.
+/// Searches the first crossing of `margin`, a function of the length of a step, from an estimate on: `fraction`, above
+/// 0, of the step of `length`.
 ///
 /// An estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin
 /// is evaluated at the estimate and at doubled lengths, up to the whole step. If it is negative at one of
@@ -148,7 +152,7 @@ pub fn search(
 /// length and margin, where it is negative. Returns the upper end of the last interval, where it is
 /// negative.
 ///
-/// Method: regula falsi with the Illinois rule; the interval ends at `width` or narrower.
+/// Method: regula falsi with the Illinois rule, until the interval is at most `width` wide, or for 100 evaluations.
 pub fn locate(
     at_start: f64,
     ceiling: (f64, f64),

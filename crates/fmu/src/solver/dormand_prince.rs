@@ -58,7 +58,7 @@ impl<V: Vector> Step<V> {
         derivative(&self.start, &mut self.slopes[0]);
     }
 
-    /// Moves the start to the end of the step that was taken. Its slope is the last one of that step.
+    /// Moves the start to the end of the step that was taken. The slope there is the last one of that step.
     pub fn proceed(&mut self) {
         std::mem::swap(&mut self.start, &mut self.end);
         self.slopes.swap(0, 6);

@@ -26,7 +26,7 @@ impl Indicators {
         &mut self.samples[k]
     }
 
-    /// Records the signs at the start as those after the last event.
+    /// Records the signs of the indicators at the start as the signs after the last event.
     pub(super) fn keep_signs(&mut self) {
         for (positive, value) in self.positive.iter_mut().zip(&self.samples[0]) {
             *positive = *value > 0.0;
@@ -38,7 +38,7 @@ impl Indicators {
         self.samples.swap(0, 4);
     }
 
-    /// Position and value of the first indicator that is infinite or not a number.
+    /// Position and value of the first indicator that is infinite or not a number at one of the five points.
     pub(super) fn first_not_finite(&self) -> Option<(usize, f64)> {
         let of =
             |values: &Vec<f64>| values.iter().copied().enumerate().find(|(_, z)| !z.is_finite());
@@ -46,19 +46,20 @@ impl Indicators {
     }
 
     /// The distance of the indicators `values` to an event: the smallest of them, each with the sign that
-    /// makes it positive before its event. An event has happened where it is negative.
+    /// makes it positive before its event. An event has happened where it is negative. NaN if an indicator is NaN,
+    /// infinity without indicators.
     pub(super) fn margin(&self, values: &[f64]) -> f64 {
         let margins = values.iter().zip(&self.positive);
         margins.fold(f64::INFINITY, |least, (value, positive)| {
             let margin = if *positive { *value } else { -*value };
-            // Zero is on the other side of an indicator that was above zero.
+            // For an indicator that was above zero, zero is beyond the event.
             let margin = if *positive && margin == 0.0 { -f64::MIN_POSITIVE } else { margin };
             if margin < least || margin.is_nan() { margin } else { least }
         })
     }
 
     /// The part of the step after which the first event is expected, by the polynomials through the five
-    /// values of each indicator.
+    /// values of each indicator; `None` if no event is expected.
     pub(super) fn first_crossing(&self) -> Option<f64> {
         let crossing = |(i, positive): (usize, &bool)| {
             let sign = if *positive { 1.0 } else { -1.0 };

@@ -34,7 +34,7 @@ pub trait System {
     ///
     /// # Errors
     ///
-    /// Same as [`System::derivative`].
+    /// Every failure ends the integration, [`Failure::Discard`] too.
     fn indicators(
         &mut self,
         time: f64,
@@ -67,11 +67,13 @@ pub struct Integrator {
     tolerance: f64,
     time: f64,
     step: Step<Vec<f64>>,
+    /// Length in s that is suggested for the next step.
     suggested: f64,
     indicators: Indicators,
-    /// A state between two steps, its derivative, and the indicators there.
+    /// Space for a state and its derivative.
     state: Vec<f64>,
     slope: Vec<f64>,
+    /// Space for the indicators at the end of a step.
     values: Vec<f64>,
 }
 
@@ -94,8 +96,8 @@ impl Integrator {
         }
     }
 
-    /// Sets the relative tolerance; the default is 1e-6. Values outside of 1e-12 to 1e-2 are taken as the
-    /// nearest of these.
+    /// Sets the relative tolerance; the default is 1e-6. A value outside of 1e-12 to 1e-2 is replaced by the nearest of
+    /// these.
     pub fn set_tolerance(&mut self, relative: f64) {
         self.tolerance = relative.clamp(1e-12, 1e-2);
     }
@@ -119,7 +121,7 @@ impl Integrator {
     ///
     /// # Errors
     ///
-    /// The failures of `system`.
+    /// The failures of `system`, except [`Failure::Discard`] of the derivative beyond the start.
     ///
     /// # Panics
     ///
@@ -133,9 +135,9 @@ impl Integrator {
     ) -> Result<(), Failure> {
         self.time = time;
         self.state.copy_from_slice(state);
-        let mut done = Ok(());
-        self.step.restart(&self.state, |y, slope| done = system.derivative(time, y, slope));
-        done?;
+        let mut result = Ok(());
+        self.step.restart(&self.state, |y, slope| result = system.derivative(time, y, slope));
+        result?;
         if !self.indicators.is_empty() {
             system.indicators(time, state, self.indicators.sample_mut(0))?;
             self.indicators.keep_signs();
@@ -152,8 +154,9 @@ impl Integrator {
     ///
     /// # Errors
     ///
-    /// [`Failure::Incomplete`] with the time reached if the state, its derivative or an indicator is not
-    /// finite, or if no step is short enough for the tolerance; the failures of `system`.
+    /// [`Failure::Incomplete`] with the time reached if the state, its derivative or an indicator is not finite, if no
+    /// step is short enough for the tolerance or for a derivative that exists, or after a million steps; the other
+    /// failures of `system`.
     pub fn advance(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -164,9 +167,9 @@ impl Integrator {
             if remaining <= 0.0 {
                 return Ok(Reached::End);
             }
-            let lasts = remaining <= 1.01 * self.suggested;
-            let length = if lasts { remaining } else { self.suggested };
-            if !self.try_step(system, length, !lasts)? {
+            let is_last = remaining <= 1.01 * self.suggested;
+            let length = if is_last { remaining } else { self.suggested };
+            if !self.try_step(system, length, !is_last)? {
                 continue;
             }
             if let Some(fraction) = self.find_crossing(system)?
@@ -174,15 +177,15 @@ impl Integrator {
             {
                 return Ok(Reached::Event);
             }
-            self.time = if lasts { end } else { self.time + length };
+            self.time = if is_last { end } else { self.time + length };
             self.step.proceed();
             self.indicators.proceed();
         }
         Err(self.stopped(format!("more than {STEP_LIMIT} integration steps")))
     }
 
-    /// Takes a step of `length` from the state reached; false if its error is too large, and a shorter
-    /// step is suggested. A longer one is suggested after it if `grows`.
+    /// Takes a step of `length` from the state reached. Returns false, and suggests a shorter step, if its error is too
+    /// large or a derivative does not exist. Otherwise suggests the length of the next step if `grows`.
     fn try_step(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -214,17 +217,17 @@ impl Integrator {
         })
     }
 
-    /// Takes a step of `length` in s, whatever its error.
+    /// Takes a step of `length` in s without a test of its error.
     fn take(&mut self, system: &mut (impl System + ?Sized), length: f64) -> Result<(), Failure> {
-        let done = RefCell::new((system, Ok(())));
+        let system_and_result = RefCell::new((system, Ok(())));
         let evaluate = |time: f64, state: &Vec<f64>, slope: &mut Vec<f64>| {
-            let (system, done) = &mut *done.borrow_mut();
-            if done.is_ok() {
-                *done = system.derivative(time, state, slope);
+            let (system, result) = &mut *system_and_result.borrow_mut();
+            if result.is_ok() {
+                *result = system.derivative(time, state, slope);
             }
         };
         self.step.take(evaluate, evaluate, self.time, length);
-        done.into_inner().1
+        system_and_result.into_inner().1
     }
 
     /// The root mean square of the errors of the step, each relative to its bound.
@@ -251,8 +254,8 @@ impl Integrator {
 
     /// The length in s of the first step of an interval of `remaining` s.
     ///
-    /// The whole interval if the state changes by at most about 1 % in it. Otherwise the method of Hairer,
-    /// Norsett and Wanner, section II.4, which costs one evaluation.
+    /// The whole interval if the state changes by at most about 1 % in it. Otherwise it follows from the method of
+    /// Hairer, Norsett and Wanner, section II.4, which costs one evaluation.
     fn first_length(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -281,7 +284,7 @@ impl Integrator {
         Ok(if bend.is_finite() { long.min(100.0 * small) } else { small })
     }
 
-    /// Searches the step for an event and returns the part of the step after which it is expected.
+    /// Returns the part of the step after which the first event is expected; `None` if none is.
     fn find_crossing(
         &mut self,
         system: &mut (impl System + ?Sized),
@@ -306,7 +309,7 @@ impl Integrator {
     }
 
     /// Repeats the step of `length` so that it ends directly after the event that is expected at
-    /// `fraction`. `End` if no event happens in the step.
+    /// `fraction`. Takes the whole step and returns `End` if no event happens in it.
     fn step_to_event(
         &mut self,
         system: &mut (impl System + ?Sized),

@@ -1,9 +1,9 @@
-//! What a variable declares, without the fields of the model.
+//! The declaration of a variable, without the fields of the model.
 
 use super::{Enumeration, Number};
 use fmu_description::{Causality, DependencyKind, Initial, Variability};
 
-/// What the model description needs to know of the field of a variable.
+/// The base type of a variable, as far as the model description needs it.
 pub(crate) enum Base {
     Real,
     Clock,
@@ -34,7 +34,7 @@ pub(crate) struct Declaration {
 }
 
 impl Declaration {
-    /// A local variable.
+    /// Returns a local variable with `initial = calculated`.
     pub(super) fn local(
         name: String,
         description: String,

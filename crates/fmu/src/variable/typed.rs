@@ -2,7 +2,7 @@
 
 use super::Field;
 
-/// Calls a macro with these types: variant, type of the field, name of the list.
+/// Calls a macro with the types that FMI 2.0 does not have: variant, type of the field, name of the list.
 macro_rules! for_types {
     ($macro:ident) => {
         $macro! {

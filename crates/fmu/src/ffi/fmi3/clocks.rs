@@ -1,5 +1,5 @@
 //! The functions for clocks. Intervals are in seconds, and the model determines them: functions that set an interval or
-//! count parts of a second are errors for every clock.
+//! count parts of a second return an error for every clock.
 
 use super::super::{borrow_output, read};
 use super::entry_points_3;

@@ -7,7 +7,7 @@ use super::super::{
     ask_for_inputs, borrow_output, borrow_state, dispatch, free_state, read, snapshot, store,
     texts, write_one,
 };
-use super::{entry_points_3, unavailable};
+use super::entry_points_3;
 use crate::Experiment;
 use crate::instance::Jacobian;
 use crate::model::{Failure, Model};
@@ -55,11 +55,11 @@ entry_points_3! {
         let (elements, independents) = (borrow_output(elements, n)?, borrow_output(independents, n)?);
         let of_independents = borrow_output(elements_of_independents, n)?;
         let kinds = borrow_output(kinds, n)?;
-        for (k, (element, known, element_of_known, kind)) in dependencies.into_iter().enumerate() {
-            elements[k].write(element);
-            independents[k].write(known);
-            of_independents[k].write(element_of_known);
-            kinds[k].write(to_c(kind) as fmi3DependencyKind);
+        for (k, dependency) in dependencies.into_iter().enumerate() {
+            elements[k].write(dependency.element);
+            independents[k].write(dependency.known);
+            of_independents[k].write(dependency.element_of_known);
+            kinds[k].write(to_c(dependency.kind) as fmi3DependencyKind);
         }
         Ok(())
     };
@@ -135,10 +135,10 @@ entry_points_3! {
     );
     activate_model_partition = ActivateModelPartition(
         _clock: fmi3ValueReference, _time: fmi3Float64
-    ), _instance => Err(unavailable("this FMU offers no scheduled execution"));
+    ), _instance => Err(Failure::Error("this FMU offers no scheduled execution".to_owned()));
 }
 
-/// `fmi3DoStep`, after the importer has set its inputs within the step.
+/// `fmi3DoStep`. The importer first sets its inputs within the step.
 #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
 pub unsafe fn do_step<M: Model>(
     instance: fmi3Instance,

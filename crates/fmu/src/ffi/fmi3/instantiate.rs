@@ -15,7 +15,7 @@ use fmu_description::abi3::{
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::NO_FOLDER;
 
-/// The strings of `fmi3InstantiateXXX` and `requiredIntermediateVariables`.
+/// The strings of `fmi3InstantiateXXX`, and `requiredIntermediateVariables` with its length.
 struct Pointers {
     name: fmi3String,
     token: fmi3String,
@@ -24,8 +24,8 @@ struct Pointers {
     required_count: usize,
 }
 
-/// Returns token, folder of resources and required intermediate variables; a null or empty path means that
-/// the importer has no resources.
+/// Returns token, folder of resources and required intermediate variables. A null or empty path means that the importer
+/// has no resources. An error for an empty name, and for null or misaligned pointers.
 unsafe fn read_pointers<'a>(pointers: &Pointers) -> Result<(String, PathBuf, &'a [u32]), Failure> {
     // SAFETY: strings are null or zero-terminated, and the array has the stated length, by the standard.
     unsafe {
@@ -44,7 +44,7 @@ unsafe fn read_pointers<'a>(pointers: &Pointers) -> Result<(String, PathBuf, &'a
     }
 }
 
-/// Makes an instance, or logs why there is none.
+/// Makes an instance, or logs why there is none and returns null.
 unsafe fn instantiate<M: Model>(
     function: &str,
     pointers: &Pointers,
@@ -93,7 +93,8 @@ pub unsafe fn instantiate_model_exchange<M: Model>(
     }
 }
 
-/// The importer may set inputs within a step; `requiredIntermediateVariables` names those inputs.
+/// `fmi3InstantiateCoSimulation`. With a callback and `requiredIntermediateVariables` the importer sets inputs within a
+/// step.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
 pub unsafe fn instantiate_co_simulation<M: Model>(
@@ -125,7 +126,7 @@ pub unsafe fn instantiate_co_simulation<M: Model>(
     }
 }
 
-/// Scheduled execution is refused.
+/// `fmi3InstantiateScheduledExecution`: logs that the FMU does not offer it, and returns null.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
 pub unsafe fn instantiate_scheduled_execution<M: Model>(
@@ -148,7 +149,8 @@ pub unsafe fn instantiate_scheduled_execution<M: Model>(
     std::ptr::null_mut()
 }
 
-/// Frees the instance. Does nothing for null and during another call of the instance.
+/// Frees the instance. Does nothing for null, during another call of the instance, and while the importer sets inputs
+/// within a step.
 pub unsafe fn free_instance<M: Model>(instance: fmi3Instance) {
     // SAFETY: an instance that is not null is one that this library made.
     unsafe { super::super::free_instance::<M>(instance) }

@@ -8,7 +8,8 @@ use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
 use fmu_description::{Causality, IntervalVariability as Variability};
 
 impl<M: Model> Instance<M> {
-    /// Lets the model tick its clocks, where event mode begins and after a clock was set.
+    /// Lets the model tick its clocks: when event mode starts, after a clock was set, and before discrete states are
+    /// updated again.
     pub(super) fn tick(&mut self) {
         if !bool::slots(&self.interface.typed).is_empty() {
             self.core.model.tick(self.core.time);
@@ -28,8 +29,9 @@ impl<M: Model> Instance<M> {
         clocks.iter().any(|clock| *(clock.field)(&mut self.core.model))
     }
 
-    /// Runs `read` on the values that this event leaves, found on a copy of the model: a clocked variable has its
-    /// new value while its clock ticks, and `fmi3UpdateDiscreteStates` keeps it (section 2.2.8.3).
+    /// Runs `read` on the values after the present event: handles the event, and restores the model afterwards. A
+    /// clocked variable has its new value while its clock ticks, and `fmi3UpdateDiscreteStates` keeps it (section
+    /// 2.2.8.3).
     #[inline(never)]
     pub(super) fn at_tick(
         &mut self,
@@ -39,9 +41,9 @@ impl<M: Model> Instance<M> {
         let (model, stale) = (self.core.model.clone(), self.core.stale);
         let handled = self.core.model.event(self.core.time);
         self.core.stale = true;
-        let done = handled.and_then(|_| read(self));
+        let result = handled.and_then(|_| read(self));
         (self.core.model, self.core.stale) = (model, stale);
-        done
+        result
     }
 
     /// `fmi3GetClock`.
@@ -77,7 +79,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3GetIntervalDecimal`: intervals in s.
+    /// `fmi3GetIntervalDecimal`: intervals in s. An error for a triggered clock.
     pub(crate) fn get_intervals(
         &mut self,
         places: &[u32],
@@ -86,14 +88,15 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         self.refresh()?;
         for ((&place, interval), qualifier) in places.iter().zip(intervals).zip(qualifiers) {
-            let (length, how) = self.interval(place)?;
+            let (length, kind) = self.interval(place)?;
             interval.write(length);
-            qualifier.write(how as i32);
+            qualifier.write(kind as i32);
         }
         Ok(())
     }
 
-    /// `fmi3GetShiftDecimal`, of periodic clocks: the first tick of every periodic clock is at the start time.
+    /// `fmi3GetShiftDecimal`: 0, because the first tick of every periodic clock is at the start time. An error for a
+    /// clock that is not periodic.
     pub(crate) fn get_shifts(&self, places: &[u32], shifts: &mut Room<f64>) -> Result<(), Failure> {
         for (&place, shift) in places.iter().zip(shifts) {
             let clock = bool::slots(&self.interface.typed).get(place as usize);
@@ -113,8 +116,9 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Returns the interval of a clock in s, and whether it is a new one. That of a clock that is changing or a countdown is
-    /// new once.
+    /// Returns the interval of a clock in s with its qualifier. The interval of a clock that is changing or a countdown
+    /// is `Changed` when it is read first, then `Unchanged` or `NotYetKnown`; that of any other timed clock is always
+    /// `Changed`. An error for a triggered clock.
     fn interval(&mut self, place: u32) -> Result<(f64, IntervalQualifier), Failure> {
         let clock = bool::slots(&self.interface.typed).get(place as usize);
         if let Some(interval) = clock.and_then(|clock| clock.interval) {

@@ -10,6 +10,7 @@ use fmu_description::call_order::{InterfaceType, State};
 use fmu_description::{Causality, Variability};
 
 impl<M: Model> Instance<M> {
+    /// Returns the slots of the structural parameters.
     fn structural_slots(&self) -> impl Iterator<Item = &Slot<M, u64>> {
         let all = u64::slots(&self.interface.typed).iter();
         all.filter(|slot| slot.causality == Causality::StructuralParameter)
@@ -23,7 +24,8 @@ impl<M: Model> Instance<M> {
         structural.map(|slot| *(slot.field)(model)).collect()
     }
 
-    /// `fmi3EnterConfigurationMode`.
+    /// `fmi3EnterConfigurationMode`: enters configuration mode or, after initialization, reconfiguration mode. An error
+    /// without structural parameters, and for reconfiguration mode without tunable ones.
     pub(crate) fn enter_configuration_mode(&mut self) -> Result<(), Failure> {
         if self.structural_slots().next().is_none() {
             return Err(Failure::Error("this FMU has no structural parameters".to_owned()));
@@ -41,7 +43,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3ExitConfigurationMode`: resizes the arrays.
+    /// `fmi3ExitConfigurationMode`: resizes the arrays of the model, and lays the variables out again.
     pub(crate) fn exit_configuration_mode(&mut self) -> Result<(), Failure> {
         self.core.model.resize()?;
         self.core.state = match (self.core.state, self.core.interface_type) {
@@ -53,10 +55,11 @@ impl<M: Model> Instance<M> {
         self.fit_layout()
     }
 
-    /// Lays the variables out again if the structural parameters have other values than before.
+    /// Lays the variables out again if the structural parameters have other values than at the last layout. Does
+    /// nothing in FMI 2.0 and in configuration and reconfiguration mode.
     pub(in super::super) fn fit_layout(&mut self) -> Result<(), Failure> {
         let Some(lay_out) = self.lay_out else { return Ok(()) };
-        // In these modes arrays still have the extents of before, and no function accesses them.
+        // In these modes arrays still have their former extents, and no function accesses them.
         let is_open =
             matches!(self.core.state, State::ConfigurationMode | State::ReconfigurationMode);
         if is_open || self.session.as_ref().is_none_or(|session| session.structural.is_empty()) {
@@ -66,7 +69,8 @@ impl<M: Model> Instance<M> {
         if self.session()?.structural == structural { Ok(()) } else { lay_out(self, structural) }
     }
 
-    /// Lays the variables out for these values of the structural parameters.
+    /// Lays the variables out for these values of the structural parameters. An error if the model then has other
+    /// variables than before.
     pub(super) fn lay_out(&mut self, structural: Vec<u64>) -> Result<(), Failure> {
         let (mut interface, description) = Interface::new(&mut self.core.model)?;
         let (table, _) = interface.convert(&description, self.core.interface_type)?;

@@ -5,12 +5,13 @@ use crate::model::{Failure, Model};
 use crate::room::Room;
 use fmu_description::NativeType;
 
-/// Unknowns, knowns and the lengths of both vectors of a partial derivative.
+/// The variables and the lengths of both vectors of a partial derivative.
 pub(crate) struct Jacobian<'a> {
     pub(crate) unknowns: &'a [u32],
     pub(crate) knowns: &'a [u32],
-    /// Number of elements of the unknowns and of the knowns, as the importer gives them.
+    /// Number of elements of the unknowns, as the importer states it.
     pub(crate) unknown_count: usize,
+    /// Number of elements of the knowns, as the importer states it.
     pub(crate) known_count: usize,
 }
 
@@ -52,7 +53,8 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3GetOutputDerivatives`. An order that the model does not have is 0.
+    /// `fmi3GetOutputDerivatives`. A derivative that the model does not have is 0, up to the highest order of any
+    /// output.
     pub(crate) fn get_output_derivatives(
         &mut self,
         references: &[u32],
@@ -65,10 +67,10 @@ impl<M: Model> Instance<M> {
         for (size, &order) in session.table.sizes(references).zip(orders) {
             expanded.extend((0..size).map(|_| order));
         }
-        let done = self.located(NativeType::Float64, references, to.len(), |instance, places| {
+        let result = self.located(NativeType::Float64, references, to.len(), |instance, places| {
             instance.get_real_output_derivatives(places, &expanded, to)
         });
         self.session_mut()?.integers = expanded;
-        done
+        result
     }
 }

@@ -13,7 +13,7 @@ use fmu_description::call_order::{InterfaceType, State};
 pub(super) struct Intermediate {
     update: IntermediateUpdate,
     values: [Vec<f64>; 3],
-    /// Whether a value had been set since the outputs were computed, when the step began.
+    /// At the start of the step: whether a value was set since the outputs were computed.
     stale: bool,
     /// Whether the importer has been asked for the present step.
     asked: bool,
@@ -25,7 +25,7 @@ impl Intermediate {
         Self { update, values: [values(), values(), values()], stale: false, asked: false }
     }
 
-    /// Makes room for another number of inputs.
+    /// Changes the number of inputs.
     pub(super) fn resize(&mut self, inputs: usize) {
         for values in &mut self.values {
             values.resize(inputs, 0.0);
@@ -38,8 +38,8 @@ fn intermediate(session: &mut Option<Box<Session>>) -> Option<&mut Intermediate>
 }
 
 impl<M: Model> Instance<M> {
-    /// Enters intermediate update mode for a step of `size` s. Returns the callback to call, if the
-    /// importer has one and may step.
+    /// Enters intermediate update mode for a step of `size` s, and returns the callback. Does nothing and returns
+    /// `None` without a callback, and if the importer must not step now or `size` is not a positive number.
     pub(crate) fn begin_intermediate(&mut self, size: f64) -> Option<IntermediateUpdate> {
         let core = &mut self.core;
         let intermediate = intermediate(&mut self.session)?;
@@ -63,7 +63,8 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Leaves intermediate update mode, unless a call in it failed, with the inputs at the start.
+    /// Restores the inputs at the start of the step. Unless a call in intermediate update mode failed, leaves this mode
+    /// and sets the derivatives of the inputs.
     pub(crate) fn end_intermediate(&mut self, size: f64) {
         let Some(intermediate) = intermediate(&mut self.session) else { return };
         let core = &mut self.core;
@@ -76,8 +77,9 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Sets the inputs to their values at the end of the step, `elapsed` s after its start, if the
-    /// importer has been asked for them.
+    /// Sets the inputs to their values at the end of the step, `elapsed` s after its start, and clears their
+    /// derivatives. These are the recorded values if the step `is_whole`, otherwise those of the polynomials. Does
+    /// nothing if the importer was not asked for inputs.
     pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
         let Self { core, interface, session, .. } = self;
         let Some(intermediate) = intermediate(session) else { return };

@@ -17,14 +17,14 @@ pub(crate) struct StepResult {
 impl<M: Model> Instance<M> {
     /// `fmi3DoStep`.
     ///
-    /// A model stops at its events ([`Model::step_to_event`]; the exporter's integration, if it has no step)
-    /// if the importer handles them (`eventModeUsed`) and allows early return. A model that wants the simulation to end returns at that
-    /// time.
+    /// If the importer handles events (`eventModeUsed`) and allows early return, the step ends at the first event
+    /// ([`Model::step_to_event`], or the integration by the exporter if the model has no step). It also ends where the
+    /// model ends the simulation.
     ///
     /// # Errors
     ///
-    /// The failures of the model. [`Failure::Incomplete`] is an error, because `earlyReturn` must not
-    /// signal one.
+    /// The failures of the model, and [`Failure::Error`] for a step that is not possible or an event outside of it.
+    /// [`Failure::Incomplete`] becomes `fmi3Error`, because `earlyReturn` must not signal a failure.
     pub(crate) fn do_step_3(&mut self, start: f64, size: f64) -> Result<StepResult, Failure> {
         let session = self.session()?;
         let (events, may_return) = (session.event_mode_used, session.early_return_allowed);

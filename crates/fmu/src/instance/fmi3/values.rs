@@ -1,4 +1,5 @@
-//! `fmi3GetXXX` and `fmi3SetXXX` by places: value references of FMI 2.0, or event indicators.
+//! `fmi3GetXXX` and `fmi3SetXXX` by places: value references of FMI 2.0, some of them with the mark [`INDICATOR`] or
+//! [`INT64`].
 
 use super::super::Instance;
 use crate::interface::fmi3::{INDICATOR, INT64};
@@ -21,7 +22,7 @@ fn copy<M, T, V>(
     }
 }
 
-/// Checks that a number is in the range of its variable, which is finite.
+/// Checks that a number is in the range of its variable, which excludes infinity; accepts every clock and binary.
 fn accept_number<M, T: Native>(slot: &Slot<M, T>, value: &T) -> Result<(), Failure> {
     let (min, max) = slot.range;
     match value.number() {
@@ -64,7 +65,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3GetInt64`: of `Int64` variables and enumerations.
+    /// `fmi3GetInt64`, for `Int64` variables and enumerations.
     pub(crate) fn get_int64(&mut self, places: &[u32], to: &mut Room<i64>) -> Result<(), Failure> {
         self.refresh()?;
         let model = &mut self.core.model;
@@ -102,7 +103,7 @@ impl<M: Model> Instance<M> {
         self.set_typed(&integers.0, &integers.1)
     }
 
-    /// `fmi3Get{VariableType}` of a number that FMI 2.0 does not have.
+    /// `fmi3Get{VariableType}` for a type of numbers that FMI 2.0 does not have.
     pub(crate) fn get_typed<T: Native + Copy>(
         &mut self,
         places: &[u32],
@@ -113,7 +114,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3Set{VariableType}` of a type that FMI 2.0 does not have: sets all values or, after a
+    /// `fmi3Set{VariableType}` for a type that FMI 2.0 does not have: sets all values or, after a
     /// failure, none.
     pub(crate) fn set_typed<T: Native>(
         &mut self,
@@ -162,9 +163,9 @@ impl<M: Model> Instance<M> {
         narrow.clear();
         // A value beyond 32 bits is no item of any enumeration; neither is the one that replaces it.
         narrow.extend(values.iter().map(|&value| i32::try_from(value).unwrap_or(i32::MIN)));
-        let done = self.set_integer(places, &narrow);
+        let result = self.set_integer(places, &narrow);
         self.session_mut()?.integers = narrow;
-        done
+        result
     }
 
     /// `fmi3SetBoolean`: sets all values or, after a failure, none.

@@ -268,9 +268,10 @@ fn dependencies_are_given_for_each_element() {
     let instance = initialized(InterfaceType::ModelExchange, false);
     let actual = instance.dependencies(reference("der(x)")).unwrap();
     let on = |element: usize, name: &str, of: usize| {
-        actual
-            .iter()
-            .any(|jacobian| (jacobian.0, jacobian.1, jacobian.2) == (element, reference(name), of))
+        actual.iter().any(|dependency| {
+            (dependency.element, dependency.known, dependency.element_of_known)
+                == (element, reference(name), of)
+        })
     };
     assert!(on(1, "x", 1) && on(1, "x", 2) && !on(1, "u", 0));
     assert!(on(2, "x", 1) && on(2, "u", 0) && on(2, "A", 4));

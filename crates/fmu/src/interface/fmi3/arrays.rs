@@ -15,9 +15,10 @@ pub(super) struct Block {
 /// Splits variables into arrays and scalars.
 ///
 /// Scalars are an array if they follow one another, are named `name[1,1]`, `name[1,2]` and so on (or
-/// `der(name[1,1])`), with every index in row-major order, and differ in nothing but start value. A
-/// variable that is an alias, or has one, stays a scalar: FMI 3.0 knows no alias of an element.
-/// `is_single` says which ones those are.
+/// `der(name[1,1])`), with every index in row-major order, and have the same attributes except the start value. Several
+/// strings or binaries stay scalars, and so do states and derivatives that are not arrays of the same extents. A
+/// variable that is an alias, or has one, stays a scalar as well, because FMI 3.0 has no alias of an element:
+/// `is_single` returns true for it.
 pub(super) fn blocks(
     variables: &[ScalarVariable],
     is_single: impl Fn(&ScalarVariable) -> bool,
@@ -35,7 +36,8 @@ pub(super) fn blocks(
     }
 }
 
-/// Returns the first scalars of arrays of states without an array of derivatives, and the reverse.
+/// Returns the names of the first scalars of arrays of states without an array of derivatives of the same extents, and
+/// of arrays of derivatives without such an array of states.
 fn unmatched(variables: &[ScalarVariable], blocks: &[Block]) -> Vec<String> {
     let state =
         |position: usize| variables[position].kind.as_real().and_then(|real| real.derivative);
@@ -55,6 +57,7 @@ fn unmatched(variables: &[ScalarVariable], blocks: &[Block]) -> Vec<String> {
     names
 }
 
+/// Splits variables into arrays and scalars, without regard to states and derivatives.
 fn split_up(
     variables: &[ScalarVariable],
     is_single: &impl Fn(&ScalarVariable) -> bool,
@@ -74,7 +77,7 @@ fn split_up(
     blocks
 }
 
-/// Returns the array that begins at `start` and has all elements of its name.
+/// Returns the array that starts at position `start`; `None` unless all elements of its name follow there in order.
 fn array(
     variables: &[ScalarVariable],
     start: usize,
@@ -105,7 +108,8 @@ fn array(
     (complete && count == indices.len()).then_some(Block { name, start, count, extents })
 }
 
-/// Splits `name[1,2]` into `name` and its indices, `der(name[1,2])` into `der(name)` and its indices.
+/// Splits `name[1,2]` into `name` and its indices, `der(name[1,2])` into `der(name)` and its indices; `None` for a name
+/// without indices of 1 or more.
 fn split(name: &str) -> Option<(String, Vec<u64>)> {
     let (inner, closing) = match name.strip_suffix("])") {
         Some(inner) if name.starts_with("der(") => (inner, ")"),

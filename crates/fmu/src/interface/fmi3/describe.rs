@@ -9,7 +9,7 @@ use fmu_description::{
     ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown, Variability,
 };
 
-/// The new variables with the places of the old ones.
+/// The variables of FMI 3.0 (new), with the places of those of FMI 2.0 (old) among them.
 #[derive(Default)]
 struct Builder {
     variables: Vec<ScalarVariable>,
@@ -47,6 +47,7 @@ pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, Mod
     (table, description)
 }
 
+/// Returns the flags of model exchange in FMI 3.0.
 fn exchange(flags: &ModelExchange) -> ModelExchange {
     ModelExchange {
         can_not_use_memory_management_functions: false,
@@ -56,6 +57,7 @@ fn exchange(flags: &ModelExchange) -> ModelExchange {
     }
 }
 
+/// Returns the flags of co-simulation in FMI 3.0.
 fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
     CoSimulation {
         can_not_use_memory_management_functions: false,
@@ -68,8 +70,9 @@ fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
     }
 }
 
-/// Key of the variables with the same value: base type and value reference of FMI 2.0.
-fn value_of(variable: &ScalarVariable) -> (bool, &'static str, u32) {
+/// Returns the key that variables with the same value share: whether it is time, base type and value reference of FMI
+/// 2.0.
+fn value_key(variable: &ScalarVariable) -> (bool, &'static str, u32) {
     let is_time = variable.causality == Causality::Independent;
     (is_time, variable.kind.base(), variable.value_reference)
 }
@@ -86,11 +89,11 @@ fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
         && without_start(&alias.kind) == without_start(&of.kind)
 }
 
-/// Returns the place of the first element of a variable.
-fn place(first: &ScalarVariable) -> u32 {
-    match first.kind {
-        Kind::Int64(_) => INT64 | first.value_reference,
-        _ => first.value_reference,
+/// Returns the place of a variable: its value reference of FMI 2.0, with a mark for an `Int64`.
+fn place(variable: &ScalarVariable) -> u32 {
+    match variable.kind {
+        Kind::Int64(_) => INT64 | variable.value_reference,
+        _ => variable.value_reference,
     }
 }
 
@@ -98,10 +101,10 @@ impl Builder {
     fn add_variables(&mut self, old: &[ScalarVariable]) {
         let mut same: HashMap<_, Vec<usize>> = HashMap::new();
         for (position, variable) in old.iter().enumerate() {
-            same.entry(value_of(variable)).or_default().push(position);
+            same.entry(value_key(variable)).or_default().push(position);
         }
         let group = |variable: &ScalarVariable| {
-            same.get(&value_of(variable)).map_or(&[][..], Vec::as_slice)
+            same.get(&value_key(variable)).map_or(&[][..], Vec::as_slice)
         };
         // The variable that an alias repeats is the one with a start value, otherwise the first one.
         let main = |variable: &ScalarVariable| {
@@ -184,15 +187,17 @@ impl Builder {
         });
     }
 
+    /// Returns the 1-based index of the next new variable.
     fn next_index(&self) -> u32 {
         u32::try_from(self.variables.len() + 1).unwrap_or(u32::MAX)
     }
 
+    /// Returns the new index of the variable with the old index `old`.
     fn index(&self, old: u32) -> u32 {
         self.places[old as usize - 1].0
     }
 
-    /// Replaces the indices of the states in derivatives.
+    /// Replaces the old index of the state in each derivative by the new one.
     fn set_derivatives(&mut self) {
         for variable in &mut self.variables {
             if let Kind::Real(RealType { derivative: Some(state), .. }) = &mut variable.kind {
@@ -201,6 +206,7 @@ impl Builder {
         }
     }
 
+    /// Returns `ModelStructure` of the new variables, without event indicators.
     fn structure(&self, old: &ModelDescription) -> ModelStructure {
         let structure = &old.structure;
         let parameters: Vec<_> =
@@ -282,13 +288,13 @@ impl Builder {
     }
 }
 
-/// Returns the 1-based indices of the variables that `chosen` accepts.
-fn indices(old: &ModelDescription, chosen: &dyn Fn(&ScalarVariable) -> bool) -> Vec<u32> {
+/// Returns the 1-based indices of the variables that `accepts` accepts.
+fn indices(old: &ModelDescription, accepts: &dyn Fn(&ScalarVariable) -> bool) -> Vec<u32> {
     let all = (1..).zip(&old.variables);
-    all.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
+    all.filter(|(_, variable)| accepts(variable)).map(|(index, _)| index).collect()
 }
 
-/// Returns the indices of the parameters.
+/// Returns the 1-based indices of the parameters.
 fn parameters(old: &ModelDescription) -> Vec<u32> {
     indices(old, &|variable| variable.causality == Causality::Parameter)
 }
@@ -302,17 +308,17 @@ fn derivative_states(old: &ModelDescription) -> Vec<u32> {
         .collect()
 }
 
-/// Returns the indices of the continuous states and of the other variables with their values.
+/// Returns the 1-based indices of the continuous states and of the other variables with their values.
 fn states(old: &ModelDescription) -> Vec<u32> {
     let values: Vec<_> = derivative_states(old)
         .into_iter()
-        .map(|index| value_of(&old.variables[index as usize - 1]))
+        .map(|index| value_key(&old.variables[index as usize - 1]))
         .collect();
-    indices(old, &|variable| values.contains(&value_of(variable)))
+    indices(old, &|variable| values.contains(&value_key(variable)))
 }
 
-/// Returns the row with these dependencies. A known that occurs twice with different kinds has no
-/// particular structure.
+/// Returns the row with these dependencies. A known that occurs twice with different kinds is
+/// [`DependencyKind::Dependent`].
 fn from_pairs(index: u32, mut pairs: Vec<(u32, DependencyKind)>) -> Unknown {
     pairs.sort_by_key(|(known, _)| *known);
     let mut merged: Vec<(u32, DependencyKind)> = Vec::new();
@@ -328,6 +334,7 @@ fn from_pairs(index: u32, mut pairs: Vec<(u32, DependencyKind)>) -> Unknown {
     Unknown { index, dependencies: Some(dependencies), kinds: (!plain).then_some(kinds) }
 }
 
+/// Adds the dependencies of `other` to `row`. The result has no list of dependencies if one of the rows has none.
 fn merge(row: &mut Unknown, other: &Unknown) {
     let pairs = |row: &Unknown| {
         let kinds = row.kinds.clone();
