@@ -14,14 +14,15 @@ use serde::{Deserialize, Serialize};
 
 /// The design and the plant in the files of the FMU, with an instance of the plant and the memory of the filter.
 ///
-/// The instance is evaluated as a function of time, states and inputs. So copies of the filter, as FMU states are, share it.
+/// The instance is evaluated as a function of time, states and inputs. So copies of the filter, as FMU states are,
+/// share it.
 pub(crate) struct Carrier {
     pub(crate) design: KalmanDesign,
     plant: PathBuf,
     engine: Mutex<Option<Engine>>,
 }
 
-/// Mean and covariance, the latter column by column.
+/// Mean and covariance of z, the covariance column by column.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Estimate {
     pub(crate) mean: Vec<f64>,
@@ -65,7 +66,7 @@ fn as_dense(matrix: &Matrix) -> DMatrix<f64> {
 }
 
 impl Carrier {
-    /// Reads the files in `resources`; none if there is no filter.
+    /// Reads `filter.toml` in `resources`; `None` without this file. The plant is opened by [`Carrier::start`].
     pub(crate) fn read(resources: &Path) -> Result<Option<Self>, Failure> {
         let file = resources.join("filter.toml");
         if !file.exists() {
@@ -102,7 +103,8 @@ impl Carrier {
         Ok(())
     }
 
-    /// The request for the plant's equations.
+    /// The commands, faults and measurements for which the plant's equations are requested, with the settings of the
+    /// plant.
     fn request(&self, start_time: f64) -> Linearise {
         let design = &self.design;
         let names = |signals: &[aso_controller::design::Signal]| {
@@ -144,7 +146,7 @@ impl Carrier {
         Ok(result)
     }
 
-    /// The estimate one sample later, before its measurement.
+    /// Advances the estimate by one sample, without the measurements of that sample.
     pub(crate) fn predict(
         &self,
         estimate: &mut Estimate,
@@ -158,7 +160,8 @@ impl Carrier {
         })
     }
 
-    /// The estimate with the measurements of a sample; returns the squared innovation relative to its covariance.
+    /// Corrects the estimate by the measurements of a sample. Returns the squared innovation relative to its
+    /// covariance.
     pub(crate) fn correct(
         &self,
         estimate: &mut Estimate,
@@ -173,7 +176,8 @@ impl Carrier {
     }
 }
 
-/// z = [x; faults; their rates] with x' = f(t, x, u + faults), f' = its rate or 0, y = h(t, x, u + faults) + faults.
+/// The plant with z = [x; faults; their rates]: x' = f(t, x, u + faults), y = h(t, x, u + faults) + faults; the
+/// derivative of a fault is its rate, or 0 if it has none, and that of a rate is 0.
 struct CarriedPlant {
     equations: PlantEquations,
     faults: Vec<Channel>,
@@ -185,26 +189,30 @@ struct CarriedPlant {
     free_inputs: Vec<f64>,
     /// All inputs of the plant with the faults.
     inputs: Vec<f64>,
-    /// The time of the sample before, or of this one, in s; size in s and number of the integration steps.
+    /// The time in s of the last sample in a prediction, of the present one in a correction.
     time: f64,
+    /// The size in s of the integration steps, and their number in a sample.
     step: f64,
     steps: i32,
-    /// Derivatives at the four points of a step, and the point.
+    /// z' at the four points of a step.
     slopes: [Vec<f64>; 4],
+    /// z at one of these points.
     point: Vec<f64>,
     /// z at the end of a step.
     ahead: Vec<f64>,
-    /// The derivatives of all this by the first z; those of the plant's equations; those of z' by z.
+    /// The derivatives of `slopes`, `point` and `ahead` by the z at which the prediction starts.
     tangents: [DMatrix<f64>; 4],
     tangent: DMatrix<f64>,
     tangent_ahead: DMatrix<f64>,
+    /// The derivatives of x' and y of the plant's equations by x and the inputs.
     jacobian: DMatrix<f64>,
+    /// The derivative of z' by z.
     dynamics: DMatrix<f64>,
 }
 
-/// A fault: where it enters, and the position of its rate in z.
+/// A fault: the signal to which it is added, and the position of its rate in z, if it has one.
 struct Channel {
-    enters: Position,
+    signal: Position,
     rate: Option<usize>,
 }
 
@@ -215,15 +223,16 @@ enum Position {
     Measurement(usize),
 }
 
-/// Runge-Kutta's method of order 4 (W. Kutta 1901): the points of a step, as parts of it, and the weights of their derivatives.
+/// The method of Runge and Kutta of order 4 (W. Kutta 1901): the points of a step, as parts of it, and the weights of
+/// their derivatives.
 const POINTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-/// State events are located to this fraction of an integration step.
-const LOCATED: f64 = 1e-9;
-/// Most state events in an integration step.
+/// The part of an integration step to which state events are located.
+const EVENT_WIDTH: f64 = 1e-9;
+/// The largest number of state events in an integration step.
 const MOST_EVENTS: usize = 1000;
 
-/// target + factor source, element by element.
+/// Adds `factor` times `source` to `target`.
 fn add_scaled(target: &mut DMatrix<f64>, factor: f64, source: &DMatrix<f64>) {
     target.zip_apply(source, |target, source| *target += factor * source);
 }
@@ -242,12 +251,12 @@ impl CarriedPlant {
         let mut faults_at_inputs = m..;
         let mut faults = Vec::new();
         for fault in &design.faults {
-            let enters = match &fault.enters {
+            let signal = match &fault.enters {
                 Entry::Actuator(at) => Position::Input(*at),
                 Entry::Sensor(at) => Position::Measurement(*at),
                 Entry::Input(_) => Position::Input(faults_at_inputs.next().unwrap_or(m)),
             };
-            faults.push(Channel { enters, rate: fault.rate.map(|rate| n + rate) });
+            faults.push(Channel { signal, rate: fault.rate.map(|rate| n + rate) });
         }
         let size = n + design.fault_states();
         let square = || DMatrix::zeros(size, size);
@@ -272,19 +281,19 @@ impl CarriedPlant {
         })
     }
 
-    /// Sets the inputs of the plant for the faults in `z`.
+    /// Sets the inputs of the plant to the commands and the values without faults, plus the faults in `z`.
     fn set_inputs(&mut self, z: &[f64]) {
         let (commands, others) = self.inputs.split_at_mut(self.u.len());
         commands.copy_from_slice(&self.u);
         others.copy_from_slice(&self.free_inputs);
         for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
-            if let Position::Input(at) = fault.enters {
+            if let Position::Input(at) = fault.signal {
                 self.inputs[at] += value;
             }
         }
     }
 
-    /// Sets the slope of point `at` of a step, z' at `time` and `point`.
+    /// Sets slope `at` of a step to z' at `time` and `point`.
     fn set_slope(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
         let point = std::mem::take(&mut self.point);
         self.set_inputs(&point);
@@ -314,7 +323,7 @@ impl CarriedPlant {
         self.dynamics.fill(0.0);
         self.dynamics.view_mut((0, 0), (n, n)).copy_from(&self.jacobian.view((0, 0), (n, n)));
         for (position, fault) in self.faults.iter().enumerate() {
-            if let Position::Input(input) = fault.enters {
+            if let Position::Input(input) = fault.signal {
                 let column = self.jacobian.view((0, n + input), (n, 1));
                 self.dynamics.view_mut((0, n + position), (n, 1)).copy_from(&column);
             }
@@ -326,8 +335,8 @@ impl CarriedPlant {
         Ok(())
     }
 
-    /// Sets `ahead` to z after an integration step of `size` in s from `z` at `start`; with `g`, the derivative of `z` by the z at
-    /// which the prediction began, also that of `ahead`.
+    /// Sets `ahead` to z after an integration step of `size` in s from `z` at `start`; with `g`, the derivative of `z`
+    /// by the z at which the prediction began, also that of `ahead`.
     fn step(
         &mut self,
         z: &[f64],
@@ -364,7 +373,7 @@ impl CarriedPlant {
         Ok(())
     }
 
-    /// Whether an event indicator has another sign at `ahead` and `time` than at the last event or step.
+    /// Whether an event indicator has another sign at `ahead` and `time` than after the last event or step.
     fn crosses(&mut self, time: f64) -> Result<bool, LineariseError> {
         let ahead = std::mem::take(&mut self.ahead);
         self.set_inputs(&ahead);
@@ -373,8 +382,8 @@ impl CarriedPlant {
         crosses
     }
 
-    /// Makes an integration step of at most `size` in s from `z` at `start`, which ends at the first state event; returns its
-    /// size.
+    /// Makes an integration step of at most `size` in s from `z` at `start`, which ends at the first state event;
+    /// returns its size.
     fn step_to_event(
         &mut self,
         z: &mut [f64],
@@ -385,7 +394,7 @@ impl CarriedPlant {
         let mut reached = size;
         if self.crosses(start + size)? {
             let mut before = 0.0;
-            while reached - before > LOCATED * self.step {
+            while reached - before > EVENT_WIDTH * self.step {
                 let middle = 0.5 * (before + reached);
                 self.step(z, [start, middle], None)?;
                 if self.crosses(start + middle)? {
@@ -405,7 +414,8 @@ impl CarriedPlant {
         Ok(reached)
     }
 
-    /// Integrates z over a sample; with its derivative `g` by the first z, if that is asked for.
+    /// Integrates z over a sample, and sets `g`, if there is one, to the derivative of the result by `z` at the start.
+    /// An error if an integration step has too many state events.
     fn integrate(
         &mut self,
         z: &mut [f64],
@@ -418,16 +428,16 @@ impl CarriedPlant {
         }
         for k in 0..self.steps {
             let start = self.time + f64::from(k) * self.step;
-            let mut passed = 0.0;
+            let mut elapsed = 0.0;
             for events in 0.. {
-                let rest = self.step - passed;
-                if rest <= LOCATED * self.step {
+                let rest = self.step - elapsed;
+                if rest <= EVENT_WIDTH * self.step {
                     break;
                 }
                 if events == MOST_EVENTS {
                     return Err(LineariseError::EndlessEvents { iterations: MOST_EVENTS });
                 }
-                passed += self.step_to_event(z, [start + passed, rest], g.as_deref_mut())?;
+                elapsed += self.step_to_event(z, [start + elapsed, rest], g.as_deref_mut())?;
             }
         }
         Ok(())
@@ -456,7 +466,7 @@ impl SampledPlant for CarriedPlant {
         self.equations.begin(self.time, x, &self.inputs)?;
         self.equations.outputs(self.time, x, &self.inputs, y)?;
         for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
-            if let Position::Measurement(at) = fault.enters {
+            if let Position::Measurement(at) = fault.signal {
                 y[at] += value;
             }
         }
@@ -475,7 +485,7 @@ impl SampledPlant for CarriedPlant {
         h.fill(0.0);
         h.view_mut((0, 0), (p, n)).copy_from(&self.jacobian.view((n, 0), (p, n)));
         for (position, fault) in self.faults.iter().enumerate() {
-            match fault.enters {
+            match fault.signal {
                 Position::Input(input) => {
                     let column = self.jacobian.view((n, n + input), (p, 1));
                     h.view_mut((0, n + position), (p, 1)).copy_from(&column);

@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 /// The part of the sample time by which a sample may be early: an importer adds up its steps with rounding.
 const TOLERANCE: f64 = 1e-4;
 
-/// Samples at start + k T. Sample 0 belongs to the initialisation.
+/// The clock of the samples at start + k T. Sample 0 belongs to the initialisation.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Clock {
     /// T in s.
     period: f64,
-    /// In s.
+    /// The time of sample 0 in s.
     start: f64,
     /// k of the next sample: a whole number, exact up to 2^53.
     next: f64,
@@ -26,7 +26,7 @@ impl Clock {
         (self.start, self.next) = (time, 1.0);
     }
 
-    /// The instant of the next sample in s, if it is due until `end`; at most `end`.
+    /// The instant of the next sample in s, at most `end`; `None` if it is not due until `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.start + self.next * self.period;
         (next <= end + TOLERANCE * self.period).then_some(next.min(end))
@@ -42,6 +42,7 @@ impl Clock {
         self.next
     }
 
+    /// Goes on to the next sample.
     pub(crate) fn tick(&mut self) {
         self.next += 1.0;
     }
@@ -50,24 +51,27 @@ impl Clock {
 /// The mean over time of values that are held.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct HeldMean {
-    /// The integrals, then the means.
+    /// The integrals over time.
     integrals: Vec<f64>,
+    /// Space for the means.
     means: Vec<f64>,
-    /// In s.
+    /// The time in s over which the integrals extend.
     duration: f64,
 }
 
 impl HeldMean {
+    /// The mean of `count` values; no time has passed.
     pub(crate) fn of(count: usize) -> Self {
         Self { integrals: vec![0.0; count], means: vec![0.0; count], duration: 0.0 }
     }
 
+    /// Starts the mean again.
     pub(crate) fn clear(&mut self) {
         self.integrals.fill(0.0);
         self.duration = 0.0;
     }
 
-    /// Adds `values`, held for `duration` in s.
+    /// Adds `values`, held for `duration` in s; ignores a duration that is not positive.
     pub(crate) fn add(&mut self, values: &[f64], duration: f64) {
         if duration <= 0.0 {
             return;
@@ -78,7 +82,7 @@ impl HeldMean {
         self.duration += duration;
     }
 
-    /// The mean since it was cleared; `values` if no time has passed.
+    /// The mean since the last [`HeldMean::clear`]; `values` if no time has passed.
     pub(crate) fn mean(&mut self, values: &[f64]) -> &[f64] {
         if self.duration <= 0.0 {
             self.means.copy_from_slice(values);

@@ -1,5 +1,5 @@
-//! The Kalman filter FMU: estimates the states and the faults of a plant whose FMU it carries in `resources/plant.fmu`, as
-//! `resources/filter.toml` describes.
+//! The Kalman filter FMU: estimates the states and the faults of a plant whose FMU it carries in `resources/plant.fmu`,
+//! as `resources/filter.toml` describes.
 #![forbid(unsafe_code)]
 
 mod carried;
@@ -33,11 +33,11 @@ pub struct KalmanFilter {
     method: i32,
     integration_steps: i32,
     every: Vec<i32>,
-    /// `x_hat_0`, `f_hat_0`.
+    /// `x_hat_0` and `f_hat_0`, one after the other.
     initial: Vec<f64>,
-    /// `x_hat`, `f_hat`, with their covariance.
+    /// `x_hat` and `f_hat`, one after the other, with their covariance.
     estimate: Estimate,
-    /// `x_deviation`, `f_deviation`.
+    /// `x_deviation` and `f_deviation`, one after the other.
     deviations: Vec<f64>,
     innovation_squared: f64,
     /// The measurements, and their derivatives with respect to time.
@@ -52,6 +52,7 @@ pub struct KalmanFilter {
 }
 
 impl KalmanFilter {
+    /// The filter with the start values of its design; a template without variables if `carrier` is `None`.
     fn with(carrier: Option<Carrier>) -> Self {
         let design = carrier.as_ref().map(|carrier| &carrier.design);
         let of = |signals: &[aso_controller::design::Signal]| -> Vec<f64> {
@@ -77,12 +78,12 @@ impl KalmanFilter {
             y,
             u,
         };
-        filter.rest();
+        filter.reset_estimate();
         filter
     }
 
-    /// Sets the estimate to the one before the first sample.
-    fn rest(&mut self) {
+    /// Sets the estimate to the initial one, before sample 0. Does nothing in a template.
+    fn reset_estimate(&mut self) {
         let Some(carrier) = &self.carrier else { return };
         self.estimate.mean.copy_from_slice(&self.initial);
         self.estimate.covariance.clone_from(&carrier.design.p.values);
@@ -90,6 +91,7 @@ impl KalmanFilter {
         self.innovation_squared = 0.0;
     }
 
+    /// Sets the standard deviations to those of the covariance.
     fn set_deviations(&mut self) {
         let n = self.deviations.len();
         let variances = self.estimate.covariance.iter().step_by(n + 1);
@@ -98,6 +100,7 @@ impl KalmanFilter {
         }
     }
 
+    /// Design and plant; an error in a template.
     fn carrier(&self) -> Result<Arc<Carrier>, Failure> {
         self.carrier.clone().ok_or_else(|| {
             Failure::Error(
@@ -108,7 +111,7 @@ impl KalmanFilter {
         })
     }
 
-    /// Takes sample `number` at `time` with the measurements extrapolated by `offset`, both in s.
+    /// Corrects the estimate by sample `number` at `time`, with the measurements extrapolated by `offset`, both in s.
     fn correct(
         &mut self,
         carrier: &Carrier,
@@ -169,7 +172,7 @@ impl Model for KalmanFilter {
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         let carrier = self.carrier()?;
         carrier.start(experiment.start_time)?;
-        self.rest();
+        self.reset_estimate();
         self.clock.start(experiment.start_time);
         self.applied.clear();
         self.correct(&carrier, [0.0, experiment.start_time, 0.0])

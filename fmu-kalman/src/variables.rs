@@ -24,6 +24,7 @@ fn with_unit(variable: Variable, unit: Option<&String>) -> Variable {
     }
 }
 
+/// The description of a fault, or its name if it has none.
 fn meaning(fault: &CarriedFault) -> &String {
     if fault.description.is_empty() { &fault.name } else { &fault.description }
 }
@@ -47,9 +48,8 @@ fn inputs(design: &KalmanDesign) -> Vec<Variable> {
     measurements.chain(commands).collect()
 }
 
-/// An element of z.
+/// An element of z: the names of its variables, its meaning and its unit.
 struct Element {
-    /// The names of its estimate, of the standard deviation and of the initial estimate.
     estimate: String,
     deviation: String,
     initial: String,
