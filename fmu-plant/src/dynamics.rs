@@ -46,7 +46,7 @@ impl Force {
         self.slope == 0.0 && self.curvature == 0.0
     }
 
-    /// No coefficient is infinite or not a number.
+    /// Whether no coefficient is infinite or not a number.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         [self.value, self.slope, self.curvature, self.start].iter().all(|part| part.is_finite())
@@ -87,7 +87,7 @@ pub struct RigidBody<D = f64> {
     linearised: bool,
 }
 
-/// Sine, cosine and centrifugal term of a position, each as the body sees it.
+/// Sine, cosine and centrifugal term of an angle; in a linearised body their linear parts.
 struct Position<D> {
     sine: D,
     cosine: D,
@@ -111,6 +111,7 @@ impl<D: Number> RigidBody<D> {
         }
     }
 
+    /// The terms of `angle` and its `rate` in the equations.
     #[inline]
     fn position(&self, functions: &impl Functions<D>, angle: D, rate: D) -> Position<D> {
         if self.linearised {

@@ -27,7 +27,7 @@ impl Regime {
         }
     }
 
-    /// The regime number as `f64`.
+    /// [`Regime::number`] as `f64`.
     #[must_use]
     pub fn sign(self) -> f64 {
         f64::from(self.number())
@@ -48,7 +48,7 @@ pub struct StribeckLaw<D = f64> {
 }
 
 impl<D: Number> StribeckLaw<D> {
-    /// The law of checked parameters.
+    /// The law with these parameters, which must have passed their check.
     #[must_use]
     pub fn new(parameters: &Parameters<D>) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl<D: Number> StribeckLaw<D> {
         self.coulomb + self.excess * functions.exponential(-power)
     }
 
-    /// The friction in N of a cart that slides in the given direction at this velocity in m/s.
+    /// The friction in N of a cart that slides in this direction, forward or backward, at this velocity in m/s.
     #[must_use]
     #[inline]
     pub fn sliding(&self, functions: &impl Functions<D>, direction: Regime, velocity: D) -> D {
@@ -79,9 +79,9 @@ impl<D: Number> StribeckLaw<D> {
         self.magnitude(functions, speed) * sign
     }
 
-    /// The friction in N of a cart at rest: the balancing force, at most `F_s` to either side.
+    /// The friction in N of a cart at rest: the balancing force, kept between `-F_s` and `F_s`.
     ///
-    /// The derivative is the derivative of the balancing force up to `F_s`, and of `F_s` beyond.
+    /// The derivative is that of the balancing force within these limits, and that of the limit beyond them.
     #[must_use]
     pub fn holding(&self, balancing: D) -> D {
         let limit = self.limit();
@@ -110,13 +110,13 @@ impl<D: Number> StribeckLaw<D> {
 }
 
 impl StribeckLaw {
-    /// The velocity in m/s over which the friction falls: `v_s`, infinite where `F_s = F_c`.
+    /// The velocity in m/s over which the friction falls: `v_s`, or infinity if `F_s = F_c`.
     #[must_use]
     pub fn width(&self) -> f64 {
         if self.excess > 0.0 { 1.0 / self.inverse_velocity } else { f64::INFINITY }
     }
 
-    /// The regime of a cart at velocity zero under the force that would hold it there.
+    /// The regime of a cart at velocity zero, where `balancing` in N is the friction that would hold it.
     #[must_use]
     pub fn regime_at_rest(&self, balancing: f64) -> Regime {
         if balancing > self.limit() {

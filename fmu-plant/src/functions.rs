@@ -1,4 +1,4 @@
-//! The transcendental functions of the equations, computed anew or remembered.
+//! The transcendental functions of the equations, computed each time or remembered.
 
 use std::cell::Cell;
 
@@ -16,7 +16,7 @@ pub trait Functions<D> {
     fn exponential(&self, exponent: D) -> D;
 }
 
-/// Computes each value.
+/// Computes each value, without memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Direct;
 

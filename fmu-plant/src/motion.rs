@@ -34,15 +34,15 @@ const SHORTEST_STEP: f64 = 1e-13;
 /// Width in s to which an event is located.
 const EVENT_WIDTH: f64 = 1e-15;
 
-/// Most integration steps, rejected ones included, in one call of `advance`.
+/// The largest number of integration steps, rejected ones included, in one call of `advance`.
 const STEP_LIMIT: u32 = 200_000;
 
-/// Most events in one call of `advance`.
+/// The largest number of events in one call of `advance`.
 const EVENT_LIMIT: u32 = 10_000;
 
 /// The reason why the motion could not be integrated to the end of the interval.
 ///
-/// The state is the state at the time that the variant names.
+/// The state of the motion is then the one at [`Failure::time`].
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Failure {
     /// Start or duration is not finite, or the duration is negative.
@@ -99,9 +99,9 @@ pub struct Motion {
     state: State,
     regime: Regime,
     suggested_step: f64,
-    /// Whether [`Motion::advance`] integrates the motion, and no importer does.
+    /// Whether [`Motion::advance`] integrates the motion. An importer does if not.
     advances: bool,
-    /// The interval that an event has interrupted.
+    /// The interval that ended at an event, if the last one did.
     interrupted: Option<Interrupted>,
     #[serde(skip)]
     memory: Memory,
@@ -112,7 +112,7 @@ pub struct Motion {
 struct Interval {
     start: f64,
     duration: f64,
-    /// The part that is done.
+    /// The duration of the part that is integrated.
     elapsed: f64,
 }
 
@@ -122,11 +122,11 @@ impl Interval {
         self.start + self.elapsed
     }
 
-    /// Whether `rest` is the rest of this interval. Its end may differ by rounding.
+    /// Whether `rest` is the part of this interval that is not integrated. Its end may differ by rounding.
     fn ends_with(&self, rest: &Self) -> bool {
-        let (end, other) = (self.start + self.duration, rest.start + rest.duration);
+        let (end, end_of_rest) = (self.start + self.duration, rest.start + rest.duration);
         self.time().to_bits() == rest.start.to_bits()
-            && (end - other).abs() <= 4.0 * f64::EPSILON * end.abs()
+            && (end - end_of_rest).abs() <= 4.0 * f64::EPSILON * end.abs()
     }
 }
 
@@ -158,7 +158,7 @@ impl Motion {
     /// The parameters must have passed their check.
     ///
     /// # Errors
-    /// An initial value that is not finite is refused.
+    /// The first initial value that is not finite.
     pub fn start(parameters: &Parameters, initial: State, force: f64) -> Result<Self, Refusal> {
         let names = ["x_p_0", "theta_0", "v_p_0", "omega_0"];
         for (name, value) in names.into_iter().zip(initial) {
@@ -236,6 +236,8 @@ impl Motion {
         self.advance_until(parameters, force, start, duration, tolerance, true)
     }
 
+    /// Integrates the motion over the interval or, if it `stops` there, to the first event at a later time than
+    /// `start`. Returns the time of this event in s; `None` at the end of the interval.
     fn advance_until(
         &mut self,
         parameters: &Parameters,
@@ -263,9 +265,9 @@ impl Motion {
             self.regime = plant.regime(0.0, &self.state);
         }
         self.advances = true;
-        let done = self.integrate(&plant, &mut interval, tolerance, stops);
+        let stopped = self.integrate(&plant, &mut interval, tolerance, stops);
         self.memory = memory;
-        if !done? {
+        if !stopped? {
             return Ok(None);
         }
         let (force, constant) = (force.value, force.is_constant());
@@ -323,8 +325,8 @@ impl Motion {
     ) -> Progress {
         let segment = Segment::new(plant, self, elapsed);
         let limit = self.suggested_step.min(segment.resolving_length());
-        let lasts = remaining <= 1.01 * limit;
-        let length = if lasts { remaining } else { limit };
+        let is_last = remaining <= 1.01 * limit;
+        let length = if is_last { remaining } else { limit };
         let step = segment.step(length);
         let error = tolerance.squared_error(&step);
         if error.is_nan() || error > 1.0 {
@@ -338,11 +340,12 @@ impl Motion {
             Ok(Some(crossing)) => self.step_to_event(&crossing, &segment, length, tolerance),
             Ok(None) => {
                 self.state = *step.end();
-                if lasts { Progress::Finished } else { Progress::Advanced(length) }
+                if is_last { Progress::Finished } else { Progress::Advanced(length) }
             }
         }
     }
 
+    /// Suggests a shorter step after a step with this squared error; a failure if it would be too short.
     fn reject(&mut self, length: f64, error: f64) -> Progress {
         self.suggested_step = length * growth(error).min(0.9);
         if self.suggested_step >= SHORTEST_STEP {
@@ -354,10 +357,10 @@ impl Motion {
 
     /// Repeats a step of `length` so that it ends where the margin becomes negative.
     ///
-    /// A margin that the repeated step does not find negative at the crossing only touched zero in
-    /// the continuous extension, or by rounding. It is looked for at doubled lengths, up to the
-    /// whole step, so that every step makes progress. The repeated step sees the friction at its end, which
-    /// the longer one may have stepped over, so its error is tested.
+    /// If the margin at the end of the repeated step is not negative, it only touched zero in the continuous extension,
+    /// or by rounding. The crossing is then searched at doubled lengths, up to the whole step, so that every step makes
+    /// progress. The error of the repeated step is tested, because it evaluates the friction at its end, which the
+    /// longer step may have missed.
     fn step_to_event(
         &mut self,
         crossing: &Crossing,
@@ -394,12 +397,15 @@ impl Motion {
 enum Progress {
     /// The end of the interval is reached.
     Finished,
+    /// The motion was advanced by this length, without an event.
     Advanced(f64),
-    /// The step ended in an event.
+    /// The step of this length ended in an event.
     Event(f64),
-    /// The step was too long and will be repeated.
+    /// The error of the step is too large; it will be repeated with a shorter length.
     Rejected,
+    /// No step is short enough for the tolerance.
     Underflow,
+    /// The state, its derivative or the margin is not finite.
     NotFinite,
 }
 

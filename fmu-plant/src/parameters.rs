@@ -32,7 +32,7 @@ pub struct Parameters<D = f64> {
     pub stribeck_velocity: D,
     /// Exponent of the Stribeck law, `delta`.
     pub stribeck_exponent: D,
-    /// True: the rigid body is linearised about the upright position; the friction is the same.
+    /// Whether the rigid body is linearised about `theta = 0`; the friction is not.
     pub linearised: bool,
 }
 
@@ -68,7 +68,7 @@ pub struct Refusal {
 }
 
 impl Parameters {
-    /// Checks every rule; the first one broken is returned.
+    /// Checks every rule.
     ///
     /// The rules make the mass matrix positive definite in every position
     /// (`(M + m) J > (m l)²`) and the friction law positive and falling from `F_s` to `F_c`.
@@ -95,7 +95,7 @@ impl Parameters {
         require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
     }
 
-    /// The parameters as dual numbers with the components of a direction; without one none changes.
+    /// The parameters as dual numbers with the components of a direction; all of them are 0 without a direction.
     pub(crate) fn along(&self, direction: Option<&Self>) -> Parameters<Dual64> {
         let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), direction.map_or(0.0, part));
         Parameters {
@@ -115,7 +115,7 @@ impl Parameters {
     }
 }
 
-/// Accepts a value that is finite and obeys its rule.
+/// Returns a refusal unless the value is finite and its rule `holds`.
 pub(crate) fn require(
     name: &'static str,
     value: f64,

@@ -16,7 +16,7 @@ use crate::response::Response;
 
 mod variables;
 
-/// Inverted pendulum on a cart with Stribeck friction; fields carry the names of the variables.
+/// Inverted pendulum on a cart with Stribeck friction; fields without a comment have the name of their variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct FrictionPendulum {
     parameters: Parameters,
@@ -24,24 +24,26 @@ pub struct FrictionPendulum {
     initial: [f64; 4],
     u: f64,
     f_a: f64,
-    /// First and second derivatives of `u` and `f_a` at the start of the step.
+    /// First and second derivative of `u` at the start of the step.
     u_derivatives: [f64; 2],
+    /// First and second derivative of `f_a` at the start of the step.
     f_a_derivatives: [f64; 2],
     /// The states and the regime.
     motion: Motion,
     tolerance: Tolerance,
-    /// The force `u + f_a` in N at the time of the outputs, and its derivative in N/s.
+    /// The force `u + f_a` in N at the time of the outputs.
     force: f64,
+    /// The derivative of this force in N/s.
     force_rate: f64,
     f_fric: f64,
-    /// The derivative of `f_fric` in N/s; `friction_rate` computes it on demand.
+    /// The derivative of `f_fric` in N/s, which `friction_rate` computes when it is read.
     f_fric_rate: f64,
     /// The derivative of the states.
     slope: [f64; 4],
     regime: i32,
 }
 
-/// The force that `u` and `f_a` exert together, as a function of the time since `start`.
+/// The force that `u` and `f_a` exert together, as a polynomial of time, whose inputs were set at `start` in s.
 fn force(model: &FrictionPendulum, start: f64) -> Force {
     let [slope, curvature] =
         [0, 1].map(|order| model.u_derivatives[order] + model.f_a_derivatives[order]);
@@ -61,19 +63,20 @@ impl FrictionPendulum {
         self.regime = self.motion.regime().number();
     }
 
-    /// Computes outputs and derivatives where a step has ended: at an event, at a failure, or at its end.
+    /// Computes outputs and derivatives where a step has ended: at an event, at a failure, or at its end. Returns the
+    /// time of the event, or the failure with the time reached.
     fn end_step(
         &mut self,
         step: &Step,
         force: &Force,
-        done: Result<Option<f64>, motion::Failure>,
+        result: Result<Option<f64>, motion::Failure>,
     ) -> Result<Option<f64>, Failure> {
-        let reached = match &done {
+        let reached = match &result {
             Ok(event) => event.unwrap_or(step.end()).min(step.end()),
             Err(failure) => failure.time(),
         };
         self.update_outputs(force, reached);
-        match done {
+        match result {
             Ok(event) => Ok(event.map(|_| reached)),
             Err(failure) => {
                 Err(Failure::Incomplete { time: reached, message: failure.to_string() })
@@ -84,7 +87,7 @@ impl FrictionPendulum {
     /// The derivative of the friction with respect to time in N/s, along the motion in the present
     /// regime.
     ///
-    /// Zero where it is infinite: at the break-away of a cart whose friction has `delta` below one.
+    /// Zero where it is not finite: at the break-away of a cart whose friction has `delta` below one.
     fn friction_rate(&mut self) -> &mut f64 {
         let state = self.motion.state();
         let response = Response::new(
@@ -161,15 +164,15 @@ impl Model for FrictionPendulum {
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let force = force(self, step.start);
         let Self { motion, parameters, tolerance, .. } = self;
-        let done = motion.advance(parameters, &force, step.start, step.size, tolerance);
-        self.end_step(step, &force, done.map(|()| None)).map(|_| ())
+        let result = motion.advance(parameters, &force, step.start, step.size, tolerance);
+        self.end_step(step, &force, result.map(|()| None)).map(|_| ())
     }
 
     fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
         let force = force(self, step.start);
         let Self { motion, parameters, tolerance, .. } = self;
-        let done = motion.advance_to_event(parameters, &force, step.start, step.size, tolerance);
-        self.end_step(step, &force, done)
+        let result = motion.advance_to_event(parameters, &force, step.start, step.size, tolerance);
+        self.end_step(step, &force, result)
     }
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {

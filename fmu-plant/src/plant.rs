@@ -6,10 +6,11 @@ use crate::functions::{Direct, Functions, Memory};
 use crate::parameters::Parameters;
 use fmu::solver::{Quartic, Step};
 
+/// Body, friction law and force.
 pub(crate) struct Plant<'a> {
     body: RigidBody,
     law: StribeckLaw,
-    /// As a polynomial of the time elapsed in the communication step.
+    /// The force as a polynomial of the time elapsed in the communication step.
     force: Force,
     /// Remembered values of functions at the start and the end of the last steps.
     memory: &'a Memory,
@@ -57,7 +58,7 @@ impl<'a> Plant<'a> {
 
     /// The change of velocity in m/s that a step may make without missing a change of friction.
     ///
-    /// The fall from static to Coulomb friction is `v_s` wide and begins at velocity zero.
+    /// The fall from static to Coulomb friction is `v_s` wide and starts at velocity zero.
     pub(crate) fn resolved_change(&self, velocity: f64) -> f64 {
         velocity.abs() + self.law.width()
     }
@@ -90,7 +91,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// The first event inside a step. `Err` if the margin is not finite.
+    /// The first event inside a step; `None` if there is none.
     pub(crate) fn first_crossing(
         &self,
         regime: Regime,
@@ -104,6 +105,7 @@ impl<'a> Plant<'a> {
         }
     }
 
+    /// The first break-away of a held cart inside a step.
     fn first_break_away(
         &self,
         elapsed: f64,
@@ -133,21 +135,23 @@ impl<'a> Plant<'a> {
         })
     }
 
-    /// The balancing force and its rise over a length in s at its present rate.
+    /// The balancing force in N, and its rise in N over `length` s at its present rate.
     fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
         let (force, force_rate) = (self.force.at(elapsed), self.force.rate_at(elapsed));
         let (balance, rate) = self.body.balancing(self.memory, state, force, force_rate);
         (balance, length * rate)
     }
 
+    /// The friction in N that holds the cart in this state.
     fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
         self.body.balancing_force(self.memory, state, self.force.at(elapsed))
     }
 }
 
-/// The margin to an event could not be computed.
+/// The error of a margin to an event that is not finite.
 pub(crate) struct NotFinite;
 
+/// The first stop inside a step of a cart that slides in this direction.
 fn first_stop(direction: Regime, step: &Step<State>) -> Result<Option<Crossing>, NotFinite> {
     let velocity = step.extension(2);
     if !velocity.is_finite() {

@@ -24,14 +24,14 @@ const NOMINAL_ACCELERATION: f64 = 1.0;
 /// A cart that slides at most this fast, in m/s, and becomes slower has stopped.
 const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 
-/// The same in event mode: the importer may have located the stop a little too early.
+/// The largest such velocity in event mode, in m/s: the importer may have located the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
 /// How far the force on a held cart exceeds the static friction at its break-away, as part of the
 /// static friction: more than an importer's integration errors, which would free the cart at once.
 const EXCESS: f64 = 1e-6;
 
-/// The same in N where there is no static friction: a force of zero is no event.
+/// The same excess in N where there is no static friction: a force of zero is no event.
 const FREE: f64 = 1e-10;
 
 /// The plant at an instant as an importer sees it.
@@ -40,9 +40,8 @@ struct Instant<'a> {
     motion: &'a Motion,
     /// The nominal value of the force in N.
     nominal: f64,
-    /// How far in N the force on a held cart exceeds the static friction at its break-away.
-    ///
-    /// It exceeds the damping of a cart at the threshold of rest, so that a stopped cart is held.
+    /// How far in N the force on a held cart exceeds the static friction at its break-away: more than the damping of a
+    /// cart at the threshold of rest, so that a stopped cart is held.
     excess: f64,
     /// Whether there is static friction, so that a cart can be held.
     holds: bool,
@@ -97,11 +96,11 @@ impl<'a> Instant<'a> {
 impl Motion {
     /// The event indicators in the present regime; indicators not in use are one.
     ///
-    /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its
-    /// direction, each relative to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8.
-    /// Not positive are a velocity of at most `r` that falls, and one below `-r`: a cart that has
-    /// just broken away, at `v = 0`, has `a > 0`. Without static friction `v + r`. Then the friction that is left before a held cart
-    /// breaks away forward and backward, relative to the static friction, and more by `EXCESS`.
+    /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its direction, each relative
+    /// to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8. Not positive are a velocity of at most `r`
+    /// that falls, and one below `-r`: a cart that has just broken away, at `v = 0`, has `a > 0`. Without static
+    /// friction `v + r`. Then the friction that is left before a held cart breaks away forward and backward, relative
+    /// to the static friction, and more by `EXCESS`.
     ///
     /// After [`Motion::settle`] under the same force all are positive.
     #[must_use]
@@ -121,11 +120,11 @@ impl Motion {
         [stop, 1.0, 1.0]
     }
 
-    /// Decides the regime at an event; true if that changed the state. Does nothing if
+    /// Decides the regime at an event; returns whether that changed the state. Does nothing if
     /// [`Motion::advance`] integrates the motion, because it decides the regime itself.
     ///
-    /// A sliding cart that has stopped gets the velocity zero; there, the balancing force decides whether
-    /// it is held, continues or reverses. A held cart with a velocity got it from the importer.
+    /// A sliding cart that has stopped gets the velocity zero; the balancing force then decides whether it is held,
+    /// continues or reverses. A held cart to which the importer has given a velocity slides in its direction.
     pub fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
         if self.advances {
             return false;

@@ -23,6 +23,7 @@ impl<'a> Segment<'a> {
         Self { plant, regime, elapsed, start, slope }
     }
 
+    /// An integration step of this length in s from the start.
     pub(super) fn step(&self, length: f64) -> Step<State> {
         let Self { plant, regime, .. } = *self;
         let mut step = Step::new(self.start, &self.slope);
@@ -35,6 +36,7 @@ impl<'a> Segment<'a> {
         step
     }
 
+    /// The margin to the event in this direction at the end of `step`; see [`Plant::margin`].
     pub(super) fn margin(&self, direction: Regime, step: &Step<State>) -> f64 {
         self.plant.margin(self.regime, direction, self.elapsed + step.length(), step.end())
     }

@@ -27,7 +27,7 @@ impl Default for Tolerance {
 impl Tolerance {
     /// The given relative tolerance and a thousandth of it as the absolute one.
     ///
-    /// Values outside of 1e-12 to 1e-3 are taken as the nearest of these.
+    /// A value outside of 1e-12 to 1e-3 is replaced by the nearest of these.
     ///
     /// # Errors
     /// A tolerance that is not finite or not positive is refused.

@@ -7,10 +7,11 @@ use crate::motion::exchange::NOMINAL_VELOCITY;
 
 type Variable = fmu::Variable<FrictionPendulum>;
 
-/// A Real parameter: its name, meaning, unit and place.
+/// A Real parameter: its name, meaning, unit and the function that borrows its field.
 pub(super) type Place =
     (&'static str, &'static str, &'static str, fn(&mut FrictionPendulum) -> &mut f64);
 
+/// The parameters that are fixed after initialization.
 pub(super) const FIXED: [Place; 7] = [
     ("M", "Mass of the cart", "kg", |model| &mut model.parameters.cart_mass),
     ("m", "Mass of the pendulum", "kg", |model| &mut model.parameters.pendulum_mass),
@@ -23,6 +24,7 @@ pub(super) const FIXED: [Place; 7] = [
     ("g", "Gravity", "m/s2", |model| &mut model.parameters.gravity),
 ];
 
+/// The parameters of the friction, which may change during the run.
 pub(super) const TUNABLE: [Place; 4] = [
     ("F_c", "Coulomb friction", "N", |model| &mut model.parameters.coulomb),
     ("F_s", "Static friction", "N", |model| &mut model.parameters.static_friction),
@@ -38,11 +40,11 @@ pub(super) const STATES: [(&str, &str, &str, f64); 4] = [
     ("omega", "Angular velocity of the pendulum", "rad/s", 1.0),
 ];
 
-/// What friction and accelerations depend on between events: the friction at rest on the forces and
-/// the pendulum, in motion on the velocity, and the accelerations on the friction.
+/// The dependencies of friction and accelerations between events: the friction depends at rest on the forces and
+/// the pendulum, in motion on the velocity; the accelerations depend on the friction.
 pub(super) const DEPENDS: [&str; 5] = ["u", "f_a", "theta", "v_p", "omega"];
 
-/// What the initial friction depends on: at rest all but the mass and the damping of the cart, in
+/// The dependencies of the initial friction: at rest all except the position, the mass and the damping of the cart, in
 /// motion the friction law and the velocity.
 pub(super) const FRICTION_INITIALLY: [&str; 15] = [
     "u",
@@ -62,7 +64,7 @@ pub(super) const FRICTION_INITIALLY: [&str; 15] = [
     "linearised",
 ];
 
-/// What the initial accelerations depend on: all but the position.
+/// The dependencies of the initial accelerations: all except the position.
 pub(super) const ACCELERATION_INITIALLY: [&str; 17] = [
     "u",
     "f_a",
