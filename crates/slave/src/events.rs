@@ -9,11 +9,12 @@ use crate::{CallError, EventInfo};
 /// nothing changes any more (FMI 3.0.2, sections 2.3.5 and 4.2; FMI 2.0.5, section 3.2).
 #[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
 pub trait Events {
-    /// The time in s of the next event that is known before it happens: a time event, or the tick of an input clock.
+    /// Returns the time in s of the next event that is known before it happens: a time event, or the tick of an input
+    /// clock; `None` if there is none.
     fn next_event(&mut self) -> Result<Option<f64>, CallError>;
 
-    /// `fmi3EnterEventMode`, `fmi2EnterEventMode` at the time reached; input clocks that are due tick. In event mode
-    /// it only lets clocks tick.
+    /// `fmi3EnterEventMode`, `fmi2EnterEventMode` at the time reached; input clocks that are due tick. If the slave is
+    /// already in event mode, the clocks tick without a change of mode.
     fn enter_event_mode(&mut self) -> Result<(), CallError>;
 
     /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. Clocks do not tick any more

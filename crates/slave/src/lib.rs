@@ -34,8 +34,9 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 ///   returns the value at the last tick, and a value set reaches the FMU at the next one.
 ///
 /// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
-/// returns a [`CallError`]. The default implementation of an optional function returns
-/// [`Failure::Missing`], that of a function which only begins or ends a mode does nothing.
+/// returns a [`CallError`]; `fmi2Discard` of a step is [`StepResult::Part`]. The default implementations
+/// of the functions that access values, derivatives and states return [`Failure::Missing`]; those that
+/// set up, change modes, terminate and free succeed without a call.
 #[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
 #[expect(unused_variables, reason = "arguments of functions that an implementation may leave out")]
 pub trait Slave: Send {
@@ -158,7 +159,8 @@ pub trait Slave: Send {
     }
 
     /// `fmi2DoStep` from `time` to `time + size`, both in s. `never_back` is
-    /// `noSetFMUStatePriorToCurrentPoint`. After `fmi2Pending` the call waits for the end of the step.
+    /// `noSetFMUStatePriorToCurrentPoint`. After `fmi2Pending` the call waits for the end of the step;
+    /// `fmi2Discard` returns [`StepResult::Part`].
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError>;
 
     /// `fmi2GetDirectionalDerivative` (section 2.1.9): `changes = (dh/dv) seed` for the `unknowns` h and
@@ -236,8 +238,8 @@ pub trait Slave: Send {
         self.advance(&mut StepRequest::held(inputs, values, step, outputs, results))
     }
 
-    /// Hands the events of this slave over to the master; call it before [`Slave::setup_experiment`]. Returns
-    /// whether the slave has events that [`Slave::events`] can handle. It then
+    /// Hands the events of this slave over to the master; call it before [`Slave::setup_experiment`], and again to
+    /// change `stop`. Returns whether the slave has events that [`Slave::events`] can handle. If so, the slave
     ///
     /// * is in event mode after [`Slave::exit_initialization_mode`],
     /// * ends a step with [`StepResult::Event`] if an event happens at the end of the step, or, with `stop`, at the
@@ -246,14 +248,14 @@ pub trait Slave: Send {
         Ok(false)
     }
 
-    /// Returns the interface for events that have been handed over.
+    /// Returns the interface for events that have been handed over; `None` if the slave has no events.
     fn events(&mut self) -> Option<&mut dyn Events> {
         None
     }
 
     /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
-    /// status, results and the end of the line after it. False if the slave cannot do so; the caller
-    /// then logs the functions of this trait.
+    /// status, results and the end of the line after it. Returns false if the slave cannot do so; the
+    /// caller then logs the functions of this trait.
     fn log_calls(&mut self, sink: CallSink) -> bool {
         false
     }
@@ -310,11 +312,11 @@ pub trait Background {
 }
 
 /// Finishes a step: calls [`Background::finish_advance`] if the slave steps in the background, otherwise
-/// [`Slave::advance`].
+/// [`Slave::advance`], which makes the whole step.
 ///
 /// # Errors
 ///
-/// As [`Slave::advance`].
+/// Returns the [`CallError`] of the function called.
 pub fn finish(
     slave: &mut dyn Slave,
     request: &mut StepRequest<'_>,
@@ -411,7 +413,7 @@ pub enum StepResult {
 
 /// The error of a call of an FMU.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{function} {}{}", self.failure_text(), quoted(.messages))]
+#[error("{function} {}{}", self.failure_text(), joined(.messages))]
 pub struct CallError {
     /// Name of the FMI function.
     pub function: &'static str,
@@ -450,9 +452,10 @@ impl CallError {
         }
     }
 
-    /// Whether the instance must not go on: after `fmi2Error` a simulation can only be restored, reset or freed
-    /// (FMI 2.0.5, section 2.1.3; FMI 3.0.2, section 2.2.3). A function that is optional may return `fmi2Error`
-    /// for want of it, which [`CallError::leaves_the_instance_usable`] allows.
+    /// Whether the simulation of the instance must end: the instance is unusable, or the call returned `fmi2Error`,
+    /// after which an instance can only be restored, reset or freed (FMI 2.0.5, section 2.1.3; FMI 3.0.2, section
+    /// 2.2.3). For a function that the FMU may lack, use [`CallError::leaves_the_instance_usable`]: some FMUs
+    /// return `fmi2Error` instead of leaving the function out.
     #[must_use]
     pub fn ends_the_instance(&self) -> bool {
         !self.leaves_the_instance_usable() || self.failure == Failure::Status(Status::Error)
@@ -499,7 +502,8 @@ pub fn absent(function: &'static str) -> CallError {
     CallError { function, failure: Failure::Missing, messages: Vec::new() }
 }
 
-fn quoted(messages: &[String]) -> String {
+/// Returns the messages as the end of a sentence; empty without any.
+fn joined(messages: &[String]) -> String {
     if messages.is_empty() { String::new() } else { format!(": {}", messages.join("; ")) }
 }
 

@@ -7,18 +7,18 @@ use crate::{CallError, Slave, absent};
 /// An instance of a model-exchange FMU (FMI 2.0.5, section 3.2; FMI 3.0, section 3), whose states the
 /// importer integrates.
 ///
-/// The functions that both interfaces share are those of [`Slave`]; its `do_step` and its input and
-/// output derivatives return [`Failure::Missing`](crate::Failure::Missing). The names are those of
-/// FMI 3.0 where the versions differ.
+/// [`Slave`] has the functions that both interfaces share; its `do_step` and its input and output
+/// derivatives return [`Failure::Missing`](crate::Failure::Missing). Where the versions differ, the
+/// functions are named after FMI 3.0.
 #[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
 pub trait ModelExchange: Slave {
-    /// Returns the number of continuous states: that of `ModelStructure/Derivatives`, or
+    /// Returns the number of continuous states: the number of entries of `ModelStructure/Derivatives`, or
     /// `fmi3GetNumberOfContinuousStates`. Call it after initialization mode.
     fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
         Ok(self.description().structure.derivatives.len())
     }
 
-    /// Returns the number of event indicators: `numberOfEventIndicators`, or
+    /// Returns the number of event indicators: `numberOfEventIndicators` (0 if it is not stated), or
     /// `fmi3GetNumberOfEventIndicators`. Call it after initialization mode.
     fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
         Ok(self.description().number_of_event_indicators.unwrap_or(0) as usize)
@@ -29,8 +29,7 @@ pub trait ModelExchange: Slave {
         true
     }
 
-    /// Tells that a communication step begins: a clock is true until the next one
-    /// ([`Slave::get_boolean`]).
+    /// Starts a communication step: [`Slave::get_boolean`] forgets the ticks of clocks before it.
     fn begin_communication_step(&mut self) {}
 
     /// `fmi2SetTime`: sets the time in s.

@@ -13,7 +13,7 @@ pub enum Transformation {
         /// The offset, in the unit of the target.
         offset: f64,
     },
-    /// A map of Integers or enumeration values: pairs of source and target.
+    /// A map of Integers or enumeration values: pairs of source and target. A value without a pair is passed on.
     Integer(Vec<(i32, i32)>),
     /// A map of Booleans.
     Boolean {
