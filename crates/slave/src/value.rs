@@ -23,12 +23,12 @@ pub enum Value {
 }
 
 impl Value {
-    /// Reads `text` as a value of a variable of that kind. An item of an enumeration may be given by its
-    /// name in `types`.
+    /// Reads `text` as a value of a variable of that kind, without the blanks around it unless it is a
+    /// String. An Enumeration is any integer, or the name of an item of its type in `types`.
     ///
     /// # Errors
     ///
-    /// What was expected, as part of a sentence: "a number".
+    /// Returns what was expected, as part of a sentence: "a number".
     pub fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         match kind {
@@ -54,7 +54,7 @@ impl Value {
     }
 }
 
-/// Reads an integer of a type of FMI 3.0. Integers beyond 63 bits are not supported.
+/// Reads an integer of a type of FMI 3.0. A `UInt64` above `i64::MAX` is not supported.
 fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
     let range = kind.integer_range(Version::V3).unwrap_or(0..=0);
     let (least, most) = (*range.start(), (*range.end()).min(i64::MAX.into()));
@@ -101,7 +101,8 @@ pub fn to_real(value: i64) -> f64 {
     value as f64
 }
 
-/// Applies the pairs of [`crate::Transformation::Integer`] to `value`.
+/// Returns the target of the first pair of [`crate::Transformation::Integer`] with the source `value`; without such a
+/// pair, returns `value`.
 #[must_use]
 pub fn mapped_integer(pairs: &[(i32, i32)], value: i64) -> i64 {
     let pair = pairs.iter().find(|(from, _)| i64::from(*from) == value);
@@ -121,7 +122,8 @@ pub fn to_hex(bytes: &[u8]) -> String {
     text
 }
 
-/// Returns the bytes that `text` writes as hexadecimal digits; `None` if it does not.
+/// Returns the bytes that `text` states, two hexadecimal digits for each; `None` if another character occurs or if the
+/// number of digits is odd.
 #[must_use]
 pub fn from_hex(text: &str) -> Option<Vec<u8>> {
     let digits: Option<Vec<u32>> = text.chars().map(|digit| digit.to_digit(16)).collect();
@@ -130,7 +132,8 @@ pub fn from_hex(text: &str) -> Option<Vec<u8>> {
 }
 
 impl Value {
-    /// Returns the start value in a model description; `None` for a String or without start value.
+    /// Returns the start value in a model description; `None` without one, for a String, a binary and a
+    /// clock, and for an integer above `i64::MAX`.
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
@@ -146,14 +149,14 @@ impl Value {
         }
     }
 
-    /// Whether `other`, read from an FMU, equals this value; for Reals within a relative difference of
-    /// 1e-9.
+    /// Whether `other`, read from an FMU, equals this value. Reals are equal within a relative difference
+    /// of 1e-9, and NaN equals NaN.
     #[must_use]
     pub fn is_near(&self, other: &Self) -> bool {
         match (self, other) {
             (Value::Real(value), Value::Real(other)) => {
                 value.total_cmp(other).is_eq()
-                    || (other - value).abs() <= TOLERANCE * value.abs()
+                    || value.is_finite() && (other - value).abs() <= TOLERANCE * value.abs()
                     || value.is_nan() && other.is_nan()
             }
             _ => self == other,
@@ -184,4 +187,18 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
     }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Value;
+
+    #[test]
+    fn an_infinite_real_is_near_itself_only() {
+        let infinite = Value::Real(f64::INFINITY);
+        assert!(infinite.is_near(&infinite));
+        for other in [5.0, f64::NEG_INFINITY, f64::NAN] {
+            assert!(!infinite.is_near(&Value::Real(other)), "{other}");
+        }
+    }
 }
