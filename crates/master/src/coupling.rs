@@ -192,7 +192,9 @@ impl Iterated {
         Ok(())
     }
 
-    /// Computes the Jacobian `dG/du` by finite differences of whole steps.
+    /// Computes the Jacobian `dG/du` by finite differences of whole steps. If a step with a perturbed value ends
+    /// early, its outputs belong to another time: the value is perturbed to the other side. If that step ends early
+    /// too, the column is 0; a wrong column costs iterations only, as whole steps decide about convergence.
     fn differentiate(
         &mut self,
         engine: &mut Engine,
@@ -201,15 +203,20 @@ impl Iterated {
     ) -> Result<(), SystemError> {
         for column in 0..self.u.len() {
             let here = self.u[column];
-            let change = self.iteration.solver().perturbation(column, &self.u);
-            self.u[column] = here + change;
-            engine.restore(&self.start)?;
-            self.evaluate(engine, time, size)?;
-            self.u[column] = here;
-            let there = engine.exchange.reals.outputs();
-            for ((quotient, there), here) in self.column.iter_mut().zip(there).zip(&self.g) {
-                *quotient = (there - here) / change;
+            let perturbation = self.iteration.solver().perturbation(column, &self.u);
+            self.column.fill(0.0);
+            for change in [perturbation, -perturbation] {
+                self.u[column] = here + change;
+                engine.restore(&self.start)?;
+                if self.evaluate(engine, time, size)? == Swept::Whole {
+                    let quotients = self.column.iter_mut().zip(engine.exchange.reals.outputs());
+                    for ((quotient, there), here) in quotients.zip(&self.g) {
+                        *quotient = (there - here) / change;
+                    }
+                    break;
+                }
             }
+            self.u[column] = here;
             self.iteration.solver().set_column(column, &self.column);
         }
         Ok(())

@@ -10,10 +10,11 @@ use super::{puppet, until};
 const STEP: f64 = 0.125;
 const STOP: f64 = 1.0;
 
-/// y = f(u) at the end of each step.
+/// y = f(u) at the end of each step. Above the limit of u, a step ends halfway with y = 0.
 struct Direct {
     description: ModelDescription,
     function: fn(f64) -> f64,
+    limit: f64,
     u: f64,
     y: f64,
     slots: [(f64, f64); 3],
@@ -31,7 +32,8 @@ impl Direct {
             <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
             </ModelStructure></fmiModelDescription>"#;
         let description = ModelDescription::parse(xml).unwrap();
-        Box::new(Self { description, function, u: 0.0, y: 0.0, slots: [(0.0, 0.0); 3] })
+        let (limit, slots) = (f64::INFINITY, [(0.0, 0.0); 3]);
+        Box::new(Self { description, function, limit, u: 0.0, y: 0.0, slots })
     }
 }
 
@@ -49,7 +51,11 @@ impl Slave for Direct {
         self.u = values[0];
         Ok(())
     }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
+        if self.u > self.limit {
+            self.y = 0.0;
+            return Ok(StepResult::Part { reached: time + 0.5 * size, terminated: false });
+        }
         self.y = (self.function)(self.u);
         Ok(StepResult::Whole)
     }
@@ -107,6 +113,26 @@ fn a_loop_without_solution_falls_back_to_single_steps_and_counts_them() {
         assert_eq!(fallbacks.count, 8, "{}", coupling.name());
         assert!(fallbacks.first.contains("t = 0 s"), "{}", fallbacks.first);
         assert_eq!(once.fallbacks(), None);
+    }
+}
+
+/// The loop u = -1 - 3 u has the solution -0.25. The iteration starts at 0, the limit: a larger value, as a difference
+/// quotient needs it, ends the step early.
+#[test]
+fn a_perturbed_step_that_ends_early_is_not_part_of_the_matrix() {
+    let mut system = System::default();
+    let mut limited = Direct::boxed(|u| -1.0 - 3.0 * u);
+    limited.limit = 0.0;
+    system.add("limited", limited).unwrap();
+    system.add("gain", Direct::boxed(|u| u)).unwrap();
+    system.connect("limited.y", "gain.u").unwrap();
+    system.connect("gain.y", "limited.u").unwrap();
+    let algorithm = Algorithm { coupling: Coupling::Newton, ..Algorithm::new(STEP) };
+    let mut simulation = Simulation::new(system, &algorithm, &until(STOP)).unwrap();
+    simulation.step().unwrap();
+    assert_eq!(simulation.time(), STEP);
+    for output in outputs(&mut simulation) {
+        assert!((output + 0.25).abs() < 1e-3, "{output}");
     }
 }
 
