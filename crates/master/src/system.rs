@@ -77,9 +77,10 @@ impl System {
     ///
     /// Returns an error if the name is already in use.
     pub fn add(&mut self, name: &str, slave: Box<dyn Slave>) -> Result<(), SystemError> {
-        if self.names.insert(name.to_owned(), self.slaves.len()).is_some() {
+        if self.names.contains_key(name) {
             return Err(SystemError::SameName { name: name.to_owned() });
         }
+        self.names.insert(name.to_owned(), self.slaves.len());
         // A name that two variables have stands for the first one.
         let variables = slave.description().variables.iter().enumerate().rev();
         self.variables.push(variables.map(|(k, variable)| (variable.name.clone(), k)).collect());

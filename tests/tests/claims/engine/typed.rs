@@ -53,6 +53,13 @@ pub(crate) fn ring() -> System {
     system
 }
 
+#[test]
+fn a_name_in_use_is_refused_and_keeps_its_slave() {
+    let mut system = ring();
+    assert!(system.add("a", boxed()).is_err());
+    assert_eq!((system.slave("a").unwrap(), system.slaves.len()), (0, 3));
+}
+
 impl Slave for Typed {
     fn description(&self) -> &ModelDescription {
         &self.description
