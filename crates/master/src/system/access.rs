@@ -97,10 +97,6 @@ impl System {
     pub fn set_value(&mut self, port: Port, value: &Value) -> Result<(), CallError> {
         let variable = self.variable(port);
         let (reference, causality) = ([variable.value_reference], variable.causality);
-        if causality == Causality::Input {
-            self.input_values.insert(self.holder(port), value.clone());
-            self.changes += 1;
-        }
         let slave = &mut self.slaves[port.slave].1;
         match value {
             Value::Real(value) => slave.set_real(&reference, &[*value]),
@@ -108,7 +104,12 @@ impl System {
             Value::Boolean(value) => slave.set_boolean(&reference, &[(*value).into()]),
             Value::String(value) => slave.set_string(&reference, std::slice::from_ref(value)),
             Value::Binary(value) => slave.set_binary(&reference, std::slice::from_ref(value)),
+        }?;
+        if causality == Causality::Input {
+            self.input_values.insert(self.holder(port), value.clone());
+            self.changes += 1;
         }
+        Ok(())
     }
 
     /// Applies the transformation of a connection to `value`; the result has the type of `to`.
