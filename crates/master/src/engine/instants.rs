@@ -248,8 +248,8 @@ impl Instants {
         Ok(())
     }
 
-    /// Asks all slaves for the times of their next events, after their states have been restored. `pending` are
-    /// the events that their steps have ended at.
+    /// Asks all slaves for the times of their next events, after their states have been restored: all slaves are
+    /// between two steps. `pending` is, for each slave, the time in s of the event at which its last step ended.
     pub(crate) fn restore(
         &mut self,
         system: &mut System,
@@ -257,6 +257,8 @@ impl Instants {
         time: f64,
     ) -> Result<(), SystemError> {
         self.pending.copy_from_slice(pending);
+        // An instant that ended the run or failed has left slaves in event mode.
+        self.in_event.fill(false);
         for position in 0..self.members.len() {
             self.ask_next(system, self.members[position], time)?;
         }
