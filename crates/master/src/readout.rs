@@ -205,13 +205,13 @@ impl Readout {
         Ok(())
     }
 
-    /// Returns the variables among `ports` that their FMUs discard to read now, each with the error.
-    /// `ports` are the ports of this readout. Reads single variables only in groups whose common
-    /// read fails, after an error to name the variable. `time` in s appears in the error message.
+    /// Returns the variables among `ports` that their FMUs refuse to read now, each with the error;
+    /// the FMUs can still be used. `ports` are the ports of this readout. If the common read of a group
+    /// of variables fails, reads them one by one. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
-    /// Returns an error if an FMU cannot be used any more.
+    /// Returns an error if an FMU cannot be used any more; it names the variable if its read alone fails.
     pub fn unreadable(
         &mut self,
         system: &mut System,
@@ -229,9 +229,12 @@ impl Readout {
                 }
                 Err(source) => source,
             };
-            let kind = self.reads[position].kind;
+            let Read { kind, references, .. } = &self.reads[position];
             let members = ports.iter().filter(|port| {
-                port.slave == slave && ValueType::of(&system.variable(**port).kind) == kind
+                let variable = system.variable(**port);
+                port.slave == slave
+                    && ValueType::of(&variable.kind) == *kind
+                    && references.contains(&variable.value_reference)
             });
             for &port in members.collect::<Vec<_>>() {
                 match system.get_value(port) {
