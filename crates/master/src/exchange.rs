@@ -32,7 +32,7 @@ use channels::{Channels, ChannelsState};
 use instant::Ticks;
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
-use slave::{CallError, CommunicationStep, Slave, StepResult};
+use slave::{CallError, CommunicationStep, Slave, StepResult, ValueType};
 pub(crate) use tasks::Task;
 
 /// All connections of a system with the current values of their outputs.
@@ -93,22 +93,24 @@ impl Exchange {
     ///
     /// # Errors
     ///
-    /// Returns an error if an input has no connection or is a String.
+    /// Returns an error, and changes no fault, if an input has no connection, or if it is a String, a binary or a clock
+    /// that ticks in event mode.
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
         faults: &[(Port, FaultChain)],
     ) -> Result<(), SystemError> {
+        let wrong = faults.iter().find(|(input, _)| !carries_numbers(system, *input));
+        if let Some((input, _)) = wrong {
+            return Err(contradiction(format!(
+                "{} has a fault, expected a connected input that is no String and no clock",
+                system.name(*input)
+            )));
+        }
         for (input, fault) in faults {
-            let set = self.reals.set_fault(*input, fault)
+            let _ = self.reals.set_fault(*input, fault)
                 || self.held.set_fault(*input, fault)
                 || self.at_events.set_fault(*input, fault);
-            if !set {
-                return Err(contradiction(format!(
-                    "{} has a fault, expected a connected input that is no String and no clock",
-                    system.name(*input)
-                )));
-            }
         }
         self.faulty = !faults.is_empty();
         Ok(())
@@ -374,4 +376,13 @@ impl Exchange {
         self.held.restore(&values.held);
         self.at_events.restore(&values.at_events);
     }
+}
+
+/// Whether a connection passes numbers or Booleans to `input`, so that it can have a fault.
+fn carries_numbers(system: &System, input: Port) -> bool {
+    let kind = ValueType::of(&system.variable(input).kind);
+    !matches!(kind, ValueType::String | ValueType::Binary)
+        && system.connections.iter().any(|connection| {
+            connection.to == input && Way::of(system, connection) != Way::Tick
+        })
 }

@@ -6,8 +6,8 @@ use crate::error::{SystemError, contradiction};
 
 impl Simulation {
     /// Returns the earliest time in s at which a change of the scenario may take effect: the first
-    /// communication point to come that no step so far has touched, also no rejected one and none of
-    /// a slave that is ahead. `None` if the run ends before.
+    /// communication point after the ends of all steps attempted so far, including rejected steps and
+    /// steps of slaves that are ahead. `None` if the run ends at this point or before.
     ///
     /// A run that has the change in its scenario from the start gives the same results, bit for bit,
     /// because it uses nothing of the change before this time.
@@ -26,15 +26,15 @@ impl Simulation {
     /// Replaces the scenario by one that adds to it: further driven variables, further points of
     /// signals, and faults after those that a connection has. What is added takes effect at
     /// [`Simulation::next_change`] or later. A [`crate::fault::Fault::Delay`] that is added has no
-    /// values from before now: it starts after its delay, or gives the value of now until then.
+    /// values from before now: until its delay has passed, it gives its initial or the present value.
     ///
     /// # Errors
     ///
-    /// Returns an error, and keeps the scenario, if a driven variable or a fault is missing or has
-    /// changed, or if a fault has no connection.
+    /// Returns an error, and keeps the scenario, if a driven variable or a fault is missing, if a fault
+    /// has changed, or if a fault has no connection or is on a String, a binary or a clock.
     pub fn change_scenario(&mut self, mut scenario: Scenario) -> Result<(), SystemError> {
         let engine = &mut self.engine;
-        let earlier = engine.exchange.faults().count();
+        let present = engine.exchange.faults().count();
         let mut inherited = 0;
         let mut same = scenario.drives.inherit(&engine.drives);
         for (input, chain) in &mut scenario.faults {
@@ -43,7 +43,7 @@ impl Simulation {
                 inherited += 1;
             }
         }
-        if !same || inherited != earlier {
+        if !same || inherited != present {
             return Err(contradiction(
                 "the new scenario lacks a driven variable or a fault of the present one, expected all of them",
             ));
@@ -51,7 +51,7 @@ impl Simulation {
         engine.exchange.set_faults(&engine.system, &scenario.faults)?;
         engine.drives = scenario.drives;
         engine.choose_sweep();
-        // What a new fault has to remember of the values of now.
+        // New faults record the present values.
         engine.commit();
         Ok(())
     }

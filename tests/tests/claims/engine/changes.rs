@@ -117,6 +117,21 @@ fn what_the_run_has_cannot_be_taken_away_or_changed() {
 }
 
 #[test]
+fn a_fault_without_a_connection_leaves_all_faults_as_they_are() {
+    let mut simulation = simulation(FIRST, &Algorithm::new(0.01));
+    let added = "[[scenario.fault]]\nconnection = \"a.u0\"\nstuck = { from = 0.5 }\n";
+    let mut scenario = resolve(&format!("{FIRST}{added}"), simulation.system(), 0.01);
+    let output = simulation.system().port("a.y0").unwrap();
+    let (_, chain) = scenario.faults[1].clone();
+    scenario.faults.push((output, chain));
+    let error = simulation.change_scenario(scenario).unwrap_err().to_string();
+    assert!(error.contains("a.y0 has a fault"), "{error}");
+    // A fault that had stayed on a.u0 would be missing here.
+    let scenario = resolve(FIRST, simulation.system(), 0.01);
+    simulation.change_scenario(scenario).unwrap();
+}
+
+#[test]
 fn there_is_no_next_change_in_the_last_step() {
     let mut simulation = simulation(FIRST, &Algorithm::new(0.25));
     let mut actual = Vec::new();
