@@ -9,8 +9,11 @@ use crate::system::{Port, System};
 use fmu_description::Version;
 use slave::ValueType;
 
-/// Relative distance below which a time may be a break; see [`near`].
-pub(crate) const BREAK: f64 = 1e-8;
+/// Returns a time before `time`, in s, and before all times that are equal to it up to rounding ([`near`]): the start
+/// of a search for breaks at `time`.
+pub(crate) fn just_before(time: f64) -> f64 {
+    time - (1e-8 * time.abs()).max(f64::MIN_POSITIVE)
+}
 
 /// Signals and faults that act on a system during a run.
 #[derive(Clone, Debug, Default)]
@@ -121,9 +124,9 @@ impl Drive {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
     }
 
-    /// Whether the signal or a fault on it jumps or has a kink at `time` in s.
+    /// Whether the drive starts at `time`, in s, or its signal or a fault on it jumps or has a kink there.
     pub(crate) fn breaks_at(&self, time: f64) -> bool {
-        self.next_break(time - BREAK * time.abs()).is_some_and(|next| near(next, time))
+        self.next_break(just_before(time)).is_some_and(|next| near(next, time))
     }
 
     fn next_break(&self, after: f64) -> Option<f64> {
@@ -432,5 +435,23 @@ impl DriveKind {
             ValueType::Boolean => Self::Boolean,
             ValueType::String | ValueType::Binary => Self::String,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Drive, DriveKind, DriveSource};
+    use crate::signal::{Interpolation, Signal, Track};
+    use crate::system::Port;
+
+    #[test]
+    fn a_tick_is_a_break_also_at_time_zero() {
+        let times = [-1.0, 0.0, 1e-9, 2.0];
+        let track = Track::new(times.into(), [1.0; 4].into(), Interpolation::Points).unwrap();
+        let (signal, start) = (Signal::Track(track), f64::NEG_INFINITY);
+        let source = DriveSource { signal, start, texts: Vec::new() };
+        let drive = Drive::new(Port { slave: 0, variable: 0 }, 0, DriveKind::Clock, source);
+        assert!(times.into_iter().all(|time| drive.breaks_at(time)));
+        assert!([-0.5, 5e-10, 1.0].into_iter().all(|time| !drive.breaks_at(time)));
     }
 }

@@ -5,14 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::coupling::Coupler;
-use crate::drive::BREAK;
+use crate::drive::just_before;
 use crate::engine::{Ending, Engine, SavedState, Swept};
 use crate::error::{SystemError, contradiction};
 use crate::exchange::Reals;
 use crate::grid::{Grid, size_between};
 use crate::signal::{near, reached};
 use crate::system::{Port, System};
-use fmu_description::Kind;
 use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 
 /// The state of the step control, which is part of a checkpoint.
@@ -78,10 +77,7 @@ const SLOT: usize = 1;
 
 /// Returns the magnitude of a variable: its `nominal`, or 1.
 pub(crate) fn nominal(system: &System, port: Port) -> f64 {
-    match &system.variable(port).kind {
-        Kind::Real(real) => real.nominal.unwrap_or(1.0),
-        _ => 1.0,
-    }
+    system.variable(port).kind.as_real().and_then(|real| real.nominal).unwrap_or(1.0)
 }
 
 impl SizeControl {
@@ -350,7 +346,7 @@ impl SizeControl {
 
 /// Whether a signal or a fault on a connection changes at `time`, in s.
 fn is_break(engine: &Engine, time: f64) -> bool {
-    engine.next_breaks(time - BREAK * time.abs()).any(|next| near(next, time))
+    engine.next_breaks(just_before(time)).any(|next| near(next, time))
 }
 
 /// Number of steps between two checks of the pace.
