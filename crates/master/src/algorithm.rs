@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{SystemError, contradiction};
 use crate::system::{Port, System};
+use slave::ValueType;
 
 /// Declares an enum whose variants have the names used in the configuration file.
 macro_rules! choice {
@@ -220,9 +221,20 @@ impl Algorithm {
     ///
     /// # Errors
     ///
-    /// Returns an error if an FMU lacks a capability flag that the algorithm needs, if a port has
-    /// the wrong kind, or if two settings contradict each other.
+    /// Returns an error if a source of events is no Real, if an FMU lacks a capability flag that the
+    /// algorithm needs, if two settings contradict each other, or if a tolerance or a limit of the step
+    /// size is not above 0.
     pub fn check(&self, system: &System) -> Result<(), SystemError> {
+        for event in &self.events {
+            let (EventSource::NextTime(port) | EventSource::Crossing(port)) = *event;
+            if ValueType::of(&system.variable(port).kind) != ValueType::Real {
+                return Err(SystemError::Role {
+                    name: system.name(port),
+                    actual: format!("a variable of type {}", system.type_name(port)),
+                    expected: "a Real output as a source of events".to_owned(),
+                });
+            }
+        }
         if let Some(required_by) = self.repeated_by() {
             let lacks = "canGetAndSetFMUstate";
             require(system, lacks, &required_by, |flags| flags.can_get_and_set_fmu_state)?;

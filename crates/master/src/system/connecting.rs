@@ -114,7 +114,7 @@ impl System {
     }
 
     /// Returns the name of the type of a variable in the version of its FMU.
-    fn type_name(&self, port: Port) -> &'static str {
+    pub(crate) fn type_name(&self, port: Port) -> &'static str {
         let description = self.slaves[port.slave].1.description();
         self.variable(port).kind.element_in(description.version())
     }

@@ -5,6 +5,7 @@ use master::{Algorithm, Extrapolation, Method, Simulation, StepControl};
 use tests::linear::OUTPUTS;
 
 use crate::engine::puppet::{system, whole};
+use crate::engine::typed::ring;
 use crate::engine::until;
 
 const EVENTS: [f64; 4] = [0.137, 0.3, 0.3001, 0.7777];
@@ -55,6 +56,16 @@ fn chosen_steps_end_at_the_times_that_an_output_announces() {
             assert!(times.contains(&event), "{}: {event} in {times:?}", control.name());
         }
     }
+}
+
+#[test]
+fn a_source_of_events_that_is_no_real_is_refused() {
+    let system = ring();
+    let event = EventSource::NextTime(system.port("a.out1").unwrap());
+    let algorithm = Algorithm { events: vec![event], ..Algorithm::new(0.1) };
+    let expected =
+        "a.out1 is a variable of type Integer, expected a Real output as a source of events";
+    assert_eq!(algorithm.check(&system).unwrap_err().to_string(), expected);
 }
 
 /// Crosses zero upwards at 0.4321 s and downwards at 0.8 s.
