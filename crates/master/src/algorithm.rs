@@ -45,7 +45,8 @@ macro_rules! choice {
 choice! {
     /// The order in which the slaves step within a communication step.
     Method {
-        /// All slaves step from the values at the start of the step.
+        /// All slaves step from the values at the start of the step. Functions
+        /// ([`crate::Slave::is_function`]) step last, from the values at its end.
         Jacobi = "jacobi",
         /// The slaves step one after the other, in the order of their direct dependencies. A slave
         /// uses the values that earlier slaves have reached at the end of the step.
@@ -71,11 +72,12 @@ choice! {
         /// whichever is smaller, or with slope 0 if their signs differ (minmod limiter; P. L. Roe,
         /// Annu. Rev. Fluid Mech. 18, 1986).
         Limited = "limited",
-        /// A line, extrapolated with the output derivative of the source if it provides one,
-        /// otherwise with its last difference quotient.
+        /// A line. If the source has already stepped, the line interpolates; otherwise it extrapolates
+        /// with the output derivative of the source if it provides one, otherwise with its last
+        /// difference quotient.
         Linear = "linear",
         /// A parabola through the output derivatives if the source provides them, otherwise through
-        /// past values.
+        /// past values. If the source has already stepped, it ends at the value of the source there.
         Quadratic = "quadratic",
     }
 }
@@ -86,7 +88,8 @@ choice! {
         /// The step is made once: explicit (weak) coupling.
         Once = "once",
         /// Newton's method on the inputs at the end of the step. The matrix comes from directional
-        /// derivatives if all FMUs provide them, otherwise from finite differences.
+        /// derivatives if all FMUs provide them, otherwise, and from the second matrix of a step on,
+        /// from finite differences.
         Newton = "newton",
         /// Anderson mixing of the last iterates (Anderson 1965; Walker and Ni 2011).
         Anderson = "anderson",
@@ -99,7 +102,7 @@ choice! {
 choice! {
     /// How the size of the communication step is chosen.
     StepControl {
-        /// Constant steps: communication points at `t0 + k H`.
+        /// Constant steps: communication points at `t0 + k H`, and at events and jumps in between.
         Fixed = "fixed",
         /// Step doubling: each step is made once as a whole and once in two halves (Richardson's
         /// error estimate), and repeated with a smaller size if the difference is too large. Needs
@@ -151,8 +154,7 @@ pub struct Algorithm {
     pub control: StepControl,
     /// Communication step H in s; the first one if the step control varies it.
     pub step: f64,
-    /// For each slave, the number of communication steps between two of its own steps; empty: 1 for
-    /// all.
+    /// For each slave, the number of communication steps in one of its steps; empty: 1 for all.
     pub multiples: Vec<u32>,
     /// Relative tolerance of the connected values, used by the iteration and the step control.
     pub relative_tolerance: f64,
@@ -270,7 +272,7 @@ impl Algorithm {
         self.repeated_by().is_some()
     }
 
-    /// Returns what may repeat steps.
+    /// Returns what may repeat steps, for a message; `None` if nothing does.
     fn repeated_by(&self) -> Option<String> {
         let is_crossing = |event: &EventSource| matches!(event, EventSource::Crossing(_));
         match (self.coupling, self.control) {

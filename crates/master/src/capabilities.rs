@@ -37,8 +37,8 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
     refused
 }
 
-/// Returns `algorithm`, without iteration if the iteration was chosen by default and the state of
-/// an FMU cannot be restored.
+/// Returns `algorithm`, without iteration if it allows a fallback, nothing else repeats steps, and the
+/// state of an FMU cannot be restored although its description promises it.
 pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
     let once = Algorithm { coupling: Coupling::Once, ..algorithm.clone() };
     if !algorithm.fallback || algorithm.coupling == Coupling::Once || once.repeats() {

@@ -45,7 +45,7 @@ pub struct AlgorithmRequest {
     /// Whether a step whose iteration fails is made once without iteration; default: true if
     /// `coupling` is not stated.
     pub fallback: Option<bool>,
-    /// FMUs by name, each with the number of communication steps between two of its own steps.
+    /// FMUs by name, each with the number of communication steps in one of its steps.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty", default)]
     pub every: std::collections::BTreeMap<String, u32>,
     /// Outputs, `slave.variable`, whose value is the time in s of the next event of their FMU.
@@ -61,7 +61,7 @@ pub struct AlgorithmRequest {
     /// Pairs of inputs, `slave.variable`, whose product is a power.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub power_bonds: Vec<(String, String)>,
-    /// Number of threads; 0: number of processors.
+    /// Number of threads; 0: number of processors; default: 1.
     pub jobs: Option<usize>,
     /// Save FMU states before every step, so that all FMUs repeat a step that one FMU completed
     /// only in part.
@@ -75,7 +75,8 @@ pub struct AlgorithmRequest {
 pub struct AlgorithmChoice {
     /// The algorithm.
     pub algorithm: Algorithm,
-    /// One sentence for each setting that the user did not state.
+    /// One sentence for each of step, coupling, method and extrapolation that the user did not state,
+    /// and for each way in which connections that are not continuous are passed on.
     pub reasons: Vec<String>,
 }
 
@@ -83,8 +84,8 @@ pub struct AlgorithmChoice {
 ///
 /// # Errors
 ///
-/// Returns an error if a name does not exist, or if a requested setting needs a capability that an
-/// FMU lacks.
+/// Returns an error if a name does not exist, or if [`Algorithm::check`] does: a requested setting needs
+/// a capability that an FMU lacks, settings contradict each other, or a number is not above 0.
 pub fn choose(
     system: &System,
     request: &AlgorithmRequest,
@@ -159,7 +160,7 @@ fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 
 }
 
 /// Chooses an iteration if direct dependencies form a loop and the state of every FMU can be
-/// restored.
+/// restored: Newton's method if all FMUs have directional derivatives, otherwise quasi-Newton.
 fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
     let order = by_direct_dependencies(system);
     if order.looped.is_empty() {
@@ -189,28 +190,29 @@ fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
     }
 }
 
+/// Returns the limited extrapolation; the reason names the FMUs that take constant inputs only.
 fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapolation {
-    let mut fed: Vec<usize> =
+    let mut receivers: Vec<usize> =
         system.connections.iter().map(|connection| connection.to.slave).collect();
-    fed.sort_unstable();
-    fed.dedup();
+    receivers.sort_unstable();
+    receivers.dedup();
     // FMI 3.0 has no canInterpolateInputs: an FMU asks for the inputs that have intermediateUpdate.
     let is_third = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
-    let (third, others): (Vec<usize>, Vec<usize>) = fed.into_iter().partition(is_third);
+    let (third, others): (Vec<usize>, Vec<usize>) = receivers.into_iter().partition(is_third);
     let unable = |slaves: &[usize]| -> Vec<&str> {
         let can = |k: usize| system.can(k, |flags| flags.can_interpolate_inputs);
         let unable = slaves.iter().filter(|&&k| !can(k));
         unable.map(|&k| system.slaves[k].0.as_str()).collect()
     };
-    let held = [
+    let unable = [
         (unable(&others), "canInterpolateInputs is false"),
         (unable(&third), "no input of theirs has intermediateUpdate"),
     ];
-    let held = held.iter().filter(|(slaves, _)| !slaves.is_empty());
-    let held: Vec<_> =
-        held.map(|(slaves, why)| format!(", held for {}: {why}", shortened(slaves))).collect();
-    reasons.push(match (held.is_empty(), third.is_empty()) {
-        (false, _) => format!("extrapolation limited{}", held.join("")),
+    let unable = unable.iter().filter(|(slaves, _)| !slaves.is_empty());
+    let exceptions: Vec<_> =
+        unable.map(|(slaves, why)| format!(", held for {}: {why}", shortened(slaves))).collect();
+    reasons.push(match (exceptions.is_empty(), third.is_empty()) {
+        (false, _) => format!("extrapolation limited{}", exceptions.join("")),
         (true, true) => {
             "extrapolation limited: all connected FMUs take input derivatives (canInterpolateInputs)"
                 .to_owned()
@@ -222,7 +224,7 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
     Extrapolation::Limited
 }
 
-/// Says which connections carry signals that are not continuous.
+/// Adds a reason for each way in which connections that are not continuous are passed on.
 fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>) {
     let signal_type = |port: Port| {
         if discrete.contains(&port) { SignalType::Discrete } else { system.signal_type(port) }
@@ -265,7 +267,7 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
     }
 }
 
-/// Joins the first names of a list for a message.
+/// Joins the first names of a list for a message, with the number of the others.
 fn shortened(names: &[&str]) -> String {
     const SHOWN: usize = 8;
     let more = names.len().saturating_sub(SHOWN);

@@ -8,7 +8,7 @@ use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
 use serde::{Deserialize, Serialize};
 
-/// Slot of the FMU states to which each evaluation returns.
+/// Slot of the FMU states from which each evaluation starts.
 const SLOT: usize = 0;
 /// Largest number of iterates that Anderson mixing keeps.
 const DEPTH: usize = 20;
@@ -42,10 +42,13 @@ pub(crate) struct Coupler {
 /// at the end of a step if they assume the values u there.
 pub(crate) struct Iterated {
     pub(crate) iteration: Iteration,
-    /// Connected values: assumed by the slaves, returned by the slaves, and next to assume.
+    /// Connected values that the slaves assume at the end of the step.
     u: Vec<f64>,
+    /// Connected values that the slaves return there.
     g: Vec<f64>,
+    /// Connected values of the next evaluation.
     next: Vec<f64>,
+    /// A column of the Jacobian `dG/du`.
     column: Vec<f64>,
     start: SavedState,
     /// Whether all slaves have directional derivatives.
@@ -128,7 +131,8 @@ impl Iterated {
         }
     }
 
-    /// Solves `u = G(u)` for the step from `time` over `size`.
+    /// Solves `u = G(u)` for the step from `time` over `size`. Returns without a solution if a slave
+    /// ends the step early.
     fn solve(&mut self, engine: &mut Engine, time: f64, size: f64) -> Result<Swept, SystemError> {
         engine.save(time, &mut self.start)?;
         engine.exchange.reals.predictions(size, &mut self.u);
@@ -158,7 +162,7 @@ impl Iterated {
                     matrices += 1;
                     continue;
                 }
-                end => described(end),
+                end => failure_text(end),
             };
             return Err(SystemError::Coupling { time, size, why });
         }
@@ -242,8 +246,8 @@ fn is_recoverable(error: &SystemError) -> bool {
     }
 }
 
-/// Describes the failure of an iteration.
-fn described(end: Progress) -> String {
+/// Describes the failure of an iteration; empty for any other progress.
+fn failure_text(end: Progress) -> String {
     match end {
         Progress::NotConverged { iterations, residual } => format!(
             "outputs and inputs differ by {residual:.1e} tolerances after {iterations} iterations"

@@ -60,8 +60,9 @@ pub struct Drive {
     texts: Vec<String>,
     faults: Option<FaultChain>,
     cursor: Cursor,
-    /// The sample set last, and the sample set last at a final communication point.
+    /// The sample set last.
     written: Option<Sample>,
+    /// The sample that was the last one at the last commit.
     accepted: Option<Sample>,
 }
 
@@ -103,7 +104,8 @@ impl Drive {
         Some(faults.map_or(undisturbed, |faults| faults.apply_sample(time, undisturbed)))
     }
 
-    /// Returns the text for a value of [`Drive::sample`], if the variable is a String.
+    /// Returns the text for a value of [`Drive::sample`]; `None` if the variable is no String, or if
+    /// there is no text of this index.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position")]
     pub fn text(&self, value: f64) -> Option<&String> {
@@ -119,7 +121,7 @@ impl Drive {
         self.faults = Some(faults);
     }
 
-    /// Whether the FMU already holds this value since the last commit and the value is constant.
+    /// Whether the sample is constant and was set before the last commit, and no other one since.
     fn is_settled(&self, sample: Sample) -> bool {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
     }
@@ -207,8 +209,8 @@ impl Drives {
         self.all.iter_mut()
     }
 
-    /// Calls `show` with type, value and text of one drive at `time` in s, unless the variable
-    /// still has its start value.
+    /// Calls `show` with type, value and text of the drive at the index `number` at `time` in s, unless
+    /// the variable still has its start value.
     pub(crate) fn show(
         &mut self,
         number: usize,
@@ -228,7 +230,7 @@ impl Drives {
     }
 
     /// Sets every driven variable but clocks at `time` in s, before the step that starts there: its value and,
-    /// if the FMU takes it, its derivative. Skips values that the FMU already holds.
+    /// if the FMU takes it, its derivative. Skips values that the FMU already holds, and drives that have not started.
     ///
     /// # Errors
     ///
@@ -237,16 +239,17 @@ impl Drives {
         self.write_to(system, time, |_| true)
     }
 
-    /// Makes the driven clocks of `slave` tick that have to at `time` in s, in event mode.
+    /// Makes those driven clocks of `slave` tick, in event mode, whose signal jumps to another value than 0 at `time` in
+    /// s, or starts with one.
     pub(crate) fn tick(
         &mut self,
         system: &mut System,
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let is_own_clock =
+        let is_clock_of_slave =
             |drive: &&mut Drive| drive.kind == DriveKind::Clock && drive.port.slave == slave;
-        for drive in self.all.iter_mut().filter(is_own_clock) {
+        for drive in self.all.iter_mut().filter(is_clock_of_slave) {
             let Some(sample) = drive.sample(time) else { continue };
             if sample.value != 0.0 && (drive.written.is_none() || drive.breaks_at(time)) {
                 let clock = [drive.reference];
@@ -257,16 +260,16 @@ impl Drives {
         Ok(())
     }
 
-    /// As [`Drives::write`], for the slaves for which `belongs` is true.
+    /// As [`Drives::write`], for the slaves for which `is_chosen` is true.
     pub(crate) fn write_to(
         &mut self,
         system: &mut System,
         time: f64,
-        belongs: impl Fn(usize) -> bool,
+        is_chosen: impl Fn(usize) -> bool,
     ) -> Result<(), SystemError> {
         for group in 0..self.groups.len() {
             let (start, end) = self.groups[group];
-            if self.all[start].kind == DriveKind::Clock || !belongs(self.all[start].port.slave) {
+            if self.all[start].kind == DriveKind::Clock || !is_chosen(self.all[start].port.slave) {
                 continue;
             }
             self.write_group(system, start, end, time).map_err(|source| {
@@ -351,15 +354,15 @@ impl Drives {
         }
     }
 
-    /// Returns the first time after `after`, both in s, at which a signal or a fault on it jumps or
-    /// has a kink; a step should end there.
+    /// Returns the first time after `after`, both in s, at which a drive starts, or a signal or a fault
+    /// on it jumps or has a kink; a step should end there.
     #[must_use]
     pub fn next_break(&self, after: f64) -> Option<f64> {
         self.all.iter().filter_map(|drive| drive.next_break(after)).reduce(f64::min)
     }
 
-    /// Takes over the state of the drives of `earlier`, each of which this collection drives too;
-    /// returns false if it does not, or if the faults of `earlier` are not the first ones here.
+    /// Takes over the state of the drives of `earlier`. Returns false if a variable of `earlier` is not
+    /// driven here, or if its faults are not the first ones of its drive here.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
         earlier.all.iter().all(|old| {
             let Some(new) = self.all.iter_mut().find(|new| new.port == old.port) else {
@@ -421,8 +424,8 @@ pub(crate) fn integer(value: f64, least: i64, largest: i64) -> i64 {
 }
 
 impl DriveKind {
-    /// Returns the type of a variable of an FMU of this version of FMI; `derivatives` applies to
-    /// Reals only.
+    /// Returns the type of a variable of an FMU of this version of FMI; a binary counts as a String.
+    /// `derivatives` applies to Reals only.
     #[must_use]
     pub fn of(kind: &fmu_description::Kind, version: Version, derivatives: bool) -> Self {
         let range = kind.integer_range(version).unwrap_or(0..=0);

@@ -39,16 +39,16 @@ pub(crate) struct Engine {
     pub(crate) drives: Drives,
     pub(crate) grid: Grid,
     pub(crate) instants: Instants,
-    /// Why steps cannot end anywhere; `None` if all slaves take steps of any size.
+    /// Why steps end on the grid only; `None` if they may end at any time.
     rigid: Option<Rigid>,
     division: Division,
     /// Whether steps may be repeated; every slave can then restore its state. Otherwise a slave
     /// that completes only a part of its step (`fmi2Discard`) continues until the end.
     pub(crate) repeats: bool,
     groups: Groups,
-    /// For each slave: the number of communication steps in one of its steps, and the size in s of
-    /// its current step, 0 if it makes none.
+    /// For each slave, the number of communication steps in one of its steps.
     multiples: Vec<u32>,
+    /// For each slave, the size in s of its step in the current sweep; 0 if it makes none.
     sizes: Vec<f64>,
     /// Whether some slaves step in the background.
     background: bool,
@@ -68,7 +68,7 @@ enum Division {
     Report,
 }
 
-/// Why steps cannot end anywhere.
+/// Why steps end on the grid only.
 struct Rigid {
     why: String,
     /// Whether a change that took effect late has been reported.
@@ -76,6 +76,7 @@ struct Rigid {
 }
 
 impl Rigid {
+    /// Returns `None` if all slaves take steps of any size.
     fn of(system: &System, multiples: &[u32]) -> Option<Self> {
         let why = if multiples.iter().any(|multiple| *multiple != 1) {
             "some FMUs step at multiples of the communication step (every)".to_owned()
@@ -90,7 +91,7 @@ impl Rigid {
     }
 }
 
-/// How far a sweep came.
+/// The result of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Swept {
     /// All slaves completed the step.
@@ -157,7 +158,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Chooses between [`Engine::pass`] and [`Engine::step_groups`], and whether steps end within the planned ones.
+    /// Chooses between [`Engine::pass`] and [`Engine::step_groups`], and whether steps end at changes within them.
     /// Call it after a change of the scenario.
     pub(crate) fn choose_sweep(&mut self) {
         self.passes = self.threads.is_none() && !self.background && self.exchange.passes();
@@ -169,10 +170,10 @@ impl Engine {
         };
     }
 
-    /// Returns the end of a step from `time` that was planned to end at `end`: the first known event, jump or kink
-    /// within it; all in s.
+    /// Returns where a step from `time` that was planned to end at `end` ends earlier: at the first known event, jump
+    /// or kink within it; all in s. `None` if it ends at `end`; reports a change that then takes effect late.
     #[inline]
-    pub(crate) fn divided(&mut self, time: f64, end: f64) -> Option<f64> {
+    pub(crate) fn earlier_end(&mut self, time: f64, end: f64) -> Option<f64> {
         match self.division {
             Division::Never => None,
             Division::AtChanges => self.first_within(time, end),
@@ -190,6 +191,7 @@ impl Engine {
         breaks.reduce(f64::min)
     }
 
+    /// Returns the first known event, jump or kink within a step.
     #[inline(never)]
     fn first_within(&self, time: f64, end: f64) -> Option<f64> {
         let change = self.change_within(time, end).into_iter();
@@ -269,13 +271,13 @@ impl Engine {
         self.drives.commit(self.grid.time);
     }
 
-    /// Returns the times after `after`, all in s, at which the next signal and the next fault on a
-    /// connection starts, ends or has a kink.
+    /// Returns the times after `after`, all in s, of the next break of a driven variable and of the next
+    /// start or end of a fault on a connection.
     pub(crate) fn next_breaks(&self, after: f64) -> impl Iterator<Item = f64> {
         [self.drives.next_break(after), self.exchange.next_break(after)].into_iter().flatten()
     }
 
-    /// Returns the slaves that step every several communication steps.
+    /// Returns the slaves whose steps cover several communication steps.
     pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
         (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
     }
@@ -352,9 +354,10 @@ impl Engine {
         time: f64,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
-        let failed = if self.background { self.start_members(members.clone(), time) } else { None };
+        let failure =
+            if self.background { self.start_members(members.clone(), time) } else { None };
         for position in members {
-            if failed.as_ref().is_some_and(|(failed, _)| *failed == position) {
+            if failure.as_ref().is_some_and(|(failed, _)| *failed == position) {
                 break;
             }
             let slave = self.groups.sequence[position];
@@ -369,7 +372,7 @@ impl Engine {
             };
             self.finish(slave, time, done, swept)?;
         }
-        failed.map_or(Ok(()), |(_, error)| Err(error))
+        failure.map_or(Ok(()), |(_, error)| Err(error))
     }
 
     /// Starts the steps of background slaves up to the first failure; returns its position and
@@ -447,7 +450,8 @@ impl Engine {
         self.exchange.check_finite(&self.system, slave, time + size)
     }
 
-    /// Handles a slave that completed only a part of its step.
+    /// Handles a slave that completed only a part of its step, `done`. If steps may be repeated, shortens the sweep to
+    /// this part, otherwise steps the slave on to the end of the step.
     #[cold]
     fn finish_in_parts(
         &mut self,
@@ -464,7 +468,7 @@ impl Engine {
                 StepResult::Whole => return self.exchange.read(&mut self.system, slave, end),
                 StepResult::Part { reached, terminated } => (reached, terminated),
                 StepResult::Event { reached } if reached >= end - ROUNDING * size => {
-                    self.instants.expect(slave, end, size);
+                    self.instants.record_event(slave, end, size);
                     return Ok(());
                 }
                 StepResult::Event { reached } => (reached, false),

@@ -89,7 +89,7 @@ pub enum SystemError {
         to: String,
         /// Its size.
         to_size: String,
-        /// The first element of one that is an array.
+        /// The first element of the source if it is an array, otherwise of the target.
         element: Box<str>,
     },
     /// Two terminals do not match.
@@ -118,7 +118,7 @@ pub enum SystemError {
         name: String,
         /// The text.
         value: String,
-        /// The type.
+        /// What was expected, as part of a sentence.
         expected: String,
     },
     /// The standard allows nobody to set the variable.
@@ -128,7 +128,7 @@ pub enum SystemError {
         name: String,
         /// The text.
         value: String,
-        /// What it is.
+        /// What the variable is, as part of a sentence.
         what: &'static str,
     },
     /// An FMU refused a setting.
@@ -151,7 +151,7 @@ pub enum SystemError {
         name: String,
         /// The text.
         value: String,
-        /// The value in the FMU.
+        /// The value in the FMU after the initialization.
         actual: String,
     },
     /// An FMU refuses to read a variable of the results and cannot be used any more.
@@ -170,7 +170,7 @@ pub enum SystemError {
     /// An FMI call failed.
     #[error("{slave} at t = {} s: {source}", seconds(*time))]
     Call {
-        /// The slave.
+        /// The slave, or a variable of it.
         slave: String,
         /// Time of the master in s.
         time: f64,
@@ -190,12 +190,12 @@ pub enum SystemError {
         /// What changes.
         names: String,
     },
-    /// An output, or the value of a connection, is NaN or infinite.
+    /// A connected output or input is NaN or infinite.
     #[error("{name} is {value} at t = {} s, expected a finite number", seconds(*time))]
     NotFinite {
-        /// The output.
+        /// The output or input.
         name: String,
-        /// Its value in s.
+        /// Its value.
         value: f64,
         /// Time of the master in s.
         time: f64,
@@ -227,7 +227,7 @@ pub enum SystemError {
         seconds(*size)
     )]
     Coupling {
-        /// Begin of the step in s.
+        /// Start of the step in s.
         time: f64,
         /// Its size in s.
         size: f64,
@@ -252,7 +252,7 @@ pub enum SystemError {
         seconds(*size)
     )]
     Stuck {
-        /// Begin of the step in s.
+        /// Start of the step in s.
         time: f64,
         /// Its size in s.
         size: f64,

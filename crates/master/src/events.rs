@@ -43,7 +43,8 @@ impl Events {
         (!sources.is_empty()).then_some(events)
     }
 
-    /// Makes the planned step, or a shorter one that ends at the first event within it.
+    /// Makes the planned step, or a shorter one that ends at the first event within it or where the step
+    /// control ends it.
     pub(crate) fn step(
         &mut self,
         engine: &mut Engine,
@@ -71,8 +72,8 @@ impl Events {
         Ok(step)
     }
 
-    /// Returns the time of the first announced event before `end`, or `end` itself if the event
-    /// differs from it by rounding.
+    /// Returns the time of the first announced event from `time` to `end`, or `end` itself if the event
+    /// differs from it by rounding; `None` without such an event.
     fn next_event(
         &self,
         engine: &mut Engine,
@@ -91,7 +92,7 @@ impl Events {
         Ok(first)
     }
 
-    /// Saves the state and reads the crossing outputs before a step.
+    /// Saves the state and reads the crossing outputs before a step, if there are any.
     fn read_crossings(&mut self, engine: &mut Engine, time: f64) -> Result<(), SystemError> {
         if self.crossings.is_empty() {
             return Ok(());
@@ -103,7 +104,8 @@ impl Events {
         engine.save(time, &mut self.start)
     }
 
-    /// Ends the step from `time` to `end` at the first zero crossing within it, if there is one.
+    /// Repeats the step from `time` to `end` up to the first zero crossing within it; returns the end
+    /// and the result of the repeated step. `None` without a crossing: the step remains as it is.
     fn locate(
         &mut self,
         engine: &mut Engine,

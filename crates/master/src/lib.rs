@@ -7,14 +7,13 @@
 //!
 //! # One communication step, from the top
 //!
-//! 1. [`Simulation::step`] (`simulation.rs`) makes a step with the four objects below; each makes
-//!    its steps by those of the next.
-//! 2. `events.rs` ends the step at an event within it.
-//! 3. `step_control.rs` plans the end of the step and repeats a step whose error is too large;
-//!    `coupling.rs` repeats it until inputs and outputs agree. Both need slaves whose state can be
-//!    saved and restored.
-//! 4. `engine.rs` makes a sweep: it steps every slave once, in the sequence of `engine/groups.rs`;
-//!    `engine/threads.rs` uses threads where they are faster.
+//! 1. [`Simulation::step`] (`simulation.rs`) plans a step with `step_control.rs` and makes it. The
+//!    modules of 2 to 4 call each other in this order.
+//! 2. `events.rs` ends the step at an event within it, if the algorithm has sources of events.
+//! 3. `step_control.rs` repeats a step whose error is too large; `coupling.rs` repeats it until
+//!    inputs and outputs agree. A repetition needs slaves whose state can be saved and restored.
+//! 4. `engine.rs` makes a sweep: it steps every slave once, in the sequence of `engine/groups.rs`,
+//!    except slaves whose last step goes on; `engine/threads.rs` uses threads where they are faster.
 //! 5. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
 //!    them, calls `fmi2DoStep` and reads the outputs.
 //! 6. `engine/instants.rs` iterates the events at the end of the step over all slaves.

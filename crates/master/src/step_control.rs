@@ -137,14 +137,14 @@ impl SizeControl {
     pub(crate) fn plan(&self, engine: &mut Engine) -> PlannedStep {
         if self.kind == StepControl::Fixed {
             let (end, size) = engine.grid.next();
-            return match engine.divided(engine.grid.time, end) {
+            return match engine.earlier_end(engine.grid.time, end) {
                 None => PlannedStep { end, size },
                 Some(end) => PlannedStep::between(engine.grid.time, end),
             };
         }
         let (time, end) = (engine.grid.time, engine.grid.end_of(self.size));
-        let breaks = engine.next_breaks(time + 1e-9 * self.size).fold(end, f64::min);
-        PlannedStep::between(time, engine.divided(time, breaks).unwrap_or(breaks))
+        let end = engine.next_breaks(time + 1e-9 * self.size).fold(end, f64::min);
+        PlannedStep::between(time, engine.earlier_end(time, end).unwrap_or(end))
     }
 
     /// Returns the end of a step from `time`, in s, in a run whose steps vary; `None` if all steps

@@ -24,9 +24,10 @@ impl Schedule {
     }
 }
 
-/// The slaves in groups. Groups step one after the other; within a group, all inputs are set before
-/// the first slave steps.
+/// The slaves in groups. Groups step one after the other; within a group, all inputs are computed
+/// before the first slave steps.
 pub(super) struct Groups {
+    /// The positions of the slaves, group by group.
     pub(super) sequence: Vec<usize>,
     /// Start of each group in `sequence`, and the end of the last group.
     starts: Vec<usize>,
@@ -53,7 +54,7 @@ impl Groups {
             neighbours[to].push(from);
         }
         let mut starts = vec![0];
-        // The group that must not contain the slave.
+        // For each slave, the last group that contains a neighbour of it.
         let mut excluded_from = vec![usize::MAX; count];
         for (position, &slave) in order.sequence.iter().enumerate() {
             if excluded_from[slave] == starts.len() {

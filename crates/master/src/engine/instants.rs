@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-6;
 /// The slaves whose events the master handles.
 #[derive(Debug, Default)]
 pub(crate) struct Instants {
-    /// Their positions.
+    /// The positions of these slaves.
     members: Vec<usize>,
     /// For each slave, the time in s of its next known event; infinite without one, and for a slave without
     /// connections.
@@ -109,7 +109,8 @@ impl Instants {
     }
 
     /// Iterates the instant at `time`: slaves with a pending event or a driven variable that jumps enter event mode;
-    /// then values are exchanged and discrete states updated until nothing changes.
+    /// then values are exchanged and discrete states updated until nothing changes. If a slave requests the end of the
+    /// simulation, returns at once, with slaves in event mode.
     pub(crate) fn iterate(
         &mut self,
         parts: &mut Parts<'_>,
@@ -140,12 +141,13 @@ impl Instants {
     }
 
     fn enter(&mut self, system: &mut System, slave: usize, time: f64) -> Result<(), SystemError> {
-        at(system, slave, time, |events| events.enter_event_mode())?;
+        with_events(system, slave, time, |events| events.enter_event_mode())?;
         (self.in_event[slave], self.set[slave]) = (true, false);
         Ok(())
     }
 
-    /// Sets the driven variables of slaves in event mode.
+    /// Enters event mode of slaves with a driven variable that jumps; sets the driven variables and clocks of all
+    /// slaves in event mode.
     fn drive(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<(), SystemError> {
         if parts.drives.is_empty() {
             return Ok(());
@@ -163,7 +165,8 @@ impl Instants {
         in_event.into_iter().try_for_each(|slave| parts.drives.tick(parts.system, slave, time))
     }
 
-    /// Passes values and ticks until they do not change any more; returns whether any has.
+    /// Passes values and ticks until they do not change any more; returns whether a discrete value or a tick was
+    /// passed.
     fn exchange(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<bool, SystemError> {
         let mut any = false;
         // As many passes as there are slaves carry a continuous signal through all of them. An algebraic loop of
@@ -212,7 +215,8 @@ impl Instants {
                 continue;
             }
             parts.system.show_event(slave, time)?;
-            let info = at(parts.system, slave, time, |events| events.update_discrete_states())?;
+            let info =
+                with_events(parts.system, slave, time, |events| events.update_discrete_states())?;
             if info.terminate_simulation {
                 return Ok(UpdateResult::Ended(Ending { slave, time }));
             }
@@ -223,11 +227,11 @@ impl Instants {
         Ok(if again { UpdateResult::Again } else { UpdateResult::Settled })
     }
 
-    /// Leaves event mode and reads the outputs.
+    /// Leaves event mode, asks for the next events and reads the outputs.
     fn leave(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<InstantEnd, SystemError> {
         for slave in 0..self.in_event.len() {
             if std::mem::take(&mut self.in_event[slave]) {
-                at(parts.system, slave, time, |events| events.leave_event_mode())?;
+                with_events(parts.system, slave, time, |events| events.leave_event_mode())?;
                 self.ask_next(parts.system, slave, time)?;
                 parts.exchange.read(parts.system, slave, time)?;
             }
@@ -243,7 +247,7 @@ impl Instants {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let next = at(system, slave, time, |events| events.next_event())?;
+        let next = with_events(system, slave, time, |events| events.next_event())?;
         self.next[slave] = next.filter(|_| self.connected[slave]).unwrap_or(f64::INFINITY);
         Ok(())
     }
@@ -265,9 +269,9 @@ impl Instants {
         Ok(())
     }
 
-    /// Records that the step of `slave`, of `size` s, has ended at an event at `end` s. The communication point there
-    /// may be less by rounding.
-    pub(crate) fn expect(&mut self, slave: usize, end: f64, size: f64) {
+    /// Records that the step of `slave`, of `size` s, has ended at an event at `end` s. The recorded time is a little
+    /// earlier, because the communication point may be less than `end` by rounding.
+    pub(crate) fn record_event(&mut self, slave: usize, end: f64, size: f64) {
         self.pending[slave] = end - ROUNDING * size;
     }
 
@@ -309,8 +313,8 @@ enum UpdateResult {
     Ended(Ending),
 }
 
-/// Performs `action` with the events of a slave.
-fn at<T>(
+/// Performs `action` with the events of a slave; an error names it and `time`, in s.
+fn with_events<T>(
     system: &mut System,
     slave: usize,
     time: f64,

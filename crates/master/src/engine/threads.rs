@@ -21,12 +21,15 @@ pub(super) struct Threads {
     groups: Vec<Measured>,
 }
 
-/// The times of a group: number of steps measured, their total time without and with threads.
+/// The measured steps of a group.
 #[derive(Clone, Copy, Default)]
 struct Measured {
+    /// Number of steps.
     steps: u32,
-    alone: Duration,
-    together: Duration,
+    /// Total time of the steps without threads.
+    sequential: Duration,
+    /// Total time of the steps in threads.
+    parallel: Duration,
 }
 
 /// How a group makes one step.
@@ -49,27 +52,28 @@ impl Threads {
     }
 
     /// Decides how the group makes its next step: the first trials without threads, the following
-    /// with them, then the faster way.
+    /// with them, then with them if they were clearly faster.
     pub(super) fn begin(&self, group: usize) -> Trial {
-        let Measured { steps, alone, together } = self.groups[group];
+        let Measured { steps, sequential, parallel } = self.groups[group];
         if steps < 2 * TRIALS {
             return Trial { in_threads: steps >= TRIALS, start: Some(Instant::now()) };
         }
-        let in_threads = together.as_secs_f64() < WORTH * alone.as_secs_f64();
+        let in_threads = parallel.as_secs_f64() < WORTH * sequential.as_secs_f64();
         Trial { in_threads, start: None }
     }
 
-    /// Records the time of a measured step.
+    /// Records the time of a step if it is measured.
     pub(super) fn end(&mut self, group: usize, trial: &Trial) {
         let Some(start) = trial.start else { return };
         let measured = &mut self.groups[group];
-        let total = if trial.in_threads { &mut measured.together } else { &mut measured.alone };
+        let total =
+            if trial.in_threads { &mut measured.parallel } else { &mut measured.sequential };
         *total += start.elapsed();
         measured.steps += 1;
     }
 }
 
-/// Makes all steps in the threads of the pool.
+/// Makes all steps: in the threads of the pool, or one after the other without `threads`.
 pub(super) fn run(threads: Option<&Threads>, tasks: &mut [Task<'_>]) {
     let step = |task: &mut Task<'_>| task.done = task.instance.advance(&mut task.request);
     match threads {
