@@ -239,8 +239,8 @@ impl Drives {
         self.write_to(system, time, |_| true)
     }
 
-    /// Makes those driven clocks of `slave` tick, in event mode, whose signal jumps to another value than 0 at `time` in
-    /// s, or starts with one.
+    /// Makes those driven clocks of `slave` tick, in event mode, whose signal jumps to another value than 0 at `time`,
+    /// in s, or starts with one.
     pub(crate) fn tick(
         &mut self,
         system: &mut System,

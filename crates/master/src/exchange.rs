@@ -50,7 +50,7 @@ pub(crate) struct Exchange {
     watch: Watch,
 }
 
-/// The values of all connected outputs, saved to repeat a step or for a checkpoint.
+/// The values of all connections that change during the run, saved to repeat a step or for a checkpoint.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Values {
     reals: Trace,
@@ -69,11 +69,11 @@ impl Values {
 
 impl Exchange {
     /// Lays out the connections of `system`. `refusing` lists for each slave the derivatives that
-    /// it refuses.
+    /// it refuses; empty: none.
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals: Vec<Port> = reals.integer_sources().iter().map(|(port, _)| *port).collect();
-        let passing = |way| -> Vec<&Connection> {
+        let by_way = |way| -> Vec<&Connection> {
             system
                 .connections
                 .iter()
@@ -81,9 +81,9 @@ impl Exchange {
                 .collect()
         };
         // The held connections also read the Integer outputs that are connected to Reals.
-        let held = Channels::new(system, &passing(Way::Held), &to_reals);
-        let at_events = Channels::new(system, &passing(Way::AtEvents), &[]);
-        let ticks = Ticks::new(system, &passing(Way::Tick));
+        let held = Channels::new(system, &by_way(Way::Held), &to_reals);
+        let at_events = Channels::new(system, &by_way(Way::AtEvents), &[]);
+        let ticks = Ticks::new(system, &by_way(Way::Tick));
         let watch = Watch::new(system, |port| reals.output(port));
         let allow_nan = algorithm.allow_nan;
         Self { reals, held, at_events, ticks, allow_nan, faulty: false, watch }
@@ -237,8 +237,9 @@ impl Exchange {
             .map_err(|source| call(name, step.time, source))
     }
 
-    /// Steps several slaves at once. `run` makes the steps that may run in another thread; `step`
-    /// returns the step of each slave.
+    /// Steps several slaves at once; returns their results in the order of `slaves`, or the first error
+    /// in this order. `run` makes the steps that may run in another thread; `step` returns the step of
+    /// each slave.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -272,6 +273,7 @@ impl Exchange {
         if self.held.is_empty() { Ok(()) } else { self.held.set(position, slave) }
     }
 
+    /// Reads the connected outputs of the slave at `position` that are not extrapolated.
     #[inline]
     fn read_discrete(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
         if !self.held.is_empty() {

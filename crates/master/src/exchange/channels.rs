@@ -1,4 +1,4 @@
-//! The channels of all types, which serve together.
+//! The channels of all types, used together.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use crate::fault::FaultChain;
 use crate::system::{Connection, Port, System};
 use slave::{CallError, Slave, ValueType};
 
-/// Connections of all types whose inputs are held.
+/// Connections of all types that are not extrapolated, one channel for each type.
 pub(super) struct Channels {
     reals: Channel<f64>,
     pub(super) integers: Channel<i64>,
@@ -77,12 +77,13 @@ impl Channels {
         Self { reals, integers, booleans, strings, binaries, empty }
     }
 
-    /// Whether there are no connections.
+    /// Whether there are no connections and no other outputs to read.
     pub(super) fn is_empty(&self) -> bool {
         self.empty
     }
 
-    /// Puts a fault on the connection to an input; returns false if the input has no connection or is no number.
+    /// Puts a fault on the connection to an input; returns false if the input has no connection here, or is a String or
+    /// a binary.
     pub(super) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
         self.reals.set_fault(input, fault)
             || self.integers.set_fault(input, fault)
@@ -95,7 +96,8 @@ impl Channels {
         reals.or_else(|| self.booleans.fault(input))
     }
 
-    /// Records the undisturbed values in the faults at the final communication point `time`.
+    /// Records the undisturbed values in the faults at the final communication point `time`. Slaves for which `ahead`
+    /// is true contribute the value at the start of their step.
     pub(super) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
         self.reals.commit(time, ahead);
         self.integers.commit(time, ahead);

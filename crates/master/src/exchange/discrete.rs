@@ -1,4 +1,4 @@
-//! Connections whose inputs are held during a step.
+//! Connections that are not extrapolated: their inputs are held during a step or set at events.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -18,8 +18,11 @@ pub(crate) struct Access<T> {
     set: Set<T>,
     /// Applies a transformation to a value and stores the result in the third argument.
     map: fn(&T, &Transformation, &mut T),
+    /// Applies faults to a value at a time in s.
     disturb: fn(&FaultChain, f64, &T) -> T,
+    /// Returns a value as the number that faults record; NaN for a text.
     number: fn(&T) -> f64,
+    /// Whether an input that holds one value need not be set to the other.
     same: fn(&T, &T) -> bool,
 }
 
@@ -103,8 +106,9 @@ struct PortMap {
 struct Wiring {
     port_maps: Vec<PortMap>,
     output_ports: Vec<Port>,
-    /// For each input, the index of its output and the transformation of the connection.
+    /// For each input, the index of its output.
     sources: Vec<usize>,
+    /// For each input, the transformation of the connection.
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
     faults: Vec<Option<FaultChain>>,
@@ -186,7 +190,7 @@ impl Wiring {
         }
     }
 
-    /// Returns the index of an input.
+    /// Returns the index of an input; `None` without a connection here.
     fn input(&self, input: Port) -> Option<usize> {
         self.input_ports.iter().position(|&port| port == input)
     }
@@ -211,7 +215,7 @@ impl<T: Clone + Default> Channel<T> {
         Self { access, wiring, state, values: defaults(inputs) }
     }
 
-    /// Returns the current value of a connected output.
+    /// Returns the current value of a connected output; `None` if it is not connected here.
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
         let position = self.wiring.output_ports.binary_search_by_key(&key(&port), key);
@@ -220,8 +224,8 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        let place = self.wiring.input(input);
-        place.map(|k| self.wiring.faults[k] = Some(fault.clone())).is_some()
+        let index = self.wiring.input(input);
+        index.map(|k| self.wiring.faults[k] = Some(fault.clone())).is_some()
     }
 
     /// Returns the faults on the connection to an input.
@@ -301,12 +305,12 @@ impl<T: Clone + Default> Channel<T> {
         Ok(())
     }
 
-    /// Takes the gathered values of all inputs as set.
+    /// Records the gathered values of all inputs as those that were set last.
     pub(crate) fn accept(&mut self) {
         self.state.inputs.clone_from(&self.values);
     }
 
-    /// Whether there are no connections.
+    /// Whether there are no outputs to read, and so no connections.
     pub(crate) fn is_empty(&self) -> bool {
         self.state.latest.is_empty()
     }

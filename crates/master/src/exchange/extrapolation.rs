@@ -79,8 +79,8 @@ impl OutputHistory {
         Polynomial { value: self.start, slope, curvature }
     }
 
-    /// Minmod limiter: returns the smaller of derivative and difference quotient, or 0 if their
-    /// signs differ.
+    /// Minmod limiter: returns the smaller of derivative and difference quotient by magnitude, or 0 if
+    /// their signs differ; without a derivative, the difference quotient.
     fn limited(&self, quotient: f64) -> f64 {
         let Some(slope) = self.slope else { return quotient };
         if slope * quotient <= 0.0 {
@@ -99,18 +99,18 @@ impl OutputHistory {
             (Some(slope), Some(curvature)) => (slope, curvature),
             (Some(slope), None) => (slope, 2.0 * (slope - quotient) / self.last_size),
             (None, _) => {
-                let sooner = (self.before - self.earlier) / self.earlier_size;
-                let curvature = 2.0 * (quotient - sooner) / (self.last_size + self.earlier_size);
+                let earlier = (self.before - self.earlier) / self.earlier_size;
+                let curvature = 2.0 * (quotient - earlier) / (self.last_size + self.earlier_size);
                 (quotient + 0.5 * curvature * self.last_size, curvature)
             }
         }
     }
 
-    /// Returns the polynomial over a step whose end values are known.
+    /// Returns the polynomial over a step whose end values are known. A signal that jumps is constant,
+    /// as it does not take the values on a line between the values before and after its jump.
     pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let slope = (self.end - self.start) / self.size;
         match extrapolation {
-            // A line from the value before a jump to one after it is neither.
             _ if self.jumps => Polynomial::held(self.end),
             Extrapolation::Hold => Polynomial::held(self.end),
             Extrapolation::Limited | Extrapolation::Linear => {

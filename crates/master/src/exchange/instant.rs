@@ -28,8 +28,10 @@ struct TickSource {
 struct TickTarget {
     port: Port,
     reference: u32,
-    /// Its source and the position of the clock there.
-    source: (usize, usize),
+    /// The index of its [`TickSource`].
+    source: usize,
+    /// The index of the output clock there.
+    clock: usize,
     /// Whether it has received the present tick.
     received: bool,
 }
@@ -47,15 +49,20 @@ impl Ticks {
                 ticks.sources.len() - 1
             });
             let source = &mut ticks.sources[number];
-            let place = source.references.iter().position(|known| *known == from);
-            let place = place.unwrap_or_else(|| {
+            let clock = source.references.iter().position(|known| *known == from);
+            let clock = clock.unwrap_or_else(|| {
                 source.references.push(from);
                 source.flags.push(0);
                 source.references.len() - 1
             });
             let reference = system.variable(connection.to).value_reference;
-            let (port, source) = (connection.to, (number, place));
-            ticks.targets.push(TickTarget { port, reference, source, received: false });
+            ticks.targets.push(TickTarget {
+                port: connection.to,
+                reference,
+                source: number,
+                clock,
+                received: false,
+            });
         }
         ticks
     }
@@ -69,17 +76,17 @@ impl Ticks {
         Ok(())
     }
 
+    /// Whether the source of `target` ticks and `target` has not received the tick.
     fn is_due(&self, target: &TickTarget) -> bool {
-        let (source, place) = target.source;
-        !target.received && self.sources[source].flags[place] != 0
+        !target.received && self.sources[target.source].flags[target.clock] != 0
     }
 
-    /// Whether a clock of `slave` has to tick.
+    /// Whether an input clock of `slave` is due.
     fn has_due(&self, slave: usize) -> bool {
         self.targets.iter().any(|target| target.port.slave == slave && self.is_due(target))
     }
 
-    /// Makes the clocks of `slave` tick that have to.
+    /// Makes the due input clocks of `slave` tick.
     fn deliver(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
         for number in 0..self.targets.len() {
             let target = &self.targets[number];
@@ -122,7 +129,7 @@ impl Exchange {
         self.at_events.has_new(slave) || self.ticks.has_due(slave)
     }
 
-    /// Sets the discrete and clocked inputs of `slave`, and makes its clocks tick that have to.
+    /// Sets the discrete and clocked inputs of `slave`, and makes its due clocks tick.
     pub(crate) fn set_at_events(
         &mut self,
         system: &mut System,
@@ -150,9 +157,10 @@ impl Exchange {
         self.ticks.end();
     }
 
-    /// Takes the discrete and clocked inputs of all slaves as set, at the start of the run.
-    pub(crate) fn accept_at_events(&mut self, slaves: usize, time: f64) {
-        for slave in 0..slaves {
+    /// Computes the discrete and clocked inputs of all `count` slaves at `time`, the start of the run, and records them
+    /// as those that were set last.
+    pub(crate) fn accept_at_events(&mut self, count: usize, time: f64) {
+        for slave in 0..count {
             self.gather_at_events(slave, time);
         }
         self.at_events.accept();
@@ -178,7 +186,7 @@ impl Reals {
         instance.get_real(&port_map.outputs, &mut self.trace.latest[port_map.output_range.clone()])
     }
 
-    /// Sets the inputs of a slave to their values at `time`, if one differs from the value set last.
+    /// Sets the inputs of a slave to their values at `time`, if one differs from the value set last; returns whether.
     fn set_now(
         &mut self,
         slave: usize,

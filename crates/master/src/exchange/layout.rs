@@ -21,6 +21,7 @@ pub(crate) struct Refusal {
 /// The connected Real inputs and outputs of one slave.
 #[derive(Debug, Default)]
 pub(super) struct PortMap {
+    /// Value references of the inputs.
     pub(super) inputs: Vec<u32>,
     /// Range of the inputs in the arrays of all slaves.
     pub(super) input_range: Range<usize>,
@@ -32,14 +33,15 @@ pub(super) struct PortMap {
     pub(super) derived_outputs: Vec<u32>,
     pub(super) output_orders: Vec<i32>,
     pub(super) output_derivative_range: Range<usize>,
-    /// Highest order of derivatives that its inputs take and its outputs provide.
+    /// Highest order of derivatives that the inputs take; 0: constant inputs.
     pub(super) input_order: usize,
+    /// Highest order of derivatives that the outputs provide.
     pub(super) output_order: usize,
 }
 
 impl PortMap {
-    /// Builds the request of a step of this slave. `values` are those of the inputs of all slaves; the other slices
-    /// belong to this slave.
+    /// Builds the request of a step of this slave. `values` are the inputs of all slaves; the other slices belong to
+    /// this slave.
     #[inline]
     pub(super) fn request<'a>(
         &'a self,
@@ -69,27 +71,34 @@ impl PortMap {
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub(super) port_maps: Vec<PortMap>,
-    /// For each input: index of its output, factor and offset, and whether it is set to a constant.
+    /// For each input, the index of its output.
     pub(super) sources: Vec<u32>,
+    /// For each input, factor and offset of the transformation of its connection.
     pub(super) factors: Vec<f64>,
     pub(super) offsets: Vec<f64>,
+    /// For each input, whether it is constant within a step, because an end of its connection is not continuous.
     pub(super) held: Vec<bool>,
+    /// For each input, its port.
     pub(super) input_ports: Vec<Port>,
     /// For each slave, whether it is a function. A function uses input values at the end of a step.
     pub(super) functions: Vec<bool>,
     /// For each slave, whether all its inputs are copies of outputs, without transformation.
     pub(super) plain: Vec<bool>,
-    /// For each output: its port, its slave, and the indices of its first and second derivative.
+    /// For each output, its port.
     pub(super) output_ports: Vec<Port>,
+    /// For each output, its slave.
     pub(super) owners: Vec<u32>,
+    /// For each output, the index of its first derivative, if its slave provides it.
     pub(super) slopes: Vec<Option<u32>>,
+    /// For each output, the index of its second derivative, if its slave provides it.
     pub(super) curvatures: Vec<Option<u32>>,
-    /// For each output, whether it depends directly on a discrete output of another slave.
+    /// For each output, whether it is continuous but jumps with a discrete output of another slave.
     pub(super) jumping: Vec<bool>,
     /// For each output, whether it is not continuous.
     pub(super) discrete: Vec<bool>,
-    /// Number of derivatives of all outputs, and of all inputs.
+    /// Number of derivatives of all outputs.
     pub(super) output_derivatives: usize,
+    /// Number of derivatives of all inputs.
     pub(super) input_derivatives: usize,
     /// Integer outputs that are connected to Reals: port, and index in the output array, after the
     /// Real outputs.
@@ -209,22 +218,23 @@ impl Layout {
         let rows: Vec<_> =
             system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
         loop {
-            let fed =
+            let from_jumping =
                 system.connections.iter().filter(|connection| jumping.contains(&connection.from));
-            let fed: HashSet<Port> = fed.map(|connection| connection.to).collect();
-            let follows = |port: &&Port| {
-                let inputs = rows[port.slave].direct_dependencies(port.variable);
-                let is_fed = |index: &u32| {
+            let inputs: HashSet<Port> = from_jumping.map(|connection| connection.to).collect();
+            let is_dependent = |port: &&Port| {
+                let dependencies = rows[port.slave].direct_dependencies(port.variable);
+                let jumps = |index: &u32| {
                     let position = (*index as usize).checked_sub(1);
-                    position.is_some_and(|variable| fed.contains(&Port { variable, ..**port }))
+                    position.is_some_and(|variable| inputs.contains(&Port { variable, ..**port }))
                 };
-                !jumping.contains(port) && inputs.is_some_and(|all| all.iter().any(is_fed))
+                !jumping.contains(port) && dependencies.is_some_and(|all| all.iter().any(jumps))
             };
-            let reached: Vec<Port> = self.output_ports.iter().filter(follows).copied().collect();
-            if reached.is_empty() {
+            let dependent: Vec<Port> =
+                self.output_ports.iter().filter(is_dependent).copied().collect();
+            if dependent.is_empty() {
                 break;
             }
-            jumping.extend(reached);
+            jumping.extend(dependent);
         }
         let jumps = |port: &Port| jumping.contains(port) && !is_discrete(*port);
         self.jumping = self.output_ports.iter().map(jumps).collect();
@@ -254,7 +264,7 @@ impl Layout {
         }
     }
 
-    /// Returns the index of an output.
+    /// Returns the index of an output; `None` if it is not connected to a Real.
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }

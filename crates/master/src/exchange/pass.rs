@@ -14,17 +14,19 @@ struct PortRanges {
 /// The arrays of a pass: value references, sources and values of all slaves, contiguous in memory.
 #[derive(Debug, Default)]
 pub(super) struct Pass {
-    places: Vec<PortRanges>,
+    ranges: Vec<PortRanges>,
+    /// Value references of the inputs.
     inputs: Vec<u32>,
     /// For each input, the index of its output.
     sources: Vec<u32>,
     /// The value of each input.
     values: Vec<f64>,
+    /// Value references of the outputs.
     outputs: Vec<u32>,
     /// Outputs at the end of the step, kept apart while other slaves still read the values at its
     /// start.
     next: Vec<f64>,
-    /// Slaves that completed only a part of their step.
+    /// Slaves that did not complete their step or ended it at an event.
     parts: Vec<(usize, StepResult)>,
 }
 
@@ -38,16 +40,16 @@ impl Pass {
         self.values.resize(self.inputs.len(), 0.0);
         self.outputs.extend(outputs);
         self.next.resize(self.outputs.len(), 0.0);
-        self.places.push(PortRanges {
+        self.ranges.push(PortRanges {
             inputs: first_input..self.inputs.len(),
             outputs: first_output..self.outputs.len(),
         });
-        self.parts.reserve(self.places.len());
+        self.parts.reserve(self.ranges.len());
     }
 
     /// Sets the inputs of all slaves from `latest`, makes `step` with each slave and reads
-    /// their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves
-    /// that completed only a part of the step.
+    /// their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves that did
+    /// not complete the step or ended it at an event, with their results.
     ///
     /// # Errors
     ///
@@ -60,17 +62,17 @@ impl Pass {
         step: CommunicationStep,
     ) -> Result<&mut Vec<(usize, StepResult)>, (usize, CallError)> {
         self.parts.clear();
-        for (slave, ((_, instance), place)) in slaves.iter_mut().zip(&self.places).enumerate() {
-            let values = &mut self.values[place.inputs.clone()];
-            for (value, &source) in values.iter_mut().zip(&self.sources[place.inputs.clone()]) {
+        for (slave, ((_, instance), range)) in slaves.iter_mut().zip(&self.ranges).enumerate() {
+            let values = &mut self.values[range.inputs.clone()];
+            for (value, &source) in values.iter_mut().zip(&self.sources[range.inputs.clone()]) {
                 *value = latest[source as usize];
             }
             let done = instance.pass(
-                &self.inputs[place.inputs.clone()],
+                &self.inputs[range.inputs.clone()],
                 values,
                 step,
-                &self.outputs[place.outputs.clone()],
-                &mut self.next[place.outputs.clone()],
+                &self.outputs[range.outputs.clone()],
+                &mut self.next[range.outputs.clone()],
             );
             match done {
                 Ok(StepResult::Whole) => {}

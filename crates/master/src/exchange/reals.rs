@@ -31,6 +31,7 @@ pub(crate) struct Reals {
     pub(crate) trace: Trace,
     /// Values of the outputs at the end of the step that an iteration assumes.
     pub(super) assumed: Vec<f64>,
+    /// Whether an iteration assumes `assumed`.
     pub(super) assumes: bool,
     /// Values for the inputs.
     pub(super) values: Vec<f64>,
@@ -161,13 +162,13 @@ impl Reals {
         }
         let start = range.start;
         for k in range {
-            self.place(slave, k, k - start, time, size);
+            self.gather_input(slave, k, k - start, time, size);
         }
     }
 
     /// Computes value and derivatives of the input at index `k`, which is number `position` of the
     /// slave.
-    fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
+    fn gather_input(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, port_map) = (&self.layout, &self.layout.port_maps[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
@@ -221,15 +222,17 @@ impl Reals {
         self.method == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 
-    /// Whether the source of `output` has already made its step, for a `slave` that steps to `end`.
+    /// Whether a `slave` that steps to `end` knows the value of `output` at the end of the step of its source: the
+    /// source has already stepped, or an iteration assumes the value.
     fn is_known(&self, slave: usize, output: usize, end: f64) -> bool {
         let source = self.layout.owners[output] as usize;
         self.assumes
             || (self.trace.spans[source].stepped && self.uses_end_value(slave, source, end))
     }
 
-    /// Returns the known values of an output over the last step of its slave.
-    pub(super) fn known(&self, output: usize, span: &Span) -> OutputHistory {
+    /// Returns the known values of an output over the last step of its slave, `span`. The value at its end is the
+    /// assumed one during an iteration, unless the slave has stepped in a Gauss-Seidel sweep.
+    pub(super) fn history(&self, output: usize, span: &Span) -> OutputHistory {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.start_derivatives[k as usize]);
         OutputHistory {
@@ -250,15 +253,15 @@ impl Reals {
         }
     }
 
-    /// Returns the polynomial of an output from `time` on.
+    /// Returns the polynomial of an output from `time` on, for a step of `slave` over `size`.
     fn polynomial(&self, slave: usize, output: usize, time: f64, size: f64) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
-        let known = self.known(output, span);
+        let history = self.history(output, span);
         let extrapolation = if self.is_known(slave, output, time + size) {
-            known.interpolated(self.extrapolation)
+            history.interpolated(self.extrapolation)
         } else {
-            known.extrapolated(self.extrapolation)
+            history.extrapolated(self.extrapolation)
         };
         extrapolation.later(time - span.start)
     }
@@ -299,7 +302,7 @@ impl Reals {
             && self.layout.from_integers.is_empty()
     }
 
-    /// Makes a sweep with [`Pass::run`]; returns the slaves that completed only a part of the step.
+    /// Makes a sweep with [`Pass::run`] and returns its result.
     #[inline]
     pub(crate) fn pass(
         &mut self,
@@ -335,7 +338,8 @@ impl Reals {
         )
     }
 
-    /// Returns an input of the slave that is not finite after transformation and fault.
+    /// Returns an input of the slave that is not finite after transformation and fault, with its value;
+    /// `None` without such an input, and if all inputs are copies of outputs, which are checked themselves.
     #[inline]
     pub(crate) fn input_not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         if self.layout.plain[slave] && self.faults.is_empty() {
@@ -346,7 +350,7 @@ impl Reals {
         Some((self.layout.input_ports[index], self.values[index]))
     }
 
-    /// Returns an output of the slave whose value is not finite.
+    /// Returns an output of the slave whose value is not finite, with its value.
     #[inline]
     pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         let range = self.layout.port_maps[slave].output_range.clone();
@@ -366,8 +370,8 @@ impl Reals {
         all_finite(&self.trace.derivatives[range])
     }
 
-    /// Returns an output of the slave whose derivative is not finite, unless it has been reported
-    /// before.
+    /// Returns an output of the slave whose derivative is not finite, with the derivative, and marks it as
+    /// reported; `None` if all such outputs have been reported.
     #[cold]
     pub(crate) fn report_derivative(&mut self, slave: usize) -> Option<(Port, f64)> {
         for output in self.layout.port_maps[slave].output_range.clone() {
@@ -383,7 +387,7 @@ impl Reals {
     }
 }
 
-/// Number of values below which [`all_finite`] looks at one after the other. A vector load would wait
+/// Number of values up to which [`all_finite`] looks at one after the other. A vector load would wait
 /// for the values that an FMU has just stored one by one.
 const FEW: usize = 16;
 

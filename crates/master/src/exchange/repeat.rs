@@ -11,12 +11,12 @@ impl Reals {
     /// Returns the order of convergence of the input extrapolation: a held mean has order 2, the
     /// value at one end of the step order 1.
     pub(crate) fn order(&self) -> u8 {
-        let held = |port_map: &PortMap| port_map.input_order == 0 && !port_map.inputs.is_empty();
-        let held = self.layout.port_maps.iter().any(held);
+        let is_held = |port_map: &PortMap| port_map.input_order == 0 && !port_map.inputs.is_empty();
+        let any_held = self.layout.port_maps.iter().any(is_held);
         match self.extrapolation {
             Extrapolation::Hold => 1,
-            Extrapolation::Limited if held => 1,
-            Extrapolation::Quadratic if !held => 3,
+            Extrapolation::Limited if any_held => 1,
+            Extrapolation::Quadratic if !any_held => 3,
             Extrapolation::Limited | Extrapolation::Linear | Extrapolation::Quadratic => 2,
         }
     }
@@ -36,7 +36,7 @@ impl Reals {
         for (output, end) in ends.iter_mut().enumerate() {
             let span = &trace.spans[self.layout.owners[output] as usize];
             let derivative = |place: Option<u32>| place.map(|k| trace.derivatives[k as usize]);
-            let known = OutputHistory {
+            let history = OutputHistory {
                 earlier: trace.before[output],
                 before: trace.start[output],
                 start: trace.latest[output],
@@ -48,12 +48,12 @@ impl Reals {
                 last_size: span.size,
                 size,
             };
-            *end = known.extrapolated(self.extrapolation).end(size);
+            *end = history.extrapolated(self.extrapolation).end(size);
         }
     }
 
-    /// Computes the derivatives of all outputs with respect to one, through the connected inputs,
-    /// from directional derivatives. On failure returns the slave and its error.
+    /// Adds the derivatives of all outputs with respect to the output at the index `output`, through
+    /// the connected inputs, to `changes`. On failure returns the slave and its error.
     pub(crate) fn derivatives_to(
         &self,
         system: &mut System,
@@ -97,9 +97,8 @@ impl Reals {
     pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
         for (output, error) in errors.iter_mut().enumerate() {
             let span = &self.trace.spans[self.layout.owners[output] as usize];
-            let mut known = self.known(output, span);
-            known.size = size;
-            *error = self.trace.latest[output] - known.extrapolated(self.extrapolation).end(size);
+            let history = OutputHistory { size, ..self.history(output, span) };
+            *error = self.trace.latest[output] - history.extrapolated(self.extrapolation).end(size);
         }
     }
 }

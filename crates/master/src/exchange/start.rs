@@ -37,7 +37,7 @@ impl Exchange {
 
 impl Reals {
     /// Tests whether a slave supports derivatives: reads them for its connected outputs and sets
-    /// derivatives of 0 at its connected inputs.
+    /// derivatives of 0 at its connected inputs. Returns the results for outputs and for inputs.
     pub(crate) fn try_derivatives(
         &self,
         slave: usize,

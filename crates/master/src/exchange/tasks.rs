@@ -17,7 +17,8 @@ impl Reals {
         Ok(done)
     }
 
-    /// Steps several slaves. Starts the background slaves first; then `run` steps the others.
+    /// Steps several slaves and returns their results in the order of `slaves`. Starts the background
+    /// slaves first; then `run` steps the others.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -32,7 +33,7 @@ impl Reals {
         let mut results: Vec<Option<Result<StepResult, CallError>>> = vec![None; chosen.len()];
         let (mut values, mut derivatives) =
             (self.trace.latest.as_mut_slice(), self.trace.derivatives.as_mut_slice());
-        let mut sorted = StepBatch::default();
+        let mut batch = StepBatch::default();
         for (slave, (_, instance)) in system.slaves.iter_mut().enumerate() {
             let port_map = &self.layout.port_maps[slave];
             let (output_values, rest) = values.split_at_mut(port_map.output_range.len());
@@ -50,9 +51,9 @@ impl Reals {
                 output_values,
                 output_derivatives,
             );
-            sorted.add(slave, instance.as_mut(), request);
+            batch.add(slave, instance.as_mut(), request);
         }
-        for (slave, done) in sorted.run(run) {
+        for (slave, done) in batch.run(run) {
             self.trace.spans[slave].stepped |= done.is_ok();
             results[slave] = Some(done);
         }
@@ -60,11 +61,12 @@ impl Reals {
     }
 }
 
-/// What a thread does for one slave: its step.
+/// The step of one slave, which any thread can make.
 pub(crate) struct Task<'a> {
     slave: usize,
     pub(crate) instance: &'a mut dyn Slave,
     pub(crate) request: StepRequest<'a>,
+    /// The result, once the step is made.
     pub(crate) done: Result<StepResult, CallError>,
 }
 
@@ -75,6 +77,7 @@ struct StepBatch<'a> {
     started: Vec<Step<'a>>,
     /// Steps that any thread can make.
     tasks: Vec<Task<'a>>,
+    /// Slaves with the results of their steps.
     done: Vec<(usize, Result<StepResult, CallError>)>,
 }
 

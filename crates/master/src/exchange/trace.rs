@@ -2,16 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The last step of a slave.
+/// The last step of a slave, and the sizes of the steps before it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Span {
     /// Start of the last step in s.
     pub(super) start: f64,
-    /// Sizes in s of the last step and of the two steps before it.
+    /// Size of the last step in s.
     pub(super) size: f64,
+    /// Size of the step before it in s.
     pub(super) last_size: f64,
+    /// Size of the step before that in s.
     pub(super) earlier_size: f64,
-    /// Whether the step is complete, so that its end values are valid.
+    /// Whether the slave has made its step, so that the latest values are those at its end.
     pub(super) stepped: bool,
 }
 
@@ -26,12 +28,12 @@ impl Default for Span {
 }
 
 impl Span {
-    /// Whether the slave has made a step.
+    /// Whether the slave has started a step since the history was cleared.
     pub(super) fn has_size(&self) -> bool {
         self.size < NEVER
     }
 
-    /// Removes the steps made so far from the history.
+    /// Removes the sizes of the steps made so far.
     pub(super) fn clear_history(&mut self) {
         (self.size, self.last_size, self.earlier_size) = (NEVER, NEVER, NEVER);
     }
@@ -40,14 +42,17 @@ impl Span {
 /// The values that change during the run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Trace {
-    /// Values of all outputs at the end of the last step, at its start, and at the starts of the
-    /// two steps before.
+    /// Values of all outputs at the end of the last step.
     pub(super) latest: Vec<f64>,
+    /// Values of all outputs at the start of the last step.
     pub(super) start: Vec<f64>,
+    /// Values of all outputs at the start of the step before the last one.
     pub(super) before: Vec<f64>,
+    /// Values of all outputs at the start of the step before that.
     pub(super) earlier: Vec<f64>,
-    /// Derivatives of all outputs at the end of the last step and at its start.
+    /// Derivatives of all outputs at the end of the last step.
     pub(super) derivatives: Vec<f64>,
+    /// Derivatives of all outputs at the start of the last step.
     pub(super) start_derivatives: Vec<f64>,
     /// The last step of each slave.
     pub(super) spans: Vec<Span>,
