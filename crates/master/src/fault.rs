@@ -146,7 +146,7 @@ impl FaultChain {
     ///
     /// # Errors
     ///
-    /// Returns [`FaultError`] if a delay would need too much memory.
+    /// Returns [`FaultError`] if a delay is negative, or if it spans more than 250 000 steps of `step` s.
     pub fn new(faults: Vec<(Window, Fault)>, step: f64) -> Result<Self, FaultError> {
         let stages = faults
             .into_iter()
@@ -161,8 +161,8 @@ impl FaultChain {
         self.apply_sample(time, Sample::held(value)).value
     }
 
-    /// As [`FaultChain::apply`], with the derivative with respect to time; the derivative of a
-    /// value that changes in jumps is zero.
+    /// As [`FaultChain::apply`], with the derivative with respect to time; the derivative of a value
+    /// that a fault holds is zero.
     #[must_use]
     pub fn apply_sample(&self, time: f64, sample: Sample) -> Sample {
         let [value, slope, _] = self.apply_derivatives(time, [sample.value, sample.slope, 0.0]);
@@ -197,7 +197,7 @@ impl FaultChain {
         i32::from(self.apply(time, f64::from(i32::from(value != 0))) != 0.0)
     }
 
-    /// Applies the faults to a value of any type at `time` in s; Strings do not change.
+    /// Applies the faults to a value of any type at `time` in s; Strings and binaries do not change.
     pub(crate) fn disturb(&self, time: f64, value: &mut Value) {
         match value {
             Value::Real(value) => *value = self.apply(time, *value),
@@ -229,8 +229,8 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
-    /// Takes over the memory of `earlier`, whose faults are the first ones of this chain; returns
-    /// false if they are not.
+    /// Takes over the memory of the faults of `earlier`; returns false, and changes nothing, if they are
+    /// not the first faults of this chain.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
         let Some(first) = self.stages.get_mut(..earlier.stages.len()) else { return false };
         let same =

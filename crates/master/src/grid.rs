@@ -112,8 +112,8 @@ impl Grid {
         Ok((grid, early))
     }
 
-    /// Returns the early end of the run if some slaves take equal steps only; `None`: the run ends
-    /// at the stop time.
+    /// Returns the early end of the run if a slave that takes equal steps only cannot end at the stop
+    /// time; `None`: the run ends at the stop time.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     fn last_whole_step(&self, system: &System, multiples: &[u32], stop: f64) -> Option<EarlyEnd> {
         let rigid = || {
@@ -154,7 +154,7 @@ impl Grid {
         self.stop
     }
 
-    /// Returns the end of a step of `size` s from the time reached.
+    /// Returns the end of a step of `size` s from the time reached, at most the stop time.
     pub(crate) fn end_of(&self, size: f64) -> f64 {
         self.limited(self.time + size, size)
     }
@@ -178,7 +178,8 @@ impl Grid {
         }
     }
 
-    /// Returns end and size of the next step: H, or the rest up to the stop time.
+    /// Returns end and size of the next step: H, or after an event the rest up to the next grid point,
+    /// or the rest up to the stop time.
     #[inline]
     pub(crate) fn next(&self) -> (f64, f64) {
         let (start, end) = self.points;
@@ -195,7 +196,8 @@ impl Grid {
     }
 
     /// Returns the size of the step from `time` of a slave whose step covers `multiple`
-    /// communication steps. The step ends at the next grid point whose number is a multiple.
+    /// communication steps. The step ends at the next grid point whose number is a multiple, or at the
+    /// stop time.
     pub(crate) fn size_of(&self, multiple: u32, time: f64) -> f64 {
         let multiple = u64::from(multiple);
         let number = (self.count / multiple + 1) * multiple;
@@ -235,7 +237,8 @@ fn least_common(a: u64, b: u64) -> u64 {
     (a / divisor).saturating_mul(b)
 }
 
-/// Returns the number of communication steps in one step of each slave.
+/// Returns the number of communication steps in one step of each slave; an error if one is 0 or if the
+/// algorithm does not state one for each slave.
 pub(crate) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u32>, SystemError> {
     let count = system.slaves.len();
     if algorithm.multiples.is_empty() {

@@ -94,7 +94,8 @@ struct Iterate<'a> {
 struct Graph<'a> {
     faults: HashMap<Port, &'a FaultChain>,
     outputs: Vec<Port>,
-    /// For each output, its connections.
+    /// For each output, the numbers of its connections: the positions in [`System::connections`], then those in
+    /// `System::initial`.
     connections: Vec<Vec<usize>>,
     components: Components,
 }
@@ -107,7 +108,7 @@ impl<'a> Graph<'a> {
         let mut inputs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); system.slaves.len()];
         for (number, connection) in system.connections.iter().chain(&system.initial).enumerate() {
             if system.signal_type(connection.to) == SignalType::Clocked {
-                // What is clocked is sent at the ticks of its clock, in event mode.
+                // Clocked values are passed at the ticks of their clock, in event mode.
                 continue;
             }
             let node = *nodes.entry(connection.from).or_insert_with(|| {
@@ -142,7 +143,7 @@ impl<'a> Graph<'a> {
         system.read(self.outputs[node], time)
     }
 
-    /// Sets all inputs that are connected to an output.
+    /// Sets all inputs and parameters that are connected to an output, after transformations and faults.
     fn write(
         &self,
         system: &mut System,
@@ -151,8 +152,7 @@ impl<'a> Graph<'a> {
         time: f64,
     ) -> Result<(), SystemError> {
         for &number in &self.connections[node] {
-            let all = system.connections.len();
-            let connection = match number.checked_sub(all) {
+            let connection = match number.checked_sub(system.connections.len()) {
                 None => &system.connections[number],
                 Some(number) => &system.initial[number],
             };
@@ -168,8 +168,8 @@ impl<'a> Graph<'a> {
         Ok(())
     }
 
-    /// Solves an algebraic loop: Reals by Newton's method, discrete values by fixed-point
-    /// iteration.
+    /// Solves an algebraic loop: in each pass of a fixed-point iteration of the discrete values, the
+    /// Reals by Newton's method.
     fn solve(
         &mut self,
         system: &mut System,
@@ -179,19 +179,19 @@ impl<'a> Graph<'a> {
         let is_real = |node: &usize| {
             ValueType::of(&system.variable(self.outputs[*node]).kind) == ValueType::Real
         };
-        let (reals, others): (Vec<usize>, Vec<usize>) =
+        let (reals, discrete): (Vec<usize>, Vec<usize>) =
             nodes.iter().partition(|node| is_real(node));
-        let mut held = self.read_all(system, &others, time)?;
+        let mut values = self.read_all(system, &discrete, time)?;
         for _ in 0..EVALUATIONS {
-            for (&node, value) in others.iter().zip(&held) {
+            for (&node, value) in discrete.iter().zip(&values) {
                 self.write(system, node, value, time)?;
             }
             self.solve_reals(system, &reals, time)?;
-            let values = self.read_all(system, &others, time)?;
-            if values == held {
+            let next = self.read_all(system, &discrete, time)?;
+            if next == values {
                 return Ok(());
             }
-            held = values;
+            values = next;
         }
         let why = format!("its discrete values do not settle within {EVALUATIONS} passes");
         Err(self.unsolved(system, nodes, time, why))
@@ -268,7 +268,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// Computes the Jacobian `dG/du` by finite differences.
+    /// Computes the Jacobian `dG/du` by finite differences, then sets the inputs to `point` again.
     fn differentiate(
         &self,
         system: &mut System,

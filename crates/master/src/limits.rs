@@ -10,7 +10,7 @@ use slave::{Transformation, Value};
 
 /// Part of the limit, or of the nominal value if this is larger, by which a value may exceed the limit: rounding.
 const ROUNDING: f64 = 1e-9;
-/// Largest number of variables that a warning names, and of connected inputs that are reported.
+/// Largest number of variables and of items that a warning names, and of connected inputs that are reported.
 const NAMED: usize = 5;
 /// Digits of a value in a message.
 const DIGITS: usize = 6;
@@ -33,7 +33,8 @@ fn types(description: &ModelDescription) -> Types<'_> {
 }
 
 impl Limits {
-    /// Returns the limits that the variable or its declared type states, `None` if every value is allowed.
+    /// Returns the limits that the variable or its declared type states; `None` if every value is allowed, or if the
+    /// variable is no number.
     fn of(variable: &ScalarVariable, types: &Types<'_>) -> Option<Self> {
         let declared = variable.kind.declared_type().and_then(|name| types.get(name));
         let (min, max, nominal) = match (variable.kind.as_real(), variable.kind.as_integer()) {
@@ -62,7 +63,7 @@ impl Limits {
         Some(Self { min, max, tolerance: ROUNDING * nominal.unwrap_or(1.0).abs(), items })
     }
 
-    /// Says why `value` is not allowed; `None` if it is.
+    /// Says why `value` is not allowed; `None` if it is allowed.
     fn refuse(&self, value: f64) -> Option<String> {
         let rounding = |limit: f64| self.tolerance.max(ROUNDING * limit.abs());
         let is_item =
@@ -83,7 +84,7 @@ impl Limits {
     }
 }
 
-/// Returns a value as a number; `None` for a text.
+/// Returns a Real or an Integer as a number; `None` for another type.
 fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Real(value) => Some(*value),
@@ -94,7 +95,7 @@ fn number(value: &Value) -> Option<f64> {
 
 /// Warns about settings, and about start values in the descriptions, that their variables do not allow.
 pub(crate) fn check_start(system: &System) {
-    let (mut set, mut started) = (Vec::new(), Vec::new());
+    let (mut settings, mut start_values) = (Vec::new(), Vec::new());
     for (slave, (_, instance)) in system.slaves.iter().enumerate() {
         let description = instance.description();
         let types = types(description);
@@ -108,12 +109,14 @@ pub(crate) fn check_start(system: &System) {
             let value = setting.cloned().or_else(|| Value::start(&declaration.kind));
             let Some(value) = value.as_ref().and_then(number) else { continue };
             if let Some(why) = limits.refuse(value) {
-                let list = if setting.is_some() { &mut set } else { &mut started };
+                let list = if setting.is_some() { &mut settings } else { &mut start_values };
                 list.push((port, value, why));
             }
         }
     }
-    for (list, what) in [(set, "settings"), (started, "start values in the model descriptions")] {
+    for (list, what) in
+        [(settings, "settings"), (start_values, "start values in the model descriptions")]
+    {
         let named = list.iter().take(NAMED).map(|(port, value, why)| {
             format!("{} = {} is {why}", system.name(*port), rounded(*value, DIGITS))
         });
@@ -142,7 +145,8 @@ enum Source {
 }
 
 impl Watched {
-    /// Returns the value of the input.
+    /// Returns the value of the input, without faults on its connection; `None` for a discrete Real that is set in
+    /// event mode.
     fn value(&self, reals: &[f64], integer: impl Fn(Port) -> Option<i64>) -> Option<f64> {
         let value = match self.source {
             Source::Real(position) => *reals.get(position)?,
@@ -158,7 +162,7 @@ impl Watched {
     }
 }
 
-/// The connected inputs with limits that have had allowed values only.
+/// The connected inputs with limits that have had allowed values only, until [`NAMED`] others are reported.
 #[derive(Default)]
 pub(crate) struct Watch {
     watched: Vec<Watched>,
@@ -181,7 +185,7 @@ impl Watch {
         Self { watched: watched.collect(), reported: 0 }
     }
 
-    /// Whether all inputs are reported.
+    /// Whether no input is to be checked any more.
     pub(crate) fn is_empty(&self) -> bool {
         self.watched.is_empty()
     }

@@ -24,13 +24,13 @@ pub struct Order {
 /// supplies, A comes before B. Otherwise slaves keep the order in which they were added.
 #[must_use]
 pub fn by_direct_dependencies(system: &System) -> Order {
-    let through = passed_through(system);
+    let feedthrough = feedthrough_inputs(system);
     let edges: Vec<(usize, usize)> = system
         .connections
         .iter()
         .filter(|connection| !is_clocked(system, connection))
         .filter(|connection| {
-            let inputs = through[connection.to.slave].as_ref();
+            let inputs = feedthrough[connection.to.slave].as_ref();
             inputs.is_none_or(|inputs| inputs.contains(&connection.to.variable))
         })
         .map(|connection| (connection.from.slave, connection.to.slave))
@@ -48,8 +48,8 @@ fn is_clocked(system: &System, connection: &Connection) -> bool {
 }
 
 /// Returns for each slave the positions of the inputs with direct feedthrough to a connected output; `None`: all.
-fn passed_through(system: &System) -> Vec<Option<HashSet<usize>>> {
-    let mut through = vec![Some(HashSet::new()); system.slaves.len()];
+fn feedthrough_inputs(system: &System) -> Vec<Option<HashSet<usize>>> {
+    let mut feedthrough = vec![Some(HashSet::new()); system.slaves.len()];
     let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
     for connection in system.connections.iter().filter(|connection| !is_clocked(system, connection))
     {
@@ -59,7 +59,7 @@ fn passed_through(system: &System) -> Vec<Option<HashSet<usize>>> {
         let Some(unknown) = u32::try_from(from.variable + 1).ok().and_then(|k| rows.get(&k)) else {
             continue;
         };
-        match (&unknown.dependencies, &mut through[from.slave]) {
+        match (&unknown.dependencies, &mut feedthrough[from.slave]) {
             (None, inputs) => *inputs = None,
             (Some(list), Some(inputs)) => {
                 inputs.extend(list.iter().map(|&index| index as usize - 1));
@@ -67,7 +67,7 @@ fn passed_through(system: &System) -> Vec<Option<HashSet<usize>>> {
             (Some(_), None) => {}
         }
     }
-    through
+    feedthrough
 }
 
 fn by_index(unknowns: &[Unknown]) -> HashMap<u32, &Unknown> {
@@ -89,14 +89,14 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the variables (1-based indices) on which the output at position `output` depends
-    /// directly; `None`: possibly all.
+    /// directly; `None`: possibly all, or it is no output.
     pub(crate) fn direct_dependencies(&self, output: usize) -> Option<&'a [u32]> {
         let index = u32::try_from(output + 1).ok()?;
         self.outputs.get(&index)?.dependencies.as_deref()
     }
 
     /// Returns the variables (1-based indices) on which the output at position `output` depends in
-    /// initialization mode; `None`: possibly all.
+    /// initialization mode; `None`: possibly all, or it is no output.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {
         let index = u32::try_from(output + 1).ok()?;
         let row = self.initial.get(&index).or_else(|| self.outputs.get(&index))?;

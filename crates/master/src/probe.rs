@@ -8,18 +8,19 @@ use slave::ValueType;
 #[derive(Default)]
 pub struct Probe {
     names: Vec<String>,
-    /// One entry for each slave and type: slave, type, value references, positions among the
-    /// values.
+    /// One entry for each slave and type.
     reads: Vec<Read>,
     reals: Vec<f64>,
     integers: Vec<i64>,
     booleans: Vec<i32>,
 }
 
+/// Variables of one slave and one type, read by one call.
 struct Read {
     slave: usize,
     kind: ValueType,
     references: Vec<u32>,
+    /// The positions of the variables among the values.
     positions: Vec<usize>,
 }
 

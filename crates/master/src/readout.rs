@@ -23,12 +23,13 @@ pub struct Readout {
     /// Values of Strings, and of binaries as hexadecimal digits.
     pub strings: Vec<String>,
     /// For each clocked variable, in the order of the variables, whether one of its clocks has ticked since the last
-    /// communication point, so that its value is one of this time.
+    /// communication point, so that the variable has a value now.
     pub present: Vec<bool>,
     /// The clocks of these variables.
     clocks: Vec<ClockRead>,
-    /// The inputs that no FMU is asked for, with their positions, and the state of the system in which they were known.
+    /// The inputs that are known without asking an FMU, with the positions of their values.
     known: Vec<(Port, usize)>,
+    /// `System::changes` when the known values were read last.
     changes: u64,
     /// Buffer for binaries.
     binaries: Vec<Vec<u8>>,
@@ -45,7 +46,7 @@ struct Read {
     range: Range<usize>,
 }
 
-/// The clocks of consecutive clocked variables that have the same ones.
+/// The clocks that consecutive clocked variables share.
 #[derive(Debug)]
 struct ClockRead {
     slave: usize,
@@ -136,7 +137,8 @@ impl Readout {
         }
     }
 
-    /// Puts a value that no FMU has to be asked for to its position; returns whether there is one.
+    /// Writes a value that is known without asking an FMU to its position; returns false, and does nothing, without one
+    /// and for texts.
     fn put_known(&mut self, value: Option<&Value>, position: usize) -> bool {
         match value {
             Some(Value::Real(value)) => self.reals[position] = *value,

@@ -55,15 +55,15 @@ pub struct Cursor(usize);
 pub enum Signal {
     /// A constant.
     Constant(f64),
-    /// A ramp: `begin` up to the time `from`, `end` after the time `until`, linear in between.
+    /// A ramp: `begin` up to the time `from`, `end` from the time `until` on, linear in between.
     Ramp {
-        /// Time in s.
+        /// Start time in s.
         from: f64,
-        /// Time in s, after `from`.
+        /// End time in s, after `from`.
         until: f64,
-        /// Value before.
+        /// Value up to `from`.
         begin: f64,
-        /// Value after.
+        /// Value from `until` on.
         end: f64,
     },
     /// A sine: `offset` before the time `from`, then `offset + amplitude sin(2 pi frequency (t -
@@ -134,7 +134,7 @@ impl Signal {
         }
     }
 
-    /// Returns the signal `scale s(t) + shift`.
+    /// Returns the signal `scale s(t) + shift`; between the points of [`Interpolation::Points`] it is still 0.
     #[must_use]
     pub fn scaled(self, scale: f64, shift: f64) -> Self {
         let absolute = |value: f64| scale * value + shift;

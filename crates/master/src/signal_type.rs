@@ -14,7 +14,7 @@ pub enum SignalType {
     Continuous,
     /// Piecewise constant: it changes at events or communication points only.
     Discrete,
-    /// Present at the ticks of a clock only (FMI 3.0.2, section 2.2.8); a clock itself.
+    /// Present at the ticks of a clock only (FMI 3.0.2, section 2.2.8), or a clock itself.
     Clocked,
 }
 
@@ -45,7 +45,7 @@ impl SignalType {
 }
 
 impl System {
-    /// Returns the type of the variable at `port`: discrete if the user has said so, else that of its description.
+    /// Returns the type of the variable at `port` by its description; a continuous one that the user names is discrete.
     #[must_use]
     pub fn signal_type(&self, port: Port) -> SignalType {
         match SignalType::of(self.variable(port)) {
@@ -54,8 +54,8 @@ impl System {
         }
     }
 
-    /// Whether the variable at `port` has a value at the ticks of its clocks only. In scheduled execution it can be read at
-    /// any time.
+    /// Whether the variable at `port` has a value at the ticks of its clocks only. False for a clock, and in scheduled
+    /// execution, where a variable can be read at any time.
     #[must_use]
     pub fn is_absent_between_ticks(&self, port: Port) -> bool {
         let variable = self.variable(port);

@@ -53,7 +53,8 @@ impl TryFrom<StoredDelayLine> for DelayLine {
 }
 
 impl DelayLine {
-    /// Creates a delay line of `seconds` for points about `step` s apart.
+    /// Creates a delay line of `seconds` for points about `step` s apart; an error if that takes less
+    /// than 0 or more than [`MOST_STEPS`] steps.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
     pub(super) fn new(seconds: f64, step: f64) -> Result<Self, FaultError> {
         let steps = seconds / step;
@@ -66,7 +67,8 @@ impl DelayLine {
         Ok(Self { seconds, spacing: 0.5 * step, room, points })
     }
 
-    /// Adds a point and removes the points that are no longer needed.
+    /// Adds a point and removes the points that are no longer needed. It replaces the last point if that
+    /// one is not earlier or if the points would be too close.
     pub(super) fn push(&mut self, time: f64, value: f64) {
         let count = self.points.len();
         let repeated = self.points.back().is_some_and(|&(last, _)| last >= time);

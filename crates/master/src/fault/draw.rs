@@ -54,7 +54,8 @@ impl RandomSeries {
         }
     }
 
-    /// Whether an event of this probability happens at `time`.
+    /// Whether an event of this probability happens at `time`, in a series that starts at `from`, both
+    /// in s.
     pub(super) fn happens(&self, probability: f64, from: f64, time: f64) -> bool {
         unit(&mut self.generator(from, time)) < probability
     }
@@ -78,8 +79,8 @@ fn unit(generator: &mut ChaCha8Rng) -> f64 {
     (generator.next_u64() >> 11) as f64 * 2.0_f64.powi(-53)
 }
 
-/// Returns the number of complete periods between `from` and `time`, all in s. A period whose end
-/// differs from `time` by rounding is complete.
+/// Returns the number of complete periods between `from` and `time`, all in s; 0 before `from`. A period
+/// whose end differs from `time` by rounding is complete.
 pub(super) fn period_of(from: f64, period: f64, time: f64) -> f64 {
     let periods = (time - from) / period;
     let next = periods.round();

@@ -12,7 +12,7 @@ use crate::signal::{Sample, earliest, reached};
 pub(super) struct Stage {
     window: Window,
     fault: Fault,
-    /// The value at which it sticks, or the last value not lost.
+    /// The value at which it sticks, or the last value not lost (the first value if all were lost).
     #[serde(rename = "kept")]
     last: Option<f64>,
     /// The memory of a delay.
@@ -28,7 +28,7 @@ impl Stage {
         Ok(Self { window, fault, last: None, line })
     }
 
-    /// Whether both are the same fault in the same window, whatever they remember.
+    /// Whether both are the same fault in the same window; their memories may differ.
     pub(super) fn is_same_fault(&self, other: &Self) -> bool {
         self.window == other.window && self.fault == other.fault
     }
@@ -107,7 +107,8 @@ impl Stage {
         }
     }
 
-    /// Returns the first time after `after` at which it starts or stops acting.
+    /// Returns the first time after `after` at which the window starts or ends, or within the window a
+    /// lost part of a periodic dropout.
     pub(super) fn next_break(&self, after: f64) -> Option<f64> {
         let Window { from, until } = self.window;
         let window = earliest(after, until.into_iter().chain([from]));

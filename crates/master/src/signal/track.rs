@@ -60,7 +60,7 @@ pub enum TrackError {
     /// A time is less than the time before it.
     #[error("point {point}: the time {actual} s comes after {before} s, expected ascending times")]
     Order {
-        /// The point.
+        /// Number of the point.
         point: usize,
         /// The time before.
         before: f64,
@@ -82,8 +82,9 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// Returns [`TrackError`] if there are no points, if a number is not finite, or if times are
-    /// not ascending.
+    /// Returns [`TrackError`] if there are no points, if the numbers of times and values differ, if a
+    /// number is not finite, if a time is above 1e300 in magnitude, or if a time is less than the one
+    /// before it.
     pub fn new(
         times: Arc<[f64]>,
         values: Arc<[f64]>,
