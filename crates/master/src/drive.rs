@@ -380,9 +380,9 @@ impl Drives {
     /// Returns the state of all drives for a checkpoint, in their order.
     #[must_use]
     pub fn state(&self) -> Vec<DriveState> {
-        let of =
+        let state =
             |drive: &Drive| DriveState { faults: drive.faults.clone(), accepted: drive.accepted };
-        self.all.iter().map(of).collect()
+        self.all.iter().map(state).collect()
     }
 
     /// Restores the state of a checkpoint, at a communication point.

@@ -5,7 +5,7 @@ use crate::coupling::Coupler;
 use crate::engine::{Engine, SavedState, Swept};
 use crate::error::SystemError;
 use crate::grid::size_between;
-use crate::step_control::{PlannedStep, SizeControl, StepMade};
+use crate::step_control::{PlannedStep, SizeControl, StepOutcome};
 use crate::system::Port;
 use solve::Bracket;
 
@@ -51,7 +51,7 @@ impl Events {
         coupler: &mut Coupler,
         control: &mut SizeControl,
         planned: PlannedStep,
-    ) -> Result<StepMade, SystemError> {
+    ) -> Result<StepOutcome, SystemError> {
         let time = engine.grid.time;
         let next = self.next_event(engine, time, planned.end)?;
         let limit = next.unwrap_or(planned.end);
@@ -63,7 +63,7 @@ impl Events {
         let crossing = self.locate(engine, coupler, time, step.end)?;
         let happened = crossing.is_some() || (next.is_some() && step.end >= limit);
         if let Some((end, swept)) = crossing {
-            step = StepMade::new(end, swept);
+            step = StepOutcome::new(end, swept);
         }
         if happened {
             engine.exchange.reals.clear_history();

@@ -2,7 +2,7 @@
 //!
 //! [`Simulation::step`] is the entry point. It reads from the top: [`SizeControl`] plans a step,
 //! [`Events`] shorten it, [`Coupler`] repeats it until inputs and outputs agree, and [`Engine`]
-//! makes each sweep over the slaves, and iterates the events at its end.
+//! makes each sweep over the slaves, and iterates the events at the end of the step.
 
 mod change;
 mod checkpoint;
@@ -41,7 +41,7 @@ pub struct Simulation {
     origin: Origin,
     /// The latest end in s of a step that was attempted.
     attempted: f64,
-    /// Whether a slave requested the end of the simulation.
+    /// The slave that requested the end of the simulation.
     ended: Option<Ending>,
 }
 
@@ -50,8 +50,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if a time is invalid, if the algorithm needs a capability that an FMU
-    /// lacks, if an FMU fails, or if an output is not finite.
+    /// Returns an error if a time is invalid, if [`Algorithm::check`] does, if an FMU fails or loses a
+    /// setting, if an output is not finite, or if the initial values or events do not settle.
     pub fn new(
         system: System,
         algorithm: &Algorithm,
@@ -64,7 +64,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if [`Simulation::new`] does, or if a fault has no connection.
+    /// Returns an error if [`Simulation::new`] does, or if a fault has no connection or is on a String, a
+    /// binary or a clock.
     pub fn with_scenario(
         system: System,
         algorithm: &Algorithm,
@@ -121,14 +122,14 @@ impl Simulation {
         })
     }
 
-    /// Returns the time reached in s: `start + k H` for fixed steps; the last step ends at the stop
-    /// time.
+    /// Returns the time reached in s: `start + k H` for fixed steps, or an event or a jump in between; the
+    /// last step ends at the stop time.
     #[must_use]
     pub fn time(&self) -> f64 {
         self.engine.grid.time
     }
 
-    /// Whether step control or events choose the ends of steps.
+    /// Whether the step control or sources of events ([`Algorithm::events`]) choose the ends of steps.
     #[must_use]
     pub fn has_varying_steps(&self) -> bool {
         self.pace.is_some()
@@ -140,7 +141,7 @@ impl Simulation {
         self.ended.is_some() || self.engine.grid.is_finished()
     }
 
-    /// Returns the FMU that requested the end of the simulation (`fmi2Terminated`).
+    /// Returns the name of the FMU that requested the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
         self.ended.map(|ending| self.engine.system.slaves[ending.slave].0.as_str())
@@ -162,13 +163,13 @@ impl Simulation {
         self.early_end.as_ref()
     }
 
-    /// Returns the slaves that step every several communication steps.
+    /// Returns the slaves whose steps cover several communication steps.
     pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
         self.engine.slow_slaves()
     }
 
     /// Returns start and end in s of the current step of a slave that is ahead of
-    /// [`Simulation::time`].
+    /// [`Simulation::time`]; `None` if the slave is not ahead.
     pub(crate) fn current_step(&self, slave: usize) -> Option<(f64, f64)> {
         self.engine.exchange.reals.step_ahead(slave, self.engine.grid.time)
     }
@@ -192,7 +193,7 @@ impl Simulation {
         readout
     }
 
-    /// Lets `readout`, which [`Simulation::readout`] has created, follow the driven variables of now.
+    /// Lets `readout`, which [`Simulation::readout`] has created, follow the present driven variables.
     /// Call it after [`Simulation::change_scenario`].
     pub fn follow(&self, readout: &mut Readout) {
         readout.follow(&self.engine.drives, &self.engine.system);
@@ -218,8 +219,9 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if an FMU does not complete the step or an output is not finite. Some
-    /// slaves are then at the start of the step and others at its end.
+    /// Returns an error if an FMU fails or does not complete the step, if an output or input is not
+    /// finite, if the iteration or the step control fails, or if events do not settle. Some slaves may
+    /// then be at the start of the step and others at its end.
     pub fn step(&mut self) -> Result<(), SystemError> {
         let Self { engine, coupler, control, events, .. } = self;
         let start = engine.grid.time;
@@ -251,13 +253,13 @@ impl Simulation {
         }
     }
 
-    /// Ends the run because a slave requested it in the step from `start`. The time of the run
-    /// becomes that of the request if all slaves could end there, otherwise `start`.
+    /// Ends the run because a slave requested it in the step from `start`. The time of the run becomes
+    /// the time of the request if all slaves are there, otherwise `start`.
     #[cold]
     fn end_early(&mut self, start: f64, ending: Ending) {
         self.ended = Some(ending);
-        let alone = self.engine.system.slaves.len() == 1;
-        self.engine.grid.time = if alone || self.engine.repeats { ending.time } else { start };
+        let is_single = self.engine.system.slaves.len() == 1;
+        self.engine.grid.time = if is_single || self.engine.repeats { ending.time } else { start };
     }
 
     /// Returns the count of steps whose iteration failed; `None` without iteration.
@@ -301,7 +303,8 @@ impl Simulation {
     }
 }
 
-/// Reads all connected outputs at the start time `start` in s and clears their history.
+/// Reads all connected outputs at the start time `start` in s, clears their history and records the
+/// communication point in faults.
 fn read_at_start(
     system: &mut System,
     exchange: &mut Exchange,

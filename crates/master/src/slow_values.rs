@@ -40,11 +40,11 @@ struct ValueIndex {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SlowState {
     names: Vec<String>,
-    values: Vec<Begins>,
+    values: Vec<TypedValues>,
 }
 
-/// The values of one slave, by type.
-type Begins = (Vec<f64>, Vec<i64>, Vec<i32>, Vec<String>);
+/// The values of one slave: Reals, Integers, Booleans, Strings.
+type TypedValues = (Vec<f64>, Vec<i64>, Vec<i32>, Vec<String>);
 
 impl SlowValues {
     /// Creates the values for a [`Readout`] of `ports`.
@@ -73,8 +73,8 @@ impl SlowValues {
         Ok(())
     }
 
-    /// Replaces the values in `row` by the values at the time reached; call it right after reading
-    /// `row`.
+    /// Replaces the values in `row` of slaves that are ahead by their values at the time reached; call it
+    /// right after reading `row`.
     pub fn apply(&self, simulation: &Simulation, row: &mut Readout) {
         for slow in &self.slaves {
             if let Some((start, end)) = simulation.current_step(slow.slave) {

@@ -1,5 +1,5 @@
 //! Step control: accepts or rejects a step and chooses the size of the next one. A rejected step is
-//! repeated from its start, so that every slave must be able to restore its state.
+//! repeated from its start; for controls that reject, every slave must be able to restore its state.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,12 +30,15 @@ pub(crate) struct SizeControl {
     /// Size of the next step in s.
     pub(crate) size: f64,
     pub(crate) scale: Scale,
-    /// For each power bond, the outputs at the other ends of its connections.
+    /// For each power bond, the indices of the outputs at the other ends of its connections.
     bonds: Vec<(usize, usize)>,
     /// Order of the method, used to compare a whole step with two halves.
     order: i32,
+    /// The errors of the extrapolated outputs.
     errors: Vec<f64>,
+    /// The extrapolated outputs at the end of a step.
     predicted: Vec<f64>,
+    /// The values of the power bonds at the end of a step.
     states: Vec<Bond>,
     /// State and time at the start of a step that may be repeated.
     start: SavedState,
@@ -58,14 +61,14 @@ impl PlannedStep {
 }
 
 /// A completed step.
-pub(crate) struct StepMade {
+pub(crate) struct StepOutcome {
     /// Its end in s.
     pub(crate) end: f64,
-    /// Whether a slave requested the end of the simulation.
+    /// The slave that requested the end of the simulation.
     pub(crate) ending: Option<Ending>,
 }
 
-impl StepMade {
+impl StepOutcome {
     pub(crate) fn new(end: f64, swept: Swept) -> Self {
         let ending = if let Swept::Ended(ending) = swept { Some(ending) } else { None };
         Self { end, ending }
@@ -131,8 +134,8 @@ impl SizeControl {
         })
     }
 
-    /// Plans the next step. It ends where a signal or a fault starts, ends or has a kink, and at known events, if all
-    /// slaves take steps of any size.
+    /// Plans the next step. If all slaves take steps of any size, it ends where a signal or a fault starts, ends or has
+    /// a kink, and at known events.
     #[inline]
     pub(crate) fn plan(&self, engine: &mut Engine) -> PlannedStep {
         if self.kind == StepControl::Fixed {
@@ -159,15 +162,15 @@ impl SizeControl {
         varies.then_some(time + size)
     }
 
-    /// Makes the planned step, or a shorter one that all slaves complete and whose error is within
-    /// the tolerance.
+    /// Makes the planned step. If steps may be repeated, makes a shorter one where slaves do not complete
+    /// it or where its error is above the tolerance.
     #[inline]
     pub(crate) fn step(
         &mut self,
         engine: &mut Engine,
         coupler: &mut Coupler,
         planned: PlannedStep,
-    ) -> Result<StepMade, SystemError> {
+    ) -> Result<StepOutcome, SystemError> {
         let PlannedStep { end, size } = planned;
         if engine.repeats {
             return self.step_within_tolerance(engine, coupler, end);
@@ -176,7 +179,7 @@ impl SizeControl {
         if self.kind != StepControl::Fixed {
             self.update_size(&engine.exchange.reals, size);
         }
-        Ok(StepMade::new(end, swept))
+        Ok(StepOutcome::new(end, swept))
     }
 
     /// Attempts a step towards `end`; repeats it with a smaller size until it is accepted.
@@ -185,7 +188,7 @@ impl SizeControl {
         engine: &mut Engine,
         coupler: &mut Coupler,
         mut end: f64,
-    ) -> Result<StepMade, SystemError> {
+    ) -> Result<StepOutcome, SystemError> {
         let time = engine.grid.time;
         engine.save(time, &mut self.start)?;
         loop {
@@ -200,7 +203,7 @@ impl SizeControl {
                     if ending.time > time {
                         coupler.step(engine, time, size_between(time, ending.time))?;
                     }
-                    return Ok(StepMade::new(ending.time, swept));
+                    return Ok(StepOutcome::new(ending.time, swept));
                 }
                 // A partial step has no error estimate.
                 Swept::Part(reached) => reached,
@@ -211,14 +214,14 @@ impl SizeControl {
                     Verdict::Rejected { .. } | Verdict::Stuck if is_break(engine, time) => {
                         engine.exchange.reals.clear_history();
                         self.clear_history();
-                        return Ok(StepMade::new(end, swept));
+                        return Ok(StepOutcome::new(end, swept));
                     }
                     Verdict::Rejected { .. } | Verdict::Stuck => {
                         return Err(SystemError::Stuck { time, size, error });
                     }
                     Verdict::Accepted { .. } => {
                         self.update_size(&engine.exchange.reals, size);
-                        return Ok(StepMade::new(end, swept));
+                        return Ok(StepOutcome::new(end, swept));
                     }
                 },
             };
@@ -253,7 +256,8 @@ impl SizeControl {
         Ok((self.doubling_error(halves, &self.whole), Swept::Whole))
     }
 
-    /// Makes one step and returns the error estimated from the input extrapolation.
+    /// Makes one step and returns the error estimated from the input extrapolation; 0 for all controls but
+    /// [`StepControl::Embedded`].
     fn step_and_estimate(
         &mut self,
         engine: &mut Engine,
@@ -292,7 +296,8 @@ impl SizeControl {
         }
     }
 
-    /// Accepts or rejects a step of `size` s with the error `error`.
+    /// Accepts or rejects a step of `size` s with the error `error`, and sets the size of the next step or
+    /// of the repetition. Controls without an error estimate accept every step.
     pub(crate) fn judge(&mut self, size: f64, error: f64) -> Verdict {
         let verdict = match &mut self.controller {
             Controller::Error(control) => control.judge(size, error),
@@ -306,7 +311,8 @@ impl SizeControl {
         verdict
     }
 
-    /// Chooses the next size after a step of `size` s, for controls that never reject a step.
+    /// Chooses the next size after a step of `size` s for [`StepControl::Increment`] and
+    /// [`StepControl::Energy`], which never reject a step.
     pub(crate) fn update_size(&mut self, reals: &Reals, size: f64) {
         match self.kind {
             StepControl::Increment => {
@@ -392,7 +398,8 @@ impl Pace {
     }
 }
 
-/// Returns the outputs that are connected to the inputs of each power bond.
+/// Returns the indices of the outputs that are connected to the inputs of each power bond; an error if an
+/// input is not connected to a Real output.
 fn bonds(
     system: &System,
     reals: &Reals,

@@ -25,7 +25,7 @@ pub struct Port {
     pub variable: usize,
 }
 
-/// A connection from an output to an input.
+/// A connection from an output to an input, or to a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
     /// The output.
@@ -60,14 +60,14 @@ pub struct System {
     /// For each slave, whether the master handles its events.
     pub(crate) events: Vec<bool>,
     observer: Option<EventObserver>,
-    /// Values of inputs that were set last by [`System::set_value`], by the variable that holds the value, and
-    /// the number of these calls.
+    /// Values of inputs that were set last by [`System::set_value`], by the variable that holds the value.
     input_values: HashMap<Port, Value>,
+    /// Number of values that [`System::set_value`] has set at inputs.
     pub(crate) changes: u64,
 }
 
-/// Sees a slave in event mode before each update of its discrete states, when its clocks tick: gets its position, the
-/// time in s, and the slave.
+/// Receives the position of a slave in event mode, the time in s and the slave before each update of its discrete
+/// states, when its clocks tick.
 pub type EventObserver = Box<dyn FnMut(usize, f64, &mut dyn Slave) -> Result<(), CallError> + Send>;
 
 impl System {
@@ -198,8 +198,8 @@ impl System {
         Ok(self.connections.len() - before)
     }
 
-    /// Connects a free output to a free input of another FMU if each is the only free one with its
-    /// unit, which must not be dimensionless; returns the new connections.
+    /// Connects a free output to a free input of another FMU if they have the same unit, no other free
+    /// output or input has it, and it is not dimensionless; returns the new connections.
     ///
     /// # Errors
     ///
@@ -263,9 +263,9 @@ impl System {
         let mut dependent = vec![false; self.slaves.len()];
         let mut open = vec![slave];
         while let Some(source) = open.pop() {
-            for wire in self.connections.iter().filter(|wire| wire.from.slave == source) {
-                if !std::mem::replace(&mut dependent[wire.to.slave], true) {
-                    open.push(wire.to.slave);
+            for connection in self.connections.iter().filter(|known| known.from.slave == source) {
+                if !std::mem::replace(&mut dependent[connection.to.slave], true) {
+                    open.push(connection.to.slave);
                 }
             }
         }
@@ -290,12 +290,13 @@ impl System {
         self.connections.get(*self.sources.get(&self.holder(input))?)
     }
 
-    /// Returns the variable that holds the value of `port`: the variable of which it is an alias, otherwise itself.
+    /// Returns the variable that holds the value of `port`: the variable of which it is an alias, otherwise itself. A
+    /// negated alias counts as a variable of its own.
     pub(crate) fn holder(&self, port: Port) -> Port {
         let variable = self.variable(port);
-        let of = variable.alias_of.as_ref().filter(|_| !variable.negated);
-        let of = of.and_then(|name| self.variables[port.slave].get(name));
-        of.map_or(port, |&variable| Port { variable, ..port })
+        let holder = variable.alias_of.as_ref().filter(|_| !variable.negated);
+        let holder = holder.and_then(|name| self.variables[port.slave].get(name));
+        holder.map_or(port, |&variable| Port { variable, ..port })
     }
 
     /// Parses `text` as a value of the variable at `port`.

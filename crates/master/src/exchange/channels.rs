@@ -58,17 +58,17 @@ macro_rules! all {
 impl Channels {
     /// Lays out `connections`, by the types of their inputs. `more` are Integer outputs to read as well.
     pub(super) fn new(system: &System, connections: &[&Connection], more: &[Port]) -> Self {
-        let of = |kind: ValueType| -> Vec<&Connection> {
-            let of_kind = |connection: &&&Connection| {
+        let by_type = |kind: ValueType| -> Vec<&Connection> {
+            let has_type = |connection: &&&Connection| {
                 ValueType::of(&system.variable(connection.to).kind) == kind
             };
-            connections.iter().filter(of_kind).copied().collect()
+            connections.iter().filter(has_type).copied().collect()
         };
-        let reals = Channel::new(system, REALS, &of(ValueType::Real), &[]);
-        let integers = Channel::new(system, INTEGERS, &of(ValueType::Integer), more);
-        let booleans = Channel::new(system, BOOLEANS, &of(ValueType::Boolean), &[]);
-        let strings = Channel::new(system, STRINGS, &of(ValueType::String), &[]);
-        let binaries = Channel::new(system, BINARIES, &of(ValueType::Binary), &[]);
+        let reals = Channel::new(system, REALS, &by_type(ValueType::Real), &[]);
+        let integers = Channel::new(system, INTEGERS, &by_type(ValueType::Integer), more);
+        let booleans = Channel::new(system, BOOLEANS, &by_type(ValueType::Boolean), &[]);
+        let strings = Channel::new(system, STRINGS, &by_type(ValueType::String), &[]);
+        let binaries = Channel::new(system, BINARIES, &by_type(ValueType::Binary), &[]);
         let empty = reals.is_empty()
             && integers.is_empty()
             && booleans.is_empty()

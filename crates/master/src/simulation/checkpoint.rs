@@ -19,7 +19,7 @@ use slave::Slave;
 
 pub(super) use origin::Origin;
 
-/// The first slot of the slaves for [`Simulation::keep`], after those of the algorithms.
+/// The first slot of the slaves for [`Simulation::keep`], after the slots of the algorithms.
 const FIRST_SLOT: usize = 3;
 
 /// The complete state of a simulation. A resumed run gives the same results, bit for bit.
@@ -29,14 +29,16 @@ pub struct Checkpoint {
     time: f64,
     /// The latest end in s of a step that was attempted.
     attempted: f64,
+    /// Number of grid points passed.
     count: u64,
+    /// Size of the next step in s, if the step control chooses it.
     size: f64,
     controller: Controller,
     iteration: Option<Iteration>,
     values: Values,
     faults: Vec<FaultChain>,
     drives: Vec<DriveState>,
-    /// For each slave, the time in s of the event that its step has ended at.
+    /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
     pending: Vec<f64>,
     /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
@@ -114,10 +116,10 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if slaves, connections or faults differ from the kept state, or if an FMU refuses
-    /// its state.
+    /// Returns an error if slaves, connections, faults or driven variables differ from the kept state, or
+    /// if an FMU refuses its state.
     pub fn return_to(&mut self, state: &KeptState) -> Result<(), SystemError> {
-        self.expect_origin_of(&state.master)?;
+        self.expect_same_system(&state.master)?;
         for (name, slave) in &mut self.engine.system.slaves {
             let restored = slave.restore_state(FIRST_SLOT + state.slot);
             restored.map_err(|source| call(name, state.master.time, source))?;
@@ -125,16 +127,16 @@ impl Simulation {
         self.restore_master(&state.master)
     }
 
-    /// A checkpoint whose FMU states are the bytes that `state` returns; it gets the name of each slave, the slave,
-    /// and the time.
+    /// Creates a checkpoint whose FMU states are the bytes that `fmu_state` returns for the name of a slave, the slave
+    /// and the time in s.
     fn checkpoint_with(
         &mut self,
-        state: impl Fn(&str, &mut dyn Slave, f64) -> Result<Vec<u8>, SystemError>,
+        fmu_state: impl Fn(&str, &mut dyn Slave, f64) -> Result<Vec<u8>, SystemError>,
     ) -> Result<Checkpoint, SystemError> {
         let time = self.engine.grid.time;
         let mut slaves = Vec::new();
         for (name, slave) in &mut self.engine.system.slaves {
-            let bytes = state(name, slave.as_mut(), time)?;
+            let bytes = fmu_state(name, slave.as_mut(), time)?;
             slaves.push((name.clone(), slave.description().guid.clone(), bytes));
         }
         let mut values = Values::default();
@@ -161,8 +163,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if [`Simulation::new`] does, if slaves, connections, start time or
-    /// algorithm differ from the checkpoint, or if an FMU refuses its state.
+    /// Returns an error if [`Simulation::with_scenario`] does, if slaves, connections, faults, driven
+    /// variables, start time or algorithm differ from the checkpoint, or if an FMU refuses its state.
     pub fn resume(
         system: System,
         algorithm: &Algorithm,
@@ -184,10 +186,10 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if slaves, connections or faults differ from the checkpoint, or if an FMU
-    /// refuses its state.
+    /// Returns an error if slaves, connections, faults or driven variables differ from the checkpoint, or
+    /// if an FMU refuses its state.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
-        self.expect_origin_of(checkpoint)?;
+        self.expect_same_system(checkpoint)?;
         let states = checkpoint.slaves.iter();
         for ((name, slave), (_, _, bytes)) in self.engine.system.slaves.iter_mut().zip(states) {
             slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
@@ -216,15 +218,16 @@ impl Simulation {
         Ok(())
     }
 
-    fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
+    /// Returns an error if slaves, connections or the number of faults differ from the checkpoint.
+    fn expect_same_system(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         let slaves = self.engine.system.slaves.iter();
         let present = slaves.map(|(name, slave)| [name, &slave.description().guid]);
-        let theirs = checkpoint.slaves.iter().map(|(name, guid, _)| [name, guid]);
-        if !present.clone().eq(theirs.clone()) {
+        let saved = checkpoint.slaves.iter().map(|(name, guid, _)| [name, guid]);
+        if !present.clone().eq(saved.clone()) {
             let list = |slave: [&String; 2]| slave.map(String::as_str).join(" ");
             return Err(contradiction(format!(
                 "the checkpoint is one of other FMUs: expected {}, found {}",
-                theirs.map(list).collect::<Vec<_>>().join(", "),
+                saved.map(list).collect::<Vec<_>>().join(", "),
                 present.map(list).collect::<Vec<_>>().join(", ")
             )));
         }

@@ -71,7 +71,7 @@ impl System {
         self.get_value(port).map_err(|source| call(&self.slaves[port.slave].0, time, source))
     }
 
-    /// As [`System::read`], for a Real.
+    /// As [`System::read`], for a Real; NaN for a variable of another type.
     pub(crate) fn read_real(&mut self, port: Port, time: f64) -> Result<f64, SystemError> {
         let value = self.read(port, time)?;
         Ok(if let Value::Real(value) = value { value } else { f64::NAN })

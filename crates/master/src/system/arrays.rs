@@ -64,7 +64,7 @@ impl System {
 
     /// Returns the pairs of output and input that a connection from `from` to `to` consists of, both in
     /// the form `slave.variable`: one pair for two scalars, one for each element of two arrays of equal
-    /// size, or one for each pair of members of two terminals. An array of one element is as a scalar.
+    /// size, or one for each pair of members of two terminals. An array of one element counts as a scalar.
     ///
     /// # Errors
     ///
@@ -115,7 +115,7 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Returns an error if a slave or a variable does not exist or if the sizes differ.
+    /// Same as [`System::pairs`].
     pub fn terminal_pairs(
         &self,
         from: (&str, &str),
@@ -138,13 +138,13 @@ impl System {
         }
     }
 
-    /// Connects an output to an input, or the outputs to the inputs of two arrays of equal size; both in
-    /// the form `slave.variable`.
+    /// Connects an output to an input, the elements of two arrays of equal size, or the members of two
+    /// terminals; both in the form `slave.variable`.
     ///
     /// # Errors
     ///
-    /// Returns an error if a variable does not exist, if causality, type, unit or size do not fit, or if
-    /// an input already has a source.
+    /// Returns an error if a variable does not exist, if causality, type, unit or size do not fit, if
+    /// terminals do not match, or if an input already has a source.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
         for (from, to) in self.pairs(from, to)? {
             self.connect_ports(from, to, Transformation::Identity, false)?;
@@ -155,13 +155,16 @@ impl System {
     /// Sets the variable called `name` to the value of `text`. The FMU receives it when the
     /// simulation is initialised. A later setting of the same variable replaces it.
     ///
-    /// A whole array gets one value for each element in row-major order, separated by blanks or commas,
-    /// or one value for all elements. A structural parameter is set at once, and arrays change their
-    /// sizes; set it before connections and settings of their elements.
+    /// A whole array gets one value for each element in row-major order, separated by blanks, commas,
+    /// semicolons or brackets, or one value for all elements. A structural parameter is set at once, and
+    /// arrays change their sizes; set it before connections and settings of their elements.
     ///
     /// # Errors
     ///
-    /// Returns an error if the variable does not exist or if `text` is not a value of its type.
+    /// Returns an error if the variable does not exist, if the standard allows nobody to set it, if `text`
+    /// is not a value of its type, if the number of values is neither 1 nor the number of elements, for an
+    /// array of Strings, or if the FMU refuses a structural parameter or loses a connected or set element
+    /// by it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
         let elements = match self.named(name)? {
             Named::One(port) => return self.set_port(port, text),
@@ -228,25 +231,26 @@ impl System {
         self.move_ports(port.slave, &before)
     }
 
-    /// Replaces the ports of a slave, whose variables had the names `before`.
+    /// Replaces the ports of a slave, whose variables had the names `before`; an error if a connected or set variable
+    /// does not exist any more.
     fn move_ports(&mut self, slave: usize, before: &[String]) -> Result<(), SystemError> {
-        let (names, variables) = (&self.slaves[slave].0, &self.variables[slave]);
-        let moved = |port: &mut Port| -> Result<(), SystemError> {
+        let (slave_name, variables) = (&self.slaves[slave].0, &self.variables[slave]);
+        let move_port = |port: &mut Port| -> Result<(), SystemError> {
             if port.slave != slave {
                 return Ok(());
             }
             let name = &before[port.variable];
             port.variable = *variables
                 .get(name)
-                .ok_or_else(|| SystemError::Resized { name: format!("{names}.{name}") })?;
+                .ok_or_else(|| SystemError::Resized { name: format!("{slave_name}.{name}") })?;
             Ok(())
         };
         for Connection { from, to, .. } in self.connections.iter_mut().chain(&mut self.initial) {
-            moved(from)?;
-            moved(to)?;
+            move_port(from)?;
+            move_port(to)?;
         }
         for setting in &mut self.settings {
-            moved(&mut setting.port)?;
+            move_port(&mut setting.port)?;
         }
         let connections = self.connections.iter().enumerate();
         self.sources = connections

@@ -7,10 +7,10 @@ use crate::error::SystemError;
 use slave::{Transformation, ValueType};
 
 impl System {
-    /// Connects an output to an input, or an output or calculated parameter to a parameter. A
-    /// parameter receives its value in initialization mode. If `units_settled` is true,
-    /// `transformation` already includes the conversion of units; otherwise different units are
-    /// converted.
+    /// Connects an output to an input, an output or calculated parameter to a parameter, or an input
+    /// clock that ticks at times to a triggered input clock. A parameter receives its value in
+    /// initialization mode. If `units_settled` is true, `transformation` already includes the conversion
+    /// of units; otherwise different units are converted.
     ///
     /// # Errors
     ///

@@ -24,8 +24,8 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Returns an error if `text` is not a value of the variable's type, or if the FMU refuses the value
-    /// of a structural parameter.
+    /// Returns an error if `text` is not a value of the variable's type, if the standard allows nobody to
+    /// set the variable, or if the FMU refuses the value of a structural parameter.
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
         let value = self.value(port, text)?;
         self.set_port_value(port, value, text)
@@ -61,7 +61,7 @@ impl System {
         Ok(())
     }
 
-    /// Returns the value that the user has set for the variable at `port` or for an alias of it.
+    /// Returns the value that the user has set for the variable at `port` or for an alias of it, if any.
     pub(crate) fn setting(&self, port: Port) -> Option<&Value> {
         let position = self.setting_positions.get(&self.holder(port))?;
         Some(&self.settings[*position].value)
@@ -78,9 +78,9 @@ impl System {
         Ok(())
     }
 
-    /// Repeats the settings that the standard allows in initialization mode (FMI 2.0.5, table
-    /// 4.2.4) and that are lost, because some FMUs reset them when they enter it. Inputs are not read: some FMUs
-    /// cannot. `time` in s appears in the error message.
+    /// Repeats settings in initialization mode, where the standard allows it (FMI 2.0.5, table 4.2.4), because some
+    /// FMUs reset them when they enter it: inputs always, as some FMUs cannot read them, and other variables if they
+    /// have another value. `time` in s appears in the error message.
     ///
     /// # Errors
     ///

@@ -36,8 +36,8 @@ impl System {
         })
     }
 
-    /// Returns the pairs of output and input of two terminals (FMI 3.0.2, section 2.4.9.2); `None` if neither name is
-    /// one of a terminal. A member without a partner is a warning.
+    /// Returns the pairs of output and input of two terminals (FMI 3.0.2, section 2.4.9.2); `None` if no terminal has
+    /// one of the names. A member without a partner is a warning for the matching rule `bus`, otherwise an error.
     pub(super) fn pairs_of_terminals(
         &self,
         from: &str,
@@ -105,10 +105,11 @@ impl System {
             _ => return Err(format!("matchingRule is {rule:?}, expected {RULES}")),
         };
         let mut free = vec![true; other.members.len()];
-        let mut alone = Vec::new();
+        let mut unmatched = Vec::new();
         for (position, member) in one.members.iter().enumerate() {
             let Some(at) = partner_of(position, member) else {
-                alone.push(format!("{}.{}.{}", self.slaves[from.slave].0, one.name, member.name));
+                let owner = &self.slaves[from.slave].0;
+                unmatched.push(format!("{owner}.{}.{}", one.name, member.name));
                 continue;
             };
             free[at] = false;
@@ -117,19 +118,19 @@ impl System {
         }
         let rest = other.members.iter().zip(free).filter(|(_, free)| *free);
         let owner = &self.slaves[to.slave].0;
-        alone.extend(rest.map(|(member, _)| format!("{owner}.{}.{}", other.name, member.name)));
-        if alone.is_empty() {
+        unmatched.extend(rest.map(|(member, _)| format!("{owner}.{}.{}", other.name, member.name)));
+        if unmatched.is_empty() {
             return Ok(());
         }
-        let alone = alone.join(", ");
+        let unmatched = unmatched.join(", ");
         if rule != "bus" {
-            return Err(format!("no partner for {alone}, as the matchingRule {rule} wants"));
+            return Err(format!("no partner for {unmatched}, as the matchingRule {rule} wants"));
         }
-        tracing::warn!("{alone} of the terminal has no partner in the other one");
+        tracing::warn!("{unmatched} of the terminal has no partner in the other one");
         Ok(())
     }
 
-    /// Adds the connections between two members to `pairs`: output and input.
+    /// Adds the connections between two members to `pairs`: output and input; none for two parameters.
     fn add_pairs(
         &self,
         from: SlaveMember<'_>,
@@ -198,7 +199,8 @@ impl System {
     }
 }
 
-/// Returns the name of the member that receives what `name` sends, or sends what it receives.
+/// Returns the name of the member that receives what `name` sends, or sends what it receives; `None` if `name` starts
+/// with neither `Tx_` nor `Rx_`.
 fn crossed(name: &str) -> Option<String> {
     let (direction, rest) = name.split_once('_')?;
     match direction {

@@ -7,7 +7,7 @@ use crate::error::SystemError;
 use slave::Transformation;
 
 impl System {
-    /// Returns name and base of a variable's unit, if it has one.
+    /// Returns name and base of a variable's unit, if it has one that its description defines.
     fn unit(&self, port: Port) -> Option<(&String, Option<BaseUnit>)> {
         let real = self.variable(port).kind.as_real()?;
         let name = real.unit.as_ref()?;
@@ -22,8 +22,9 @@ impl System {
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
 
-    /// Returns factor and offset of the conversion between the units of two variables; `None` if
-    /// they are equal or one variable has no unit.
+    /// Returns factor and offset of the conversion between the units of two variables; `None` if values
+    /// are equal in both units, or if a variable has no unit that its description defines. An error if
+    /// the units cannot be converted.
     pub(super) fn conversion(
         &self,
         from: Port,

@@ -29,7 +29,7 @@ impl Origin {
         }
     }
 
-    /// Returns an error if a setting differs.
+    /// Returns an error if a setting differs. Settings that the checkpoint does not have are not compared.
     pub(in crate::simulation) fn expect(
         &self,
         system: &System,
