@@ -26,7 +26,7 @@ pub struct CallLog {
 #[derive(Debug)]
 struct Output {
     file: File,
-    /// The first error, after which nothing is written.
+    /// The first error, after which nothing is written until [`CallLog::check`] returns it.
     failed: Option<io::Error>,
 }
 
@@ -45,10 +45,14 @@ impl CallLog {
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
         let logged = self.wrap(instance, slave);
-        logged.created([
+        let function_3 = match logged.description().scheduled_execution {
+            Some(_) => "fmi3InstantiateScheduledExecution",
+            None => "fmi3InstantiateCoSimulation",
+        };
+        logged.log_creation([
             ("fmiInstantiateSlave", ""),
             ("fmi2Instantiate", "fmi2CoSimulation, "),
-            ("fmi3InstantiateCoSimulation", ""),
+            (function_3, ""),
         ]);
         logged
     }
@@ -61,7 +65,7 @@ impl CallLog {
         slave: Box<dyn ModelExchange>,
     ) -> LoggedSlave<dyn ModelExchange> {
         let logged = self.wrap(instance, slave);
-        logged.created([
+        logged.log_creation([
             ("fmiInstantiateModel", ""),
             ("fmi2Instantiate", "fmi2ModelExchange, "),
             ("fmi3InstantiateModelExchange", ""),
@@ -69,10 +73,10 @@ impl CallLog {
         logged
     }
 
-    /// Wraps an instance, which logs its C calls itself if it can.
+    /// Wraps an instance and guards its arrays. The instance logs its C calls itself if it can.
     fn wrap<S: Slave + ?Sized>(&self, instance: &str, mut slave: Box<S>) -> LoggedSlave<S> {
         let (log, name, mut starts_line) = (self.clone(), instance.to_owned(), true);
-        let direct = slave.log_calls(Box::new(move |text| {
+        let logs_itself = slave.log_calls(Box::new(move |text| {
             if starts_line {
                 log.write(&format!("{name} "));
             }
@@ -81,10 +85,11 @@ impl CallLog {
         }));
         slave.guard_arrays();
         let version = slave.description().version();
-        LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave, direct, version }
+        let (log, instance) = (self.clone(), instance.to_owned());
+        LoggedSlave { log, instance, slave, logs_itself, version }
     }
 
-    /// Appends `text`. A write error ends the log, but no run: it is a debugging aid.
+    /// Appends `text`. A write error stops the log, but not the run; [`CallLog::check`] returns it.
     fn write(&self, text: &str) {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         if output.failed.is_none() {
@@ -92,52 +97,65 @@ impl CallLog {
         }
     }
 
-    /// Checks that each call so far is in the file.
+    /// Checks that all calls since the last check are in the file.
     ///
     /// # Errors
     ///
-    /// [`io::Error`], the first one, if a call could not be written.
+    /// The first [`io::Error`] since the last check. The calls after that error are missing from the file; those
+    /// after this check are written again.
     pub fn check(&self) -> io::Result<()> {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         output.failed.take().map_or(Ok(()), Err)
     }
 }
 
-/// A slave whose calls go to a [`CallLog`].
+/// A slave whose calls are written to a [`CallLog`].
 pub struct LoggedSlave<S: Slave + ?Sized = dyn Slave> {
     log: CallLog,
     instance: String,
     slave: Box<S>,
     /// Whether the slave logs its C calls itself.
-    direct: bool,
+    logs_itself: bool,
     version: Version,
 }
 
-/// Functions of FMI 3.0 and 1.0 whose name is not that of FMI 2.0 with another prefix.
-const NAMES: [(&str, &str, &str); 10] = [
+/// Functions of FMI 2.0, 3.0 and 1.0 whose names differ in more than the prefix. A function that FMI 1.0 lacks keeps
+/// its name of FMI 2.0.
+const NAMES: &[(&str, &str, &str)] = &[
     ("fmi2GetReal", "fmi3GetFloat64", "fmiGetReal"),
     ("fmi2SetReal", "fmi3SetFloat64", "fmiSetReal"),
     ("fmi2GetInteger", "fmi3GetInt64", "fmiGetInteger"),
     ("fmi2SetInteger", "fmi3SetInt64", "fmiSetInteger"),
     ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
     ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
+    ("fmi2SerializeFMUstate", "fmi3SerializeFMUState", "fmi2SerializeFMUstate"),
+    ("fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState", "fmi2DeSerializeFMUstate"),
     ("fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates", "fmiEventUpdate"),
     ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
+    ("fmi2FreeInstance", "fmi3FreeInstance", "fmiFreeSlaveInstance"),
+    ("fmi2SetRealInputDerivatives", "fmi3IntermediateUpdateCallback", "fmiSetRealInputDerivatives"),
     ("fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives", "fmiGetRealOutputDerivatives"),
+    (
+        "fmi2GetDirectionalDerivative",
+        "fmi3GetDirectionalDerivative",
+        "fmi2GetDirectionalDerivative",
+    ),
+    ("fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives", "fmiGetDerivatives"),
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
-/// Functions of FMI 1.0 for model exchange with other names than in FMI 2.0.
-const MODELS: [(&str, &str); 3] = [
+/// Functions of FMI 2.0 and of FMI 1.0 for model exchange, where the latter differ from [`NAMES`].
+const MODEL_EXCHANGE_NAMES: &[(&str, &str)] = &[
     ("fmi2Terminate", "fmiTerminate"),
+    ("fmi2FreeInstance", "fmiFreeModelInstance"),
     ("fmi2EnterInitializationMode", "fmiInitialize"),
     ("fmi2GetNominalsOfContinuousStates", "fmiGetNominalContinuousStates"),
 ];
 
 impl<S: Slave + ?Sized> LoggedSlave<S> {
-    /// Logs that the instance was created, by which function and with which argument for its kind; `functions` has
-    /// both for FMI 1.0, 2.0 and 3.0.
-    fn created(&self, functions: [(&str, &str); 3]) {
+    /// Logs the creation of the instance. `functions` has, for FMI 1.0, 2.0 and 3.0, the C function and its argument
+    /// for the interface.
+    fn log_creation(&self, functions: [(&str, &str); 3]) {
         let (function, kind) = self.of_version(functions);
         let (instance, guid) = (&self.instance, &self.slave.description().guid);
         let prefix = self.prefix();
@@ -145,7 +163,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
             .write(&format!("{instance} {function}({instance:?}, {kind}{guid:?}) -> {prefix}OK\n"));
     }
 
-    /// Returns what belongs to the version of the FMU, of FMI 1.0, 2.0 and 3.0.
+    /// Returns the element for the version of the FMU; the elements are for FMI 1.0, 2.0 and 3.0.
     fn of_version<T>(&self, [v1, v2, v3]: [T; 3]) -> T {
         match self.version {
             Version::V1 => v1,
@@ -160,9 +178,9 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     }
 
     /// Returns the name of a function of FMI 2.0 in the version of the FMU.
-    fn spelt(&self, function: &str) -> String {
+    fn name(&self, function: &str) -> String {
         if self.version == Version::V1 && self.slave.description().model_exchange.is_some() {
-            let known = MODELS.iter().find(|(name, _)| *name == function);
+            let known = MODEL_EXCHANGE_NAMES.iter().find(|(name, _)| *name == function);
             if let Some((_, name)) = known {
                 return (*name).to_owned();
             }
@@ -176,8 +194,9 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         }
     }
 
+    /// Appends `text` unless the slave logs its calls itself.
     fn write(&self, text: &str) {
-        if !self.direct {
+        if !self.logs_itself {
             self.log.write(text);
         }
     }
@@ -197,11 +216,13 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         done
     }
 
+    /// Writes the start of a line: instance, function of FMI 2.0 in the version of the FMU, and arguments.
     fn begin(&self, function: &str, arguments: &str) {
-        let function = self.spelt(function);
+        let function = self.name(function);
         self.write(&format!("{} {function}({arguments})", self.instance));
     }
 
+    /// Writes the end of a line: status and results.
     fn end<T>(&mut self, done: &Result<T, CallError>, results: &str) {
         let warned = self.slave.take_warning();
         let status = match done {
@@ -224,6 +245,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         self.call(function, arguments, call, String::clone).map(|_| ())
     }
 
+    /// Logs a call without results.
     fn plain(
         &mut self,
         function: &str,
@@ -232,13 +254,24 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     ) -> Result<(), CallError> {
         self.call(function, arguments, call, |()| String::new())
     }
+
+    /// Logs a call that only changes the mode. FMI 1.0 has no such functions.
+    fn change_mode(
+        &mut self,
+        function: &str,
+        call: impl FnOnce(&mut S) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        match self.version {
+            Version::V1 => call(self.slave.as_mut()),
+            Version::V2 | Version::V3 => self.plain(function, "", call),
+        }
+    }
 }
 
 impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     fn drop(&mut self) {
         // The instance is freed after this.
-        let function =
-            self.of_version(["fmiFreeSlaveInstance", "fmi2FreeInstance", "fmi3FreeInstance"]);
+        let function = self.name("fmi2FreeInstance");
         self.log.write(&format!("{} {function}()\n", self.instance));
     }
 }
@@ -296,7 +329,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.exit_initialization_mode();
-        self.plain("fmi2ExitInitializationMode", "", call)
+        self.change_mode("fmi2ExitInitializationMode", call)
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
@@ -340,13 +373,23 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
-        self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {never_back}"));
+        // The last argument of FMI 1.0 is `newStep`, which is always true.
+        let flag = never_back || self.version == Version::V1;
+        self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {flag}"));
         let done = self.slave.do_step(time, size, never_back);
-        match done {
-            Ok(StepResult::Part { reached, terminated }) => self.write(&format!(
+        match (&done, self.version) {
+            (Ok(StepResult::Part { reached, .. }), Version::V1) => {
+                self.write(&format!(" -> fmiDiscard fmiLastSuccessfulTime {reached:?}\n"));
+            }
+            (Ok(StepResult::Part { reached, terminated }), Version::V2) => self.write(&format!(
                 " -> fmi2Discard fmi2LastSuccessfulTime {reached:?}, fmi2Terminated {terminated}\n"
             )),
-            Ok(StepResult::Event { reached }) => {
+            (Ok(StepResult::Part { reached, terminated }), Version::V3) => {
+                let results =
+                    format!(" terminateSimulation {terminated}, lastSuccessfulTime {reached:?}");
+                self.end(&done, &results);
+            }
+            (Ok(StepResult::Event { reached }), _) => {
                 self.end(&done, &format!(" event at {reached:?}"));
             }
             _ => self.end(&done, ""),
@@ -398,5 +441,92 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn events(&mut self) -> Option<&mut dyn Events> {
         self.slave.events()?;
         Some(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::package::TemporaryFolder;
+
+    use super::*;
+
+    /// Accepts the calls; its steps end after 0.5 s.
+    struct Stub(ModelDescription);
+
+    impl Slave for Stub {
+        fn description(&self) -> &ModelDescription {
+            &self.0
+        }
+
+        fn get_real(&mut self, _: &[u32], _: &mut [f64]) -> Result<(), CallError> {
+            Ok(())
+        }
+
+        fn set_real(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
+            Ok(())
+        }
+
+        fn set_input_derivatives(
+            &mut self,
+            _: &[u32],
+            _: &[i32],
+            _: &[f64],
+        ) -> Result<(), CallError> {
+            Ok(())
+        }
+
+        fn do_step(&mut self, time: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+            Ok(StepResult::Part { reached: time + 0.5, terminated: true })
+        }
+
+        fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+            Ok(vec![0; 3])
+        }
+
+        fn deserialize_state(&mut self, _: &[u8]) -> Result<(), CallError> {
+            Ok(())
+        }
+    }
+
+    /// Returns the log of the calls of an FMU of a version.
+    fn log_of(fmi_version: &str) -> String {
+        let folder = TemporaryFolder::new().unwrap();
+        let path = folder.path().join("calls.txt");
+        let fmi_version = fmi_version.to_owned();
+        let description = ModelDescription { fmi_version, ..ModelDescription::default() };
+        let log = CallLog::create(&path).unwrap();
+        let mut slave = log.listen("a", Box::new(Stub(description)));
+        slave.exit_initialization_mode().unwrap();
+        slave.set_input_derivatives(&[1], &[1], &[2.0]).unwrap();
+        slave.do_step(0.0, 1.0, false).unwrap();
+        let bytes = slave.serialize_state().unwrap();
+        slave.deserialize_state(&bytes).unwrap();
+        drop(slave);
+        log.check().unwrap();
+        std::fs::read_to_string(&path).unwrap()
+    }
+
+    #[test]
+    fn functions_and_results_of_fmi_3_have_their_names() {
+        let expected = r#"a fmi3InstantiateCoSimulation("a", "") -> fmi3OK
+a fmi3ExitInitializationMode() -> fmi3OK
+a fmi3IntermediateUpdateCallback([1], orders [1], [2.0]) -> fmi3OK
+a fmi3DoStep(0.0, 1.0, false) -> fmi3OK terminateSimulation true, lastSuccessfulTime 0.5
+a fmi3SerializeFMUState() -> fmi3OK 3 bytes
+a fmi3DeserializeFMUState(3 bytes) -> fmi3OK
+a fmi3FreeInstance()
+"#;
+        assert_eq!(log_of("3.0"), expected);
+    }
+
+    #[test]
+    fn a_partial_step_has_the_names_of_its_version() {
+        let log = log_of("1.0");
+        let step = "a fmiDoStep(0.0, 1.0, true) -> fmiDiscard fmiLastSuccessfulTime 0.5\n";
+        assert!(log.contains(step) && log.ends_with("a fmiFreeSlaveInstance()\n"), "{log}");
+        assert!(!log.contains("ExitInitializationMode"), "{log}");
+        let log = log_of("2.0");
+        let step = "-> fmi2Discard fmi2LastSuccessfulTime 0.5, fmi2Terminated true\n";
+        assert!(log.contains(step), "{log}");
     }
 }

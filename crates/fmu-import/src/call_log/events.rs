@@ -5,7 +5,7 @@ use slave::{CallError, EventInfo, Events, Slave, absent};
 
 use super::LoggedSlave;
 
-/// Returns the events of a slave that has handed them over.
+/// Returns the interface for the events of a slave; an error if the slave has none.
 fn events<S: Slave + ?Sized>(slave: &mut S) -> Result<&mut dyn Events, CallError> {
     slave.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
@@ -17,7 +17,7 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| events(slave)?.enter_event_mode();
-        self.plain("fmi2EnterEventMode", "", call)
+        self.change_mode("fmi2EnterEventMode", call)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
@@ -31,6 +31,6 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
             _ => "fmi2EnterContinuousTimeMode",
         };
         let call = |slave: &mut S| events(slave)?.leave_event_mode();
-        self.plain(function, "", call)
+        self.change_mode(function, call)
     }
 }

@@ -4,7 +4,7 @@ use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
 use super::LoggedSlave;
 
-/// The instances that are logged here.
+/// The instances whose calls are logged here.
 type Equations = dyn ModelExchange;
 
 impl ModelExchange for LoggedSlave<Equations> {
@@ -62,7 +62,7 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2EnterEventMode", "", Equations::enter_event_mode)
+        self.change_mode("fmi2EnterEventMode", Equations::enter_event_mode)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
@@ -72,6 +72,6 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2EnterContinuousTimeMode", "", Equations::enter_continuous_time_mode)
+        self.change_mode("fmi2EnterContinuousTimeMode", Equations::enter_continuous_time_mode)
     }
 }
