@@ -198,21 +198,26 @@ impl Fmu {
         &self.content.unpacked.description
     }
 
-    /// Returns the description whose variables the instances have: as [`Fmu::description`], with a
-    /// variable for each element of an array at the start values of its structural parameters.
+    /// Returns the description whose variables the instances have. It is [`Fmu::description`] with a variable for each
+    /// element of an array at the start values of its structural parameters (FMI 3.0), and with value references of
+    /// their own for negated aliases (FMI 1.0).
     ///
     /// # Errors
     ///
-    /// [`LoadError::Unsupported`] if the arrays have too many elements.
+    /// [`LoadError::Unsupported`] if the arrays have too many elements, if the size of an array is not known, or if an
+    /// element has the name of another variable.
     pub fn elements(&self) -> Result<ModelDescription, FmuError> {
         let description = self.description();
-        if description.version() != Version::V3 {
-            return Ok(description.clone());
-        }
-        let view = crate::v3::ElementView::new(description, &HashMap::new()).map_err(|reason| {
-            LoadError::Unsupported { model: description.model_name.clone(), reason }
-        })?;
-        Ok(view.description)
+        let view = match description.version() {
+            Version::V1 => return Ok(crate::v1::scalar_description(description)),
+            Version::V2 => return Ok(description.clone()),
+            Version::V3 => crate::v3::ElementView::new(description, &HashMap::new()),
+        };
+        let unsupported = |reason| {
+            let model = description.model_name.clone();
+            LoadError::Unsupported { model, reason }
+        };
+        Ok(view.map_err(unsupported)?.description)
     }
 
     /// Reserves an FMU that allows one instance only.

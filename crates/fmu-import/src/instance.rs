@@ -167,9 +167,7 @@ impl Slave for Instance {
         values: &[f64],
     ) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(instance) => {
-                instance.component.set_input_derivatives(references, orders, values)
-            }
+            Inner::V1(instance) => instance.set_input_derivatives(references, orders, values),
             Inner::V2(instance) => {
                 instance.component.set_real_input_derivatives(references, orders, values)
             }
@@ -184,9 +182,7 @@ impl Slave for Instance {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(instance) => {
-                instance.component.get_output_derivatives(references, orders, values)
-            }
+            Inner::V1(instance) => instance.get_output_derivatives(references, orders, values),
             Inner::V2(instance) => {
                 instance.component.get_real_output_derivatives(references, orders, values)
             }

@@ -8,7 +8,7 @@ mod equations;
 use std::collections::{HashMap, HashSet};
 use std::ffi::{c_char, c_int};
 
-use fmu_description::{Causality, Experiment, ModelDescription};
+use fmu_description::{Causality, Experiment, Kind, ModelDescription};
 
 use crate::library::Interface;
 use crate::library::v1::Component;
@@ -23,42 +23,57 @@ pub(crate) struct Instance {
     in_initialization_mode: bool,
     /// The inputs: type and value reference.
     inputs: HashSet<(ValueType, u32)>,
-    /// Value references of variables whose sign differs from that of their FMU's value reference
-    /// (`negatedAlias`): that of the description, that of the FMU.
+    /// Value references of the negated aliases in `description`, each with the value reference in the FMU.
     negated: HashMap<u32, u32>,
-    references: Vec<u32>,
-    reals: Vec<f64>,
     /// The description, in which negated aliases have value references of their own.
     description: ModelDescription,
+    /// Buffers of the calls.
+    references: Vec<u32>,
+    reals: Vec<f64>,
     integers: Vec<c_int>,
     booleans: Vec<c_char>,
-    /// For model exchange: the result of `fmiInitialize`, until a value is set or the event is updated.
+    /// For model exchange: the result of `fmiInitialize`, until a value is set or `fmiEventUpdate` is due.
     initialized: Option<EventInfo>,
     interface: Interface,
 }
 
-/// Returns the description of an instance, in which negated aliases have value references of their own.
-#[cfg(target_os = "linux")]
+/// Returns the description that an instance has: negated aliases have value references of their own.
 pub(crate) fn scalar_description(description: &ModelDescription) -> ModelDescription {
     let mut scalars = description.clone();
     separate_negated(&mut scalars);
     scalars
 }
 
-/// Gives the negated aliases of `description` value references that no variable has; returns each with
-/// that of the FMU.
+/// Gives each negated alias of `description` a value reference that no variable has; returns these references, each
+/// with the value reference in the FMU. A String has no sign: its alias is no longer negated.
 fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {
     let used: HashSet<u32> =
         description.variables.iter().map(|variable| variable.value_reference).collect();
     let mut free = (0..=u32::MAX).rev().filter(|reference| !used.contains(reference));
     let mut negated = HashMap::new();
     for variable in description.variables.iter_mut().filter(|variable| variable.negated) {
-        if let Some(reference) = free.next() {
+        if matches!(variable.kind, Kind::String(_)) {
+            variable.negated = false;
+        } else if let Some(reference) = free.next() {
             negated.insert(reference, variable.value_reference);
             variable.value_reference = reference;
         }
     }
     negated
+}
+
+/// Returns the value references in the FMU of the variables in `list`. `buffer` holds them if some are `negated`.
+fn references_in_fmu<'a>(
+    negated: &HashMap<u32, u32>,
+    list: &'a [u32],
+    buffer: &'a mut Vec<u32>,
+) -> &'a [u32] {
+    if !list.iter().any(|reference| negated.contains_key(reference)) {
+        return list;
+    }
+    buffer.clear();
+    buffer.extend(list.iter().map(|reference| negated.get(reference).unwrap_or(reference)));
+    buffer
 }
 
 impl Instance {
@@ -79,9 +94,9 @@ impl Instance {
             in_initialization_mode: false,
             inputs: inputs.collect(),
             negated,
+            description,
             references: Vec::new(),
             reals: Vec::new(),
-            description,
             integers: Vec::new(),
             booleans: Vec::new(),
             initialized: None,
@@ -89,12 +104,16 @@ impl Instance {
         }
     }
 
-    /// Whether the FMU takes the values: in initialization mode only if all of them are values of inputs.
-    /// The master repeats settings there; the FMU has them already.
-    fn takes(&mut self, kind: ValueType, references: &[u32]) -> bool {
-        self.initialized = None;
-        !self.in_initialization_mode
-            || references.iter().all(|reference| self.inputs.contains(&(kind, *reference)))
+    /// Returns whether to pass values to the FMU: in initialization mode only if all of them are values of inputs.
+    /// The master repeats its settings there; the FMU has them already. After a value is passed, the result of
+    /// `fmiInitialize` is out of date.
+    fn accepts(&mut self, kind: ValueType, references: &[u32]) -> bool {
+        let accepted = !self.in_initialization_mode
+            || references.iter().all(|reference| self.inputs.contains(&(kind, *reference)));
+        if accepted {
+            self.initialized = None;
+        }
+        accepted
     }
 
     pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
@@ -123,121 +142,176 @@ impl Instance {
         &self.description
     }
 
-    /// Stores the value references of the FMU for a list, if they differ.
-    fn translate(&mut self, list: &[u32]) -> bool {
-        if self.negated.is_empty()
-            || !list.iter().any(|reference| self.negated.contains_key(reference))
-        {
-            return false;
-        }
-        self.references.clear();
-        let negated = &self.negated;
-        self.references
-            .extend(list.iter().map(|reference| negated.get(reference).unwrap_or(reference)));
-        true
-    }
-
-    pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        if !self.translate(list) {
-            return self.component.get_real(list, values);
-        }
-        self.component.get_real(&self.references, values)?;
-        for (value, _) in
-            values.iter_mut().zip(list).filter(|(_, reference)| self.is_negated(**reference))
-        {
-            *value = -*value;
-        }
-        Ok(())
-    }
-
     fn is_negated(&self, reference: u32) -> bool {
         self.negated.contains_key(&reference)
     }
 
-    pub(crate) fn set_real(&mut self, list: &[u32], values: &[f64]) -> Result<(), CallError> {
-        if !self.takes(ValueType::Real, list) {
-            return Ok(());
+    /// Changes the sign of the values of negated aliases.
+    fn negate(&self, list: &[u32], values: &mut [f64]) {
+        for (value, reference) in values.iter_mut().zip(list) {
+            if self.is_negated(*reference) {
+                *value = -*value;
+            }
         }
-        if !self.translate(list) {
-            return self.component.set_real(list, values);
-        }
+    }
+
+    /// Stores the values for the FMU: those of negated aliases have the opposite sign.
+    fn store_reals(&mut self, list: &[u32], values: &[f64]) {
         self.reals.clear();
         for (value, reference) in values.iter().zip(list) {
-            self.reals.push(if self.negated.contains_key(reference) { -value } else { *value });
+            let real = if self.is_negated(*reference) { -value } else { *value };
+            self.reals.push(real);
         }
-        self.component.set_real(&self.references, &self.reals)
+    }
+
+    pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.get_real(references, values)?;
+        self.negate(list, values);
+        Ok(())
+    }
+
+    pub(crate) fn set_real(&mut self, list: &[u32], values: &[f64]) -> Result<(), CallError> {
+        if !self.accepts(ValueType::Real, list) {
+            return Ok(());
+        }
+        self.store_reals(list, values);
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.set_real(references, &self.reals)
+    }
+
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        self.store_reals(list, values);
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.set_input_derivatives(references, orders, &self.reals)
+    }
+
+    pub(crate) fn get_output_derivatives(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.get_output_derivatives(references, orders, values)?;
+        self.negate(list, values);
+        Ok(())
     }
 
     pub(crate) fn get_integer(
         &mut self,
-        references: &[u32],
+        list: &[u32],
         values: &mut [i64],
     ) -> Result<(), CallError> {
         self.integers.clear();
-        self.integers.resize(references.len(), 0);
-        let translated = self.translate(references);
-        let list = if translated { &self.references } else { references };
-        self.component.get_integer(list, &mut self.integers)?;
-        for ((value, integer), reference) in values.iter_mut().zip(&self.integers).zip(references) {
+        self.integers.resize(list.len(), 0);
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.get_integer(references, &mut self.integers)?;
+        for ((value, integer), reference) in values.iter_mut().zip(&self.integers).zip(list) {
             let integer = i64::from(*integer);
-            *value = if translated && self.is_negated(*reference) { -integer } else { integer };
+            *value = if self.is_negated(*reference) { -integer } else { integer };
         }
         Ok(())
     }
 
-    pub(crate) fn set_integer(
-        &mut self,
-        references: &[u32],
-        values: &[i64],
-    ) -> Result<(), CallError> {
-        if !self.takes(ValueType::Integer, references) {
+    pub(crate) fn set_integer(&mut self, list: &[u32], values: &[i64]) -> Result<(), CallError> {
+        if !self.accepts(ValueType::Integer, list) {
             return Ok(());
         }
         self.integers.clear();
-        for (value, reference) in values.iter().zip(references) {
-            let value = if self.is_negated(*reference) { -*value } else { *value };
-            self.integers.push(narrow("fmiSetInteger", "an Integer of 32 bits", value)?);
+        for (value, reference) in values.iter().zip(list) {
+            let integer = integer_for_fmu(*value, self.is_negated(*reference))?;
+            self.integers.push(integer);
         }
-        let translated = self.translate(references);
-        let list = if translated { &self.references } else { references };
-        self.component.set_integer(list, &self.integers)
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
+        self.component.set_integer(references, &self.integers)
     }
 
     pub(crate) fn get_boolean(
         &mut self,
-        references: &[u32],
+        list: &[u32],
         values: &mut [i32],
     ) -> Result<(), CallError> {
         self.booleans.clear();
-        self.booleans.resize(references.len(), 0);
+        self.booleans.resize(list.len(), 0);
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
         self.component.get_boolean(references, &mut self.booleans)?;
-        for (value, boolean) in values.iter_mut().zip(&self.booleans) {
-            *value = i32::from(*boolean != 0);
+        for ((value, boolean), reference) in values.iter_mut().zip(&self.booleans).zip(list) {
+            *value = i32::from((*boolean != 0) != self.is_negated(*reference));
         }
         Ok(())
     }
 
-    pub(crate) fn set_boolean(
-        &mut self,
-        references: &[u32],
-        values: &[i32],
-    ) -> Result<(), CallError> {
-        if !self.takes(ValueType::Boolean, references) {
+    pub(crate) fn set_boolean(&mut self, list: &[u32], values: &[i32]) -> Result<(), CallError> {
+        if !self.accepts(ValueType::Boolean, list) {
             return Ok(());
         }
         self.booleans.clear();
-        self.booleans.extend(values.iter().map(|value| c_char::from(*value != 0)));
+        for (value, reference) in values.iter().zip(list) {
+            let boolean = (*value != 0) != self.is_negated(*reference);
+            self.booleans.push(c_char::from(boolean));
+        }
+        let references = references_in_fmu(&self.negated, list, &mut self.references);
         self.component.set_boolean(references, &self.booleans)
     }
 
-    pub(crate) fn set_string(
-        &mut self,
-        references: &[u32],
-        values: &[String],
-    ) -> Result<(), CallError> {
-        if !self.takes(ValueType::String, references) {
+    pub(crate) fn set_string(&mut self, list: &[u32], values: &[String]) -> Result<(), CallError> {
+        if !self.accepts(ValueType::String, list) {
             return Ok(());
         }
-        self.component.set_string(references, values)
+        self.component.set_string(list, values)
+    }
+}
+
+/// Returns the Integer of the FMU for a value; an error beyond 32 bits. That of a negated alias has the opposite sign.
+fn integer_for_fmu(value: i64, negated: bool) -> Result<c_int, CallError> {
+    // The smallest i64 has no opposite and is beyond 32 bits in any case.
+    let value = if negated { value.wrapping_neg() } else { value };
+    narrow("fmiSetInteger", "an Integer of 32 bits", value)
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::ScalarVariable;
+
+    use super::*;
+
+    #[test]
+    fn negated_aliases_have_value_references_of_their_own_unless_they_are_strings() {
+        let variable = |name: &str, kind, value_reference, negated| ScalarVariable {
+            name: String::from(name),
+            kind,
+            value_reference,
+            negated,
+            ..ScalarVariable::default()
+        };
+        let variables = vec![
+            variable("on", Kind::Boolean(None), 7, false),
+            variable("off", Kind::Boolean(None), 7, true),
+            variable("text", Kind::String(None), 8, false),
+            variable("same_text", Kind::String(None), 8, true),
+        ];
+        let mut description = ModelDescription { variables, ..ModelDescription::default() };
+        let negated = separate_negated(&mut description);
+        assert_eq!(negated, HashMap::from([(u32::MAX, 7)]));
+        let references = description.variables.iter().map(|variable| variable.value_reference);
+        assert_eq!(references.collect::<Vec<_>>(), [7, u32::MAX, 8, 8]);
+        assert!(description.variables[1].negated && !description.variables[3].negated);
+        let mut buffer = Vec::new();
+        let translated = references_in_fmu(&negated, &[8, u32::MAX], &mut buffer);
+        assert_eq!(translated, [8, 7]);
+    }
+
+    #[test]
+    fn integers_of_negated_aliases_have_the_opposite_sign_within_32_bits() {
+        assert_eq!(integer_for_fmu(5, true), Ok(-5));
+        assert_eq!(integer_for_fmu(1 << 31, true), Ok(c_int::MIN));
+        assert!(integer_for_fmu(1 << 31, false).is_err());
+        assert!(integer_for_fmu(i64::MIN, true).is_err());
     }
 }

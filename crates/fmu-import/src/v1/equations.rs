@@ -17,7 +17,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Calls `fmiEventUpdate`. Directly after `fmiInitialize`, whose result says the same, there is no event.
+    /// Calls `fmiEventUpdate`. The first call after `fmiInitialize` returns the result of that function instead, unless
+    /// a value has been set since or the FMU needs another iteration.
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         match self.initialized.take() {
             Some(info) if !info.discrete_states_need_update => Ok(info),
