@@ -161,7 +161,9 @@ impl Instance {
         self.component.enter_configuration_mode()?;
         let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
         set.and_then(|()| self.component.exit_configuration_mode())?;
+        // The elements have new positions.
         self.state.held = vec![None; view.shadows];
+        self.state.memory.clear();
         self.clocked = ClockedRuns::new(&view);
         (self.view, self.sizes) = (view, sizes);
         self.plans.clear();

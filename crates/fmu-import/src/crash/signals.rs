@@ -163,8 +163,9 @@ pub(super) fn install() -> io::Result<()> {
     // SAFETY: no conditions.
     PROCESS.store(unsafe { libc::getpid() }, Ordering::Relaxed);
     // SAFETY: a function that may run in the copy of a process: it stores to an atomic.
-    if unsafe { libc::pthread_atfork(None, None, Some(on_fork)) } != 0 {
-        return Err(io::Error::last_os_error());
+    let error = unsafe { libc::pthread_atfork(None, None, Some(on_fork)) };
+    if error != 0 {
+        return Err(io::Error::from_raw_os_error(error));
     }
     let stack = Box::leak(vec![0_u8; STACK].into_boxed_slice());
     let stack = libc::stack_t { ss_sp: stack.as_mut_ptr().cast(), ss_flags: 0, ss_size: STACK };

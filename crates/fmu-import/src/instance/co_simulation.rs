@@ -12,8 +12,9 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`Instantiate`](crate::LoadError::Instantiate) with the
-    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
+    /// [`FmuError::NoInterface`] if the FMU offers neither; [`FmuError::OnlyOnce`] for a forbidden second instance;
+    /// [`Instantiate`](crate::LoadError::Instantiate) with the FMU's messages if the FMU does not instantiate, in
+    /// [`FmuError::NeedsTool`] if it declares to need a tool.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let flags = self.description().stepped();
         let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
@@ -42,10 +43,32 @@ impl Fmu {
                     crate::v3::Instance::new(library, description, interface, name, resources);
                 Ok(Inner::V3(Box::new(created.map_err(hint)?)))
             }
-            _ => {
+            Some(CoSimulation::V2(_)) => {
                 let component = self.component(Interface::CoSimulation, name)?;
                 Ok(Inner::V2(crate::v2::Instance::new(component)))
             }
+            None => Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::package::TemporaryFolder;
+
+    use super::*;
+
+    #[test]
+    fn an_fmu_that_offers_model_exchange_only_lacks_the_interface() {
+        let folder = TemporaryFolder::new().unwrap();
+        let description = r#"<fmiModelDescription fmiVersion="3.0"
+ modelName="M" instantiationToken="t">
+<ModelExchange modelIdentifier="M"/>
+<ModelVariables><Float64 name="time" valueReference="0" causality="independent"/></ModelVariables>
+<ModelStructure/></fmiModelDescription>"#;
+        std::fs::write(folder.path().join("modelDescription.xml"), description).unwrap();
+        let fmu = Fmu::open_quietly(folder.path()).unwrap();
+        let error = fmu.instantiate("m").err().unwrap();
+        assert!(matches!(error, FmuError::NoInterface { .. }), "{error}");
     }
 }

@@ -15,8 +15,10 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`FmuError::Load`] with the FMU's messages
-    /// if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange.
+    /// [`FmuError::NoInterface`] without model exchange; [`FmuError::OnlyOnce`] for a forbidden second instance;
+    /// [`FmuError::Package`] without a library for this platform; [`FmuError::Load`] if the library does not load, or,
+    /// with the FMU's messages, if the FMU does not instantiate; [`FmuError::NeedsTool`] in place of
+    /// [`FmuError::Load`] if the FMU declares to need a tool.
     pub fn instantiate_equations(&self, name: &str) -> Result<Box<dyn ModelExchange>, FmuError> {
         let description = self.description();
         let flags = description.model_exchange.as_ref();
@@ -45,8 +47,8 @@ impl Fmu {
         let library = library.map_err(hint)?;
         let (location, names) = (file_uri(unpacked.folder())?, self.names());
         let (library, guid) = (Arc::new(library), &description.guid);
-        let component = library.instantiate(interface, name, guid, &location, names)?;
-        Ok(crate::v1::Instance::new(component, description, interface))
+        let component = library.instantiate(interface, name, guid, &location, names);
+        Ok(crate::v1::Instance::new(component.map_err(hint)?, description, interface))
     }
 
     fn equations_of_version_3(&self, name: &str) -> Result<crate::v3::Instance, FmuError> {
@@ -65,12 +67,19 @@ impl Fmu {
     }
 }
 
+/// Returns the number in an attribute of the description; an error if it is too large for a vector.
+fn stated_number(attribute: &'static str, count: u32) -> Result<usize, CallError> {
+    let error = |failure| CallError { function: attribute, failure, messages: Vec::new() };
+    check_number(count as usize).map_err(error)
+}
+
 impl ModelExchange for Instance {
     fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
         match &mut self.inner {
             Inner::V1(instance) => {
                 let flags = instance.description().model_exchange.as_ref();
-                Ok(flags.map_or(0, |flags| flags.number_of_continuous_states as usize))
+                let count = flags.map_or(0, |flags| flags.number_of_continuous_states);
+                stated_number("numberOfContinuousStates", count)
             }
             Inner::V3(instance) => instance.component.get_number_of_states(),
             Inner::V2(_) => Ok(self.fmu().description().structure.derivatives.len()),
@@ -82,10 +91,7 @@ impl ModelExchange for Instance {
             return instance.component.get_number_of_indicators();
         }
         let count = self.fmu().description().number_of_event_indicators.unwrap_or(0);
-        check_number(count as usize).map_err(|failure| {
-            let function = "numberOfEventIndicators";
-            CallError { function, failure, messages: Vec::new() }
-        })
+        stated_number("numberOfEventIndicators", count)
     }
 
     fn begin_communication_step(&mut self) {

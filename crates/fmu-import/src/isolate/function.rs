@@ -4,8 +4,9 @@
 use fmu_description::Version;
 use serde::{Deserialize, Serialize};
 
-/// Names of functions of FMI 3.0 that are not the name of a [`Function`]: a slave calls them for it.
-const OTHERS: [&str; 21] = [
+/// C functions that errors can name besides those of the table of [`Function`]: a worker calls them on its own for a
+/// [`Function`].
+const OTHERS: &[&str] = &[
     "fmi3ExitConfigurationMode",
     "fmi3GetFloat32",
     "fmi3SetFloat32",
@@ -27,15 +28,44 @@ const OTHERS: [&str; 21] = [
     "fmi3SetClock",
     "fmi3GetIntervalDecimal",
     "fmi3GetShiftDecimal",
+    "fmi3ActivateModelPartition",
+    // Model exchange.
+    "fmi3EnterContinuousTimeMode",
+    "fmi3CompletedIntegratorStep",
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3GetContinuousStates",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3GetEventIndicators",
+    "fmi3GetNominalsOfContinuousStates",
+    "fmi3GetNumberOfContinuousStates",
+    "fmi3GetNumberOfEventIndicators",
+    "fmi2CompletedIntegratorStep",
+    "fmi2SetTime",
+    "fmi2SetContinuousStates",
+    "fmi2GetContinuousStates",
+    "fmi2GetDerivatives",
+    "fmi2GetEventIndicators",
+    "fmi2GetNominalsOfContinuousStates",
+    "fmiInitialize",
+    "fmiTerminate",
+    "fmiEventUpdate",
+    "fmiCompletedIntegratorStep",
+    "fmiSetTime",
+    "fmiSetContinuousStates",
+    "fmiGetContinuousStates",
+    "fmiGetDerivatives",
+    "fmiGetEventIndicators",
+    "fmiGetNominalContinuousStates",
 ];
 
-/// Returns the static name of a function of any version.
+/// Returns the static name of a function of any version; `None` if no error of a worker names it.
 pub(super) fn known_name(name: &str) -> Option<&'static str> {
     let versions = [Version::V2, Version::V3, Version::V1];
     let names = versions.into_iter().flat_map(|version| {
         Function::ALL.iter().map(move |function| *function.static_name(version))
     });
-    names.chain(OTHERS).find(|known| *known == name)
+    names.chain(OTHERS.iter().copied()).find(|known| *known == name)
 }
 
 /// Defines the functions, each with the names that its errors have: in FMI 2.0, 3.0 and 1.0.
@@ -79,7 +109,7 @@ functions! {
     SetBoolean = "fmi2SetBoolean" "fmi3SetBoolean" "fmiSetBoolean",
     GetString = "fmi2GetString" "fmi3GetString" "fmiGetString",
     SetString = "fmi2SetString" "fmi3SetString" "fmiSetString",
-    SetInputDerivatives = "fmi2SetRealInputDerivatives" "fmi2SetRealInputDerivatives" "fmiSetRealInputDerivatives",
+    SetInputDerivatives = "fmi2SetRealInputDerivatives" "fmi3GetFloat64" "fmiSetRealInputDerivatives",
     GetOutputDerivatives = "fmi2GetRealOutputDerivatives" "fmi3GetOutputDerivatives" "fmiGetRealOutputDerivatives",
     DoStep = "fmi2DoStep" "fmi3DoStep" "fmiDoStep",
     DirectionalDerivative = "fmi2GetDirectionalDerivative" "fmi3GetDirectionalDerivative" "fmi2GetDirectionalDerivative",
@@ -147,6 +177,7 @@ mod tests {
             }
         }
         assert_eq!(Function::from_word(u64::MAX), None);
+        assert_eq!(known_name("fmi2GetDerivatives"), Some("fmi2GetDerivatives"));
         assert_eq!(known_name("fmi2Nothing"), None);
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct Variable {
     /// Number of elements; 1 for a scalar.
     pub(super) size: usize,
     /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
-    /// section 4.2.1): all but continuous inputs.
+    /// section 4.2.1): all but continuous inputs without clocks.
     pub(super) event: bool,
     /// Whether the FMU asks for this input within a step: a scalar with `intermediateUpdate`.
     pub(super) intermediate: bool,
@@ -120,12 +120,10 @@ impl ElementView {
         }
     }
 
-    /// Returns the name of a variable of the FMU.
+    /// Returns the name of the variable with a value reference of [`ElementView::description`], for messages.
     pub(super) fn name(&self, reference: u32) -> String {
-        let known = self.description.variables.iter().find(|variable| {
-            self.locate(variable.value_reference)
-                .is_some_and(|(variable, _)| self.variables[variable].reference == reference)
-        });
+        let variables = &self.description.variables;
+        let known = variables.iter().find(|variable| variable.value_reference == reference);
         known.map_or_else(|| format!("the variable {reference}"), |variable| variable.name.clone())
     }
 }
@@ -276,8 +274,10 @@ impl Builder {
         let kind = variable.kind.native_type();
         let is_plain = !is_array && variable.clocks.is_empty();
         view.plain &= kind != NativeType::Float32 && (kind != NativeType::Float64 || is_plain);
-        let event = !(variable.causality == Causality::Input
-            && variable.variability == Variability::Continuous);
+        let is_continuous = variable.causality == Causality::Input
+            && variable.variability == Variability::Continuous
+            && variable.clocks.is_empty();
+        let event = !is_continuous;
         let clocks = variable.clocks.iter().filter_map(|index| {
             description
                 .variables
@@ -397,5 +397,42 @@ impl Builder {
             }
         }
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DESCRIPTION: &str = r#"<fmiModelDescription fmiVersion="3.0"
+ modelName="M" instantiationToken="t">
+<CoSimulation modelIdentifier="M" hasEventMode="true"/>
+<ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent"/>
+<Clock name="c" valueReference="1" causality="input" intervalVariability="triggered"/>
+<Float64 name="a" valueReference="2" causality="input" start="0" clocks="1"/>
+<Float64 name="b" valueReference="3" causality="input" start="0" clocks="1"/>
+<Float64 name="v" valueReference="4" causality="input" start="0"><Dimension start="2"/></Float64>
+</ModelVariables>
+<ModelStructure/></fmiModelDescription>"#;
+
+    fn view() -> ElementView {
+        let (description, _) = ModelDescription::read(DESCRIPTION).unwrap();
+        ElementView::new(&description, &HashMap::new()).unwrap()
+    }
+
+    #[test]
+    fn clocked_inputs_of_default_variability_have_different_shadows() {
+        let view = view();
+        let shadows: Vec<usize> = view.variables[2..4].iter().map(|input| input.shadow).collect();
+        assert_eq!(shadows, [2, 3]);
+    }
+
+    #[test]
+    fn an_element_has_its_name_in_messages() {
+        let view = view();
+        let element = view.description.variables.last().unwrap();
+        assert_eq!(view.name(element.value_reference), "v[2]");
+        assert_eq!(view.name(2), "a");
     }
 }

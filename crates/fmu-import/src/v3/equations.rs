@@ -1,8 +1,7 @@
 //! The functions of model exchange (FMI 3.0.2, section 3).
 
 use super::Instance;
-use super::mode::Mode;
-use slave::{CallError, CompletedStep};
+use slave::{CallError, CompletedStep, Events as _};
 
 impl Instance {
     pub(crate) fn begin_communication_step(&mut self) {
@@ -22,9 +21,6 @@ impl Instance {
     }
 
     pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
-        self.state.clocks.end_event();
-        self.component.enter_continuous_time_mode()?;
-        self.state.mode = Mode::Step;
-        Ok(())
+        self.leave_event_mode()
     }
 }

@@ -220,11 +220,13 @@ impl Events for Instance {
         Ok(info)
     }
 
-    /// Enters Step Mode.
+    /// Enters Step Mode, in model exchange Continuous-Time Mode.
     fn leave_event_mode(&mut self) -> Result<(), CallError> {
         self.state.clocks.end_event();
-        if !self.is_scheduled() {
-            self.component.enter_step_mode()?;
+        match self.interface {
+            Interface::CoSimulation => self.component.enter_step_mode()?,
+            Interface::ModelExchange => self.component.enter_continuous_time_mode()?,
+            Interface::ScheduledExecution => {}
         }
         self.state.mode = Mode::Step;
         Ok(())
