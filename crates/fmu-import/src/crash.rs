@@ -56,11 +56,11 @@ pub(crate) const UNLOADING: &str = "unloading the library";
 static REPORTER: OnceLock<Thread> = OnceLock::new();
 
 /// The last failure, for the case that the process crashes before the program reports it.
-static BEFORE: Mutex<Option<String>> = Mutex::new(None);
+static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
 
 /// Notes a failure that the program is about to report: an FMU that crashes when it is freed would hide it.
 pub fn note(failure: String) {
-    *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+    *LAST_FAILURE.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
 }
 
 /// Advice for the line on standard error if the program's crash function fails.
@@ -215,7 +215,7 @@ pub fn watch(
 fn ending() -> Ending {
     let calls = place::calls(PLACE.load(Ordering::Relaxed)).collect();
     // A thread that will never continue may hold the lock.
-    let before = BEFORE.try_lock().ok().and_then(|mut before| before.take());
+    let before = LAST_FAILURE.try_lock().ok().and_then(|mut before| before.take());
     Ending { cause: cause(), calls, before }
 }
 
@@ -285,17 +285,16 @@ fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str(ADVICE.get().copied().unwrap_or_default())
 }
 
-/// Wakes the thread of [`watch`] to report the end. Signal handlers call this function: it neither
-/// allocates nor locks. Returns false if the end has started already or [`watch`] was not called.
-fn start_report(cause: i32, place: usize) -> bool {
-    let Some(reporter) = REPORTER.get() else { return false };
-    if ENDING.swap(true, Ordering::AcqRel) {
-        return false;
+/// Wakes the thread of [`watch`] to report the end. Does nothing if the end has started already or [`watch`] was not
+/// called. Signal handlers call this function: it neither allocates nor locks.
+fn start_report(cause: i32, place: usize) {
+    if let Some(reporter) = REPORTER.get()
+        && !ENDING.swap(true, Ordering::AcqRel)
+    {
+        PLACE.store(place, Ordering::Relaxed);
+        CAUSE.store(cause, Ordering::Release);
+        reporter.unpark();
     }
-    PLACE.store(place, Ordering::Relaxed);
-    CAUSE.store(cause, Ordering::Release);
-    reporter.unpark();
-    true
 }
 
 /// Ends the process as after a crash, for a program whose FMU does not return, after it has `waited` since a

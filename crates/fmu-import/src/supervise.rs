@@ -18,11 +18,12 @@ use rustix::process::Signal;
 
 use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
 
-/// How long the process may take to end after its work, and to end the call that it is in after a signal.
+/// How long the process may take to end after its work.
 const AFTER_WORK: Duration = Duration::from_secs(1);
+/// How long the process may stay in the same calls of FMUs after an ending signal.
 const AFTER_SIGNAL: Duration = Duration::from_secs(8);
 /// The interval of checks while one of these times passes.
-const LOOK: Duration = Duration::from_millis(50);
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of words of memory that both processes share for the program: 2 MiB, of which only what is used
 /// takes memory.
@@ -74,7 +75,7 @@ pub struct Ended {
 pub fn split() -> io::Result<Option<Ended>> {
     share_record()?;
     share_memory()?;
-    let signals = Signals::blocked()?;
+    let signals = Signals::block()?;
     // SAFETY: no conditions.
     let supervisor = unsafe { libc::getpid() };
     // SAFETY: this process has one thread.
@@ -90,7 +91,7 @@ pub fn split() -> io::Result<Option<Ended>> {
             end_with(supervisor);
             Ok(None)
         }
-        child => Ok(Some(Watch { child, signals, told: None }.end())),
+        child => Ok(Some(Watch { child, signals, standstill: None }.end())),
     }
 }
 
@@ -142,38 +143,40 @@ fn end_with(supervisor: pid_t) {
     }
 }
 
-/// The signals that the supervisor waits for, blocked meanwhile.
+/// The signals for which the supervisor waits. They are blocked meanwhile.
 struct Signals {
-    waited: sigset_t,
-    former: sigset_t,
+    set: sigset_t,
+    /// The signals that were blocked before.
+    former_mask: sigset_t,
 }
 
 impl Signals {
-    fn blocked() -> io::Result<Self> {
-        let (mut waited, mut former) = (MaybeUninit::zeroed(), MaybeUninit::zeroed());
-        let hangup = ignores_hangup();
+    /// Blocks the ending signals (SIGHUP only if it is not ignored), SIGCHLD and SIGTSTP.
+    fn block() -> io::Result<Self> {
+        let (mut set, mut former_mask) = (MaybeUninit::zeroed(), MaybeUninit::zeroed());
+        let ignores_hangup = ignores_hangup();
         // SAFETY: sets of signals to write to, and numbers of signals.
         unsafe {
-            libc::sigemptyset(waited.as_mut_ptr());
-            let chosen =
-                ENDING_SIGNALS.into_iter().filter(|signal| *signal != libc::SIGHUP || !hangup);
-            for signal in chosen.chain([libc::SIGCHLD, libc::SIGTSTP]) {
-                libc::sigaddset(waited.as_mut_ptr(), signal);
+            libc::sigemptyset(set.as_mut_ptr());
+            let ending = ENDING_SIGNALS.into_iter();
+            let ending = ending.filter(|signal| *signal != libc::SIGHUP || !ignores_hangup);
+            for signal in ending.chain([libc::SIGCHLD, libc::SIGTSTP]) {
+                libc::sigaddset(set.as_mut_ptr(), signal);
             }
-            if libc::sigprocmask(libc::SIG_BLOCK, waited.as_ptr(), former.as_mut_ptr()) != 0 {
+            if libc::sigprocmask(libc::SIG_BLOCK, set.as_ptr(), former_mask.as_mut_ptr()) != 0 {
                 return Err(io::Error::last_os_error());
             }
-            Ok(Self { waited: waited.assume_init(), former: former.assume_init() })
+            Ok(Self { set: set.assume_init(), former_mask: former_mask.assume_init() })
         }
     }
 
     fn restore(&self) {
         // SAFETY: the set that this process had.
-        unsafe { libc::sigprocmask(libc::SIG_SETMASK, &raw const self.former, null_mut()) };
+        unsafe { libc::sigprocmask(libc::SIG_SETMASK, &raw const self.former_mask, null_mut()) };
     }
 
-    /// Waits for one of the signals, up to `limit`; returns its number, and whether the kernel sent it to the
-    /// whole process group, as it does with the keys of a terminal.
+    /// Waits for one of the signals, up to `limit` if there is one. Returns its number and whether the kernel sent it,
+    /// as it does to the whole process group for the keys of a terminal; `None` after the limit.
     fn wait(&self, limit: Option<Duration>) -> Option<(c_int, bool)> {
         let mut info = MaybeUninit::<siginfo_t>::zeroed();
         let time = limit.map(|limit| libc::timespec {
@@ -182,7 +185,7 @@ impl Signals {
         });
         let time = time.as_ref().map_or(std::ptr::null(), from_ref);
         // SAFETY: a set, a structure to write to, and null or a time.
-        let signal = unsafe { libc::sigtimedwait(&raw const self.waited, info.as_mut_ptr(), time) };
+        let signal = unsafe { libc::sigtimedwait(&raw const self.set, info.as_mut_ptr(), time) };
         // SAFETY: all zeros is a valid value of the structure.
         let by_kernel = unsafe { info.assume_init() }.si_code > 0;
         (signal > 0).then_some((signal, by_kernel))
@@ -193,28 +196,35 @@ impl Signals {
 struct Watch {
     child: pid_t,
     signals: Signals,
-    /// When the first ending signal was passed on, and the calls at the last change.
-    told: Option<(Instant, Vec<Call>)>,
+    /// The calls of the process; `None` until an ending signal arrives.
+    standstill: Option<Standstill>,
+}
+
+/// The calls of FMUs in which the process is, and since when.
+struct Standstill {
+    since: Instant,
+    calls: Vec<Call>,
 }
 
 impl Watch {
-    /// Waits for the end of the process.
+    /// Waits for the end of the process, and kills it if an FMU keeps it from ending.
     fn end(mut self) -> Ended {
-        let mut done: Option<Instant> = None;
+        let mut finished_at: Option<Instant> = None;
         let end = loop {
             if let Some(end) = self.reap() {
                 break end;
             }
-            if chosen_status().is_some() && done.is_none() {
-                done = Some(Instant::now());
+            if chosen_status().is_some() && finished_at.is_none() {
+                finished_at = Some(Instant::now());
             }
-            let is_late = done.is_some_and(|since| since.elapsed() > AFTER_WORK);
+            let is_late = finished_at.is_some_and(|since| since.elapsed() > AFTER_WORK);
             if is_late || self.is_stuck() {
                 self.send(libc::SIGKILL);
                 self.wait_for_end();
                 break End::Stuck;
             }
-            let limit = (done.is_some() || self.told.is_some()).then_some(LOOK);
+            let is_ending = finished_at.is_some() || self.standstill.is_some();
+            let limit = is_ending.then_some(CHECK_INTERVAL);
             if let Some((signal, by_kernel)) = self.signals.wait(limit) {
                 self.pass_on(signal, by_kernel);
             }
@@ -227,6 +237,7 @@ impl Watch {
         }
     }
 
+    /// Passes a signal on to the process, unless the terminal has sent it to both. SIGTSTP stops both processes.
     fn pass_on(&mut self, signal: c_int, by_kernel: bool) {
         match signal {
             libc::SIGCHLD => {}
@@ -243,19 +254,20 @@ impl Watch {
                 if !(by_terminal && together) {
                     self.send(signal);
                 }
-                self.told.get_or_insert_with(|| (Instant::now(), crash::calls()));
+                let standstill = || Standstill { since: Instant::now(), calls: crash::calls() };
+                self.standstill.get_or_insert_with(standstill);
             }
         }
     }
 
-    /// Whether the process has been in the same calls for long since it was told to end.
+    /// Returns whether the process has been in the same calls for longer than [`AFTER_SIGNAL`] since an ending signal.
     fn is_stuck(&mut self) -> bool {
-        let Some((since, calls)) = &mut self.told else { return false };
-        let now = crash::calls();
-        if now.is_empty() || now != *calls {
-            (*since, *calls) = (Instant::now(), now);
+        let Some(standstill) = &mut self.standstill else { return false };
+        let calls = crash::calls();
+        if calls.is_empty() || calls != standstill.calls {
+            *standstill = Standstill { since: Instant::now(), calls };
         }
-        since.elapsed() > AFTER_SIGNAL
+        standstill.since.elapsed() > AFTER_SIGNAL
     }
 
     fn send(&self, signal: c_int) {
@@ -271,6 +283,7 @@ impl Watch {
         {}
     }
 
+    /// Returns how the process ended; `None` while it runs.
     fn reap(&self) -> Option<End> {
         let mut status = 0;
         // SAFETY: a status to write to.

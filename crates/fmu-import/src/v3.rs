@@ -51,8 +51,8 @@ pub(crate) struct Instance {
     event_mode: bool,
     experiment: Experiment,
     /// Whether the master handles the events, and whether a step then ends at the first one.
-    hands_over: bool,
-    stops: bool,
+    hands_over_events: bool,
+    stops_at_events: bool,
     state: State,
     clocked: ClockedRuns,
     /// The states that belong to the FMU states of the slots.
@@ -83,7 +83,7 @@ impl Instance {
         })?;
         let followed = view.variables.iter().filter(|variable| variable.intermediate);
         let intermediate: Vec<u32> = followed.map(|variable| variable.reference).collect();
-        let with = Instantiation {
+        let arguments = Instantiation {
             interface,
             name,
             token: &description.guid,
@@ -92,12 +92,12 @@ impl Instance {
             early_return: flags.has_event_mode || flags.might_return_early_from_do_step,
             intermediate: &intermediate,
         };
-        let (mut component, event_mode) = match library.instantiate(&with) {
-            Ok(component) => (component, with.event_mode),
+        let (mut component, event_mode) = match library.instantiate(&arguments) {
+            Ok(component) => (component, arguments.event_mode),
             // Some FMUs promise Event Mode and lack it.
-            Err(error) if with.event_mode => {
+            Err(error) if arguments.event_mode => {
                 let early_return = flags.might_return_early_from_do_step;
-                let without = Instantiation { event_mode: false, early_return, ..with };
+                let without = Instantiation { event_mode: false, early_return, ..arguments };
                 let component = library.instantiate(&without).map_err(|_| error)?;
                 tracing::warn!(
                     "{name}: the FMU runs without Event Mode, although its hasEventMode is true: it \
@@ -123,8 +123,8 @@ impl Instance {
         let (plans, slots, clocked) = (Plans::default(), Vec::new(), ClockedRuns::new(&view));
         Ok(Self {
             component,
-            hands_over: false,
-            stops: false,
+            hands_over_events: false,
+            stops_at_events: false,
             clocked,
             view,
             plans,

@@ -78,7 +78,7 @@ fn handler_of(signal: c_int) -> io::Result<libc::sighandler_t> {
 
 /// The last ending signal that the thread of [`on_ending_signal`] has not seen yet; 0: none.
 static ARRIVED: AtomicI32 = AtomicI32::new(0);
-static WAITING: OnceLock<Thread> = OnceLock::new();
+static SIGNAL_THREAD: OnceLock<Thread> = OnceLock::new();
 
 /// Calls `react` with the number of each signal that ends a program or announces its end, in a thread of its
 /// own. No descriptor is involved, because an FMU may close those that it did not open. Only the first call has
@@ -96,8 +96,8 @@ pub fn on_ending_signal(react: impl Fn(c_int) + Send + 'static) -> io::Result<()
             }
         }
     };
-    let waiting = std::thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
-    if WAITING.set(waiting.thread().clone()).is_err() {
+    let thread = std::thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
+    if SIGNAL_THREAD.set(thread.thread().clone()).is_err() {
         return Ok(());
     }
     let is_handled = |signal: &&c_int| **signal != libc::SIGHUP || !ignores_hangup();
@@ -110,8 +110,8 @@ pub fn on_ending_signal(react: impl Fn(c_int) + Send + 'static) -> io::Result<()
 
 extern "C" fn on_arrival(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     ARRIVED.store(signal, Ordering::Release);
-    if let Some(waiting) = WAITING.get() {
-        waiting.unpark();
+    if let Some(thread) = SIGNAL_THREAD.get() {
+        thread.unpark();
     }
 }
 
@@ -125,12 +125,12 @@ pub(super) fn is_copy() -> bool {
 #[inline]
 pub fn end_copy() {
     if is_copy() {
-        say_and_end();
+        report_and_end_copy();
     }
 }
 
 #[cold]
-fn say_and_end() -> ! {
+fn report_and_end_copy() -> ! {
     if RECORD.copies.fetch_add(1, Ordering::Relaxed) > 0 {
         leave(0);
     }
@@ -242,7 +242,7 @@ impl Line {
 }
 
 /// Where [`leave_file`] lets a crash be written.
-static LEFT: OnceLock<CString> = OnceLock::new();
+static CRASH_FILE: OnceLock<CString> = OnceLock::new();
 
 /// Lets a crash of this process leave a file in `folder` that names the FMU, function and time, for a program
 /// that is not ours to end: it ends afterwards as it would have. Signals that the program handles are left to
@@ -257,7 +257,7 @@ pub fn leave_file(folder: &Path) -> io::Result<()> {
     }
     let name = format!("aso-ftc-crash-{}.txt", std::process::id());
     let path = CString::new(folder.join(name).into_os_string().into_encoded_bytes())?;
-    if LEFT.set(path).is_err() {
+    if CRASH_FILE.set(path).is_err() {
         return Ok(());
     }
     for (signal, _) in FATAL {
@@ -271,7 +271,7 @@ pub fn leave_file(folder: &Path) -> io::Result<()> {
 
 /// Writes the file of [`leave_file`]; then the signal acts as by default.
 extern "C" fn write_file(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
-    if let Some(path) = LEFT.get().filter(|_| !is_copy()) {
+    if let Some(path) = CRASH_FILE.get().filter(|_| !is_copy()) {
         let mut line = Line::new();
         // A line that is too long is cut.
         let _ = super::write_crash(&mut line, signal, last_of_this_thread());

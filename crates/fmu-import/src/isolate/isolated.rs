@@ -87,19 +87,20 @@ impl Isolated {
         refuse_in_worker()?;
         let (shared, memory) =
             Shared::create(count).map_err(system("cannot create shared memory"))?;
-        let (here, there) = UnixStream::pair().map_err(system("cannot create a connection"))?;
+        let (socket, worker_socket) =
+            UnixStream::pair().map_err(system("cannot create a connection"))?;
         let slice = options.time_limit.map_or(SLICE, |limit| (limit / 8).min(SLICE));
         let slice = slice.max(Duration::from_millis(1));
-        here.set_read_timeout(Some(slice)).map_err(system("cannot set a time limit"))?;
-        here.set_write_timeout(Some(slice)).map_err(system("cannot set a time limit"))?;
+        socket.set_read_timeout(Some(slice)).map_err(system("cannot set a time limit"))?;
+        socket.set_write_timeout(Some(slice)).map_err(system("cannot set a time limit"))?;
         let executable = options.executable.clone().map_or_else(std::env::current_exe, Ok);
         let executable = executable.map_err(system("cannot find this program's file"))?;
-        let process = Process::start(&executable, name, there, memory).map_err(|source| {
+        let process = Process::start(&executable, name, worker_socket, memory).map_err(|source| {
             let (executable, instance) = (executable.clone(), name.to_owned());
             IsolateError::Start { executable, instance, source }
         })?;
         let mut isolated = Self {
-            channel: Channel::new(Arc::new(shared), here, Side::Master),
+            channel: Channel::new(Arc::new(shared), socket, Side::Master),
             process,
             inbox: Inbox::new(name),
             place: Place::new(name),

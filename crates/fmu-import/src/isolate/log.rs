@@ -52,7 +52,7 @@ impl Forward {
     fn send(&self, level: Level, message: &Message) {
         let Ok(mut head) = self.head.lock() else { return };
         let ring = self.shared.ring();
-        let sent = Sent {
+        let sent = RingMessage {
             level: LEVELS.iter().position(|known| *known == level).unwrap_or(0),
             time: message.time,
             category: clip(&message.category, CATEGORY),
@@ -76,7 +76,7 @@ impl Forward {
 
 /// A message in the ring. Its texts may be cut within a character.
 #[derive(Serialize, Deserialize)]
-struct Sent<'a> {
+struct RingMessage<'a> {
     level: usize,
     time: f64,
     category: &'a [u8],
@@ -271,7 +271,7 @@ impl Inbox {
         }
         let mut bytes: Vec<u8> = (1..=words).flat_map(|next| word(next).to_le_bytes()).collect();
         bytes.truncate(usize::try_from(length).ok()?);
-        let sent: Sent<'_> = decode(&bytes)?;
+        let sent: RingMessage<'_> = decode(&bytes)?;
         let level = *LEVELS.get(sent.level)?;
         let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
         let message =

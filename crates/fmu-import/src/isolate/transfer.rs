@@ -35,9 +35,9 @@ impl Isolated {
 
     /// Posts an encoded request.
     fn upload(&mut self, function: Function, mut message: &[u8]) -> Result<(), CallError> {
-        let most = 8 * self.channel.shared.area().len().saturating_sub(1);
-        while message.len() > most {
-            let (part, rest) = message.split_at(most);
+        let capacity = 8 * self.channel.shared.area().len().saturating_sub(1);
+        while message.len() > capacity {
+            let (part, rest) = message.split_at(capacity);
             self.call(Function::Upload, |writer| writer.put_part(part), |_| Some(()))?;
             message = rest;
         }

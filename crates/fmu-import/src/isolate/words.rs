@@ -50,37 +50,37 @@ pub(super) fn words_of(bytes: &[u8]) -> impl Iterator<Item = u64> {
 /// Writes values to an area from its start. Values that do not fit are not written.
 pub(super) struct Writer<'a> {
     words: &'a [AtomicU64],
-    at: usize,
+    position: usize,
 }
 
 impl<'a> Writer<'a> {
     pub(super) fn new(words: &'a [AtomicU64]) -> Self {
-        Self { words, at: 0 }
+        Self { words, position: 0 }
     }
 
     /// Returns whether all values fitted.
     pub(super) fn fits(&self) -> bool {
-        self.at <= self.words.len()
+        self.position <= self.words.len()
     }
 
     #[inline]
     pub(super) fn put<T: Word>(&mut self, value: T) {
-        if let Some(word) = self.words.get(self.at) {
+        if let Some(word) = self.words.get(self.position) {
             word.store(value.to_word(), Ordering::Relaxed);
         }
-        self.at = self.at.saturating_add(1);
+        self.position = self.position.saturating_add(1);
     }
 
     /// Writes the values without their number.
     #[inline]
     pub(super) fn put_all<T: Word>(&mut self, values: &[T]) {
-        let end = self.at.saturating_add(values.len());
-        if let Some(words) = self.words.get(self.at..end) {
+        let end = self.position.saturating_add(values.len());
+        if let Some(words) = self.words.get(self.position..end) {
             for (word, value) in words.iter().zip(values) {
                 word.store(value.to_word(), Ordering::Relaxed);
             }
         }
-        self.at = end;
+        self.position = end;
     }
 
     /// Writes the number of values and the values.
@@ -92,7 +92,7 @@ impl<'a> Writer<'a> {
 
     /// Writes as many of `bytes` as fit, after their number.
     pub(super) fn put_part(&mut self, bytes: &[u8]) {
-        let room = self.words.len().saturating_sub(self.at).saturating_sub(1);
+        let room = self.words.len().saturating_sub(self.position).saturating_sub(1);
         let part = &bytes[..bytes.len().min(BYTES * room)];
         self.put(part.len() as u64);
         words_of(part).for_each(|word| self.put(word));
@@ -103,20 +103,20 @@ impl<'a> Writer<'a> {
 /// invalid.
 pub(super) struct Reader<'a> {
     words: &'a [AtomicU64],
-    at: usize,
+    position: usize,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(words: &'a [AtomicU64]) -> Self {
-        Self { words, at: 0 }
+        Self { words, position: 0 }
     }
 
     /// Returns the next `count` words.
     #[inline]
     fn next(&mut self, count: usize) -> Option<&'a [AtomicU64]> {
-        let end = self.at.checked_add(count)?;
-        let words = self.words.get(self.at..end)?;
-        self.at = end;
+        let end = self.position.checked_add(count)?;
+        let words = self.words.get(self.position..end)?;
+        self.position = end;
         Some(words)
     }
 

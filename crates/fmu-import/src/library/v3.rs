@@ -25,7 +25,7 @@ use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption};
 use intermediate::Inputs;
 pub(crate) use intermediate::ORDERS;
-pub(crate) use step::StepDone;
+pub(crate) use step::DoStepResult;
 
 /// The interface of an instance of FMI 3.0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,18 +84,18 @@ impl Library {
         Ok(Self::new(functions, loading.path, handle))
     }
 
-    /// Calls the C function of `with.interface`; null if it fails.
-    fn create(&self, with: &Instantiation<'_>, sink: &Sink) -> Instance {
-        let (name, token) = (c_string(with.name), c_string(with.token));
-        let resources = with.resources.map(c_string);
+    /// Calls the C function of `arguments.interface`; null if it fails.
+    fn create(&self, arguments: &Instantiation<'_>, sink: &Sink) -> Instance {
+        let (name, token) = (c_string(arguments.name), c_string(arguments.token));
+        let resources = arguments.resources.map(c_string);
         let resources = resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr());
         let (name, token) = (name.as_ptr(), token.as_ptr());
         let environment = std::ptr::from_ref(sink).cast_mut().cast();
         let log = Some(receive_message as functions::LogMessage);
-        let created = match with.interface {
+        let created = match arguments.interface {
             Interface::CoSimulation => self.functions.instantiate.map(|function| {
-                let (event_mode, early_return) = (with.event_mode, with.early_return);
-                let (count, list) = (with.intermediate.len(), with.intermediate.as_ptr());
+                let (event_mode, early_return) = (arguments.event_mode, arguments.early_return);
+                let (count, list) = (arguments.intermediate.len(), arguments.intermediate.as_ptr());
                 let list = if count == 0 { std::ptr::null() } else { list };
                 let update = (count > 0).then_some(intermediate::update as IntermediateUpdate);
                 // SAFETY: terminated strings; an environment and a callback that outlive the instance.
@@ -146,13 +146,13 @@ impl Library {
     /// Creates an instance.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
-        with: &Instantiation<'_>,
+        arguments: &Instantiation<'_>,
     ) -> Result<Component, LoadError> {
-        let function = with.interface.function();
-        let place = Place::new(with.name);
+        let function = arguments.interface.function();
+        let place = Place::new(arguments.name);
         let sink = Sink::new(&place, None);
         place.enter(function);
-        let pointer = self.create(with, &sink);
+        let pointer = self.create(arguments, &sink);
         place.leave();
         let base = Base::new(self, pointer, function, place, sink, Version::V3)?;
         Ok(Component { base, inputs: Box::default() })

@@ -6,7 +6,7 @@ use fmu_description::NativeType;
 
 use super::Instance;
 use super::buffer::Buffer;
-use super::clocked::Listed;
+use super::clocked::TextOrBytes;
 use super::mode::Mode;
 use super::plan::Run;
 use super::refusal::{refused, unknown};
@@ -102,7 +102,7 @@ impl Instance {
     }
 
     /// Reads Strings or binaries.
-    pub(super) fn read_list<T: Listed>(
+    pub(super) fn read_list<T: TextOrBytes>(
         &mut self,
         function: &'static str,
         list: &[u32],
@@ -129,7 +129,7 @@ impl Instance {
     }
 
     /// Passes Strings or binaries.
-    pub(super) fn write_list<T: Listed + Hash>(
+    pub(super) fn write_list<T: TextOrBytes + Hash>(
         &mut self,
         function: &'static str,
         list: &[u32],

@@ -16,7 +16,7 @@ use slave::CallError;
 
 /// The value of an element.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum Remembered {
+pub(super) enum ElementValue {
     /// The bits of a number.
     Number(u64),
     Text(String),
@@ -24,27 +24,27 @@ pub(super) enum Remembered {
 }
 
 /// The values by the position of the element among those that may change in Event Mode only.
-pub(super) type Memory = BTreeMap<usize, Remembered>;
+pub(super) type Memory = BTreeMap<usize, ElementValue>;
 
 /// A value of a variable of type String or Binary.
-pub(super) trait Listed: Clone + Default {
-    fn remembered(&self) -> Remembered;
-    fn recalled(value: &Remembered) -> Option<&Self>;
+pub(super) trait TextOrBytes: Clone + Default {
+    fn to_value(&self) -> ElementValue;
+    fn from_value(value: &ElementValue) -> Option<&Self>;
     /// Reads the values of whole variables.
     fn get(component: &mut Component, list: &[u32], values: &mut [Self]) -> Result<(), CallError>;
     /// Passes the values of whole variables.
     fn set(component: &mut Component, list: &[u32], values: &[Self]) -> Result<(), CallError>;
 }
 
-macro_rules! listed {
+macro_rules! text_or_bytes {
     ($($type:ty: $variant:ident, $get:ident, $set:ident;)*) => {
-        $(impl Listed for $type {
-            fn remembered(&self) -> Remembered {
-                Remembered::$variant(self.clone())
+        $(impl TextOrBytes for $type {
+            fn to_value(&self) -> ElementValue {
+                ElementValue::$variant(self.clone())
             }
 
-            fn recalled(value: &Remembered) -> Option<&Self> {
-                if let Remembered::$variant(value) = value { Some(value) } else { None }
+            fn from_value(value: &ElementValue) -> Option<&Self> {
+                if let ElementValue::$variant(value) = value { Some(value) } else { None }
             }
 
             fn get(
@@ -62,7 +62,7 @@ macro_rules! listed {
     };
 }
 
-listed! {
+text_or_bytes! {
     String: Text, get_string, set_string;
     Vec<u8>: Bytes, get_binary, set_binary;
 }
@@ -98,7 +98,7 @@ impl Instance {
     /// Remembers the numbers in the buffer of a run.
     pub(super) fn remember(&mut self, run: &Run) {
         for (place, shadow) in run.shadows.iter().enumerate() {
-            self.state.memory.insert(*shadow, Remembered::Number(run.buffer.bits(place)));
+            self.state.memory.insert(*shadow, ElementValue::Number(run.buffer.bits(place)));
         }
     }
 
@@ -107,7 +107,10 @@ impl Instance {
         let mut all = true;
         for (place, shadow) in run.shadows.iter().enumerate() {
             let known = self.state.memory.get(shadow);
-            let bits = if let Some(Remembered::Number(bits)) = known { Some(*bits) } else { None };
+            let bits = match known {
+                Some(ElementValue::Number(bits)) => Some(*bits),
+                _ => None,
+            };
             all &= bits.is_some();
             run.buffer.put_bits(place, bits.unwrap_or(0));
         }
@@ -115,15 +118,15 @@ impl Instance {
     }
 
     /// Remembers the Strings or binaries of a run.
-    pub(super) fn remember_list<T: Listed>(&mut self, run: &Run, values: &[T]) {
+    pub(super) fn remember_list<T: TextOrBytes>(&mut self, run: &Run, values: &[T]) {
         for (shadow, value) in run.shadows.iter().zip(values) {
-            self.state.memory.insert(*shadow, value.remembered());
+            self.state.memory.insert(*shadow, value.to_value());
         }
     }
 
     /// Returns the remembered Strings or binaries of a run; `None` for an element without one.
-    pub(super) fn recall_list<T: Listed>(&self, run: &Run) -> Vec<Option<T>> {
-        let value = |shadow| self.state.memory.get(shadow).and_then(T::recalled).cloned();
+    pub(super) fn recall_list<T: TextOrBytes>(&self, run: &Run) -> Vec<Option<T>> {
+        let value = |shadow| self.state.memory.get(shadow).and_then(T::from_value).cloned();
         run.shadows.iter().map(value).collect()
     }
 
@@ -152,7 +155,7 @@ impl Instance {
         done
     }
 
-    fn read_and_remember<T: Listed>(&mut self, run: &Run) -> Result<(), CallError> {
+    fn read_and_remember<T: TextOrBytes>(&mut self, run: &Run) -> Result<(), CallError> {
         let mut values = vec![T::default(); run.shadows.len()];
         T::get(&mut self.component, &run.references, &mut values)?;
         self.remember_list(run, &values);
@@ -182,7 +185,7 @@ impl Instance {
         done
     }
 
-    fn set_remembered<T: Listed>(&mut self, run: &Run) -> Result<(), CallError> {
+    fn set_remembered<T: TextOrBytes>(&mut self, run: &Run) -> Result<(), CallError> {
         let values: Option<Vec<T>> = self.recall_list(run).into_iter().collect();
         values.map_or(Ok(()), |all| T::set(&mut self.component, &run.references, &all))
     }

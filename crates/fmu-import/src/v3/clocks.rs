@@ -395,7 +395,7 @@ impl Instance {
         if clocks.is_empty() {
             return Ok(());
         }
-        if self.hands_over && self.state.mode.is_initialized() {
+        if self.hands_over_events && self.state.mode.is_initialized() {
             self.enter_event()?;
             return self.activate(&clocks);
         }
@@ -406,7 +406,7 @@ impl Instance {
 
     /// Stores in the buffer of a run which clocks tick.
     pub(super) fn read_clocks(&mut self, run: &mut Run) -> Result<(), CallError> {
-        let now = self.hands_over && self.state.mode == Mode::Event;
+        let now = self.hands_over_events && self.state.mode == Mode::Event;
         if now {
             self.state.clocks.read_outputs(&mut self.component)?;
         }

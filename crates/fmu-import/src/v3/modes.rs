@@ -47,7 +47,7 @@ impl Instance {
         } else {
             Mode::Step
         };
-        if self.event_mode && !self.hands_over { self.handle_event() } else { Ok(()) }
+        if self.event_mode && !self.hands_over_events { self.handle_event() } else { Ok(()) }
     }
 
     /// Enters Event Mode, if the FMU is not in it.
@@ -91,7 +91,7 @@ impl Instance {
 
     /// Hands the events over to the master; returns whether there are any.
     pub(crate) fn hand_over_events(&mut self, stop: bool) -> bool {
-        (self.hands_over, self.stops) = (true, stop);
+        (self.hands_over_events, self.stops_at_events) = (true, stop);
         self.event_mode
     }
 
@@ -102,12 +102,18 @@ impl Instance {
         size: f64,
         never_back: bool,
     ) -> Result<StepResult, CallError> {
-        let done = self.parts(time, size, never_back);
+        let done = self.step_in_parts(time, size, never_back);
         self.component.forget_input_derivatives();
         done
     }
 
-    fn parts(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
+    /// Steps in parts, each up to an event, a discarded part or an early return of the FMU.
+    fn step_in_parts(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<StepResult, CallError> {
         self.state.time = time;
         if self.event_mode {
             self.state.clocks.begin_step();
@@ -149,7 +155,7 @@ impl Instance {
                 return Ok(StepResult::Part { reached, terminated: true });
             }
             if self.event_mode && (done.event || self.is_event_due(reached, size)) {
-                if self.hands_over && (self.stops || reached >= end - rounding) {
+                if self.hands_over_events && (self.stops_at_events || reached >= end - rounding) {
                     self.state.event = true;
                     return Ok(StepResult::Event { reached });
                 }

@@ -2,8 +2,7 @@
 //! such an FMU for one of co-simulation whose steps do nothing and whose events run the partitions.
 
 use super::Instance;
-use crate::library::v3::Interface;
-use crate::library::v3::StepDone;
+use crate::library::v3::{DoStepResult, Interface};
 use slave::{CallError, EventInfo};
 
 impl Instance {
@@ -17,10 +16,10 @@ impl Instance {
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<StepDone, CallError> {
+    ) -> Result<DoStepResult, CallError> {
         if self.is_scheduled() {
             let reached = time + size;
-            return Ok(StepDone { event: false, terminate: false, early: false, reached });
+            return Ok(DoStepResult { event: false, terminate: false, early: false, reached });
         }
         self.component.do_step(time, size, never_back)
     }

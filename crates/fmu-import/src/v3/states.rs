@@ -15,9 +15,9 @@ const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
-/// What a serialised state has beside that of the FMU.
+/// The state of the slave in a serialised state; the state of the FMU follows.
 #[derive(Serialize, Deserialize)]
-struct Kept {
+struct SlaveState {
     initialized: bool,
     next_event: Option<f64>,
     event: bool,
@@ -46,15 +46,15 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the state of the slave, then that of the FMU.
+    /// Returns the state of the slave, then the state of the FMU. In Event Mode it first handles the event.
     pub(crate) fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         if self.state.mode == Mode::Event {
-            // A serialised state is always in Step Mode.
+            // A serialised state is never in Event Mode.
             self.handle_event()?;
         }
-        let theirs = self.component.serialize_state()?;
+        let fmu_state = self.component.serialize_state()?;
         let State { mode, next_event, event, terminate, time, held, memory, clocks } = &self.state;
-        let kept_state = Kept {
+        let slave_state = SlaveState {
             initialized: mode.is_initialized(),
             next_event: *next_event,
             event: *event,
@@ -64,20 +64,20 @@ impl Instance {
             memory: memory.clone(),
             clocks: clocks.state(),
         };
-        postcard::to_extend(&(kept_state, theirs), MAGIC.to_vec())
+        postcard::to_extend(&(slave_state, fmu_state), MAGIC.to_vec())
             .map_err(|error| refused(SERIALIZE, format!("cannot store the state: {error}")))
     }
 
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
-        let read = read.filter(|(saved, _): &(Kept, &[u8])| {
+        let read = read.filter(|(saved, _): &(SlaveState, &[u8])| {
             saved.held.len() == self.state.held.len() && self.state.clocks.fits(&saved.clocks)
         });
-        let Some((saved, theirs)) = read else {
+        let Some((saved, fmu_state)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
             return Err(refused(DESERIALIZE, what));
         };
-        self.component.deserialize_state(theirs)?;
+        self.component.deserialize_state(fmu_state)?;
         let state = &mut self.state;
         state.mode = if saved.initialized { Mode::Step } else { Mode::Instantiated };
         (state.next_event, state.event) = (saved.next_event, saved.event);

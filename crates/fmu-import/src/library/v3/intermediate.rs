@@ -28,7 +28,7 @@ pub(super) struct Inputs {
     /// Start of the step in s.
     pub(super) start: f64,
     /// The last time for which the FMU asked, in s.
-    asked: Option<f64>,
+    asked_time: Option<f64>,
     pub(super) references: Vec<u32>,
     /// The values at the start of the step.
     pub(super) values: Vec<f64>,
@@ -73,7 +73,7 @@ impl Inputs {
         target: (Instance, SetFloat64),
         step: impl FnOnce() -> c_int,
     ) -> c_int {
-        (self.asked, self.target) = (None, Some(target));
+        (self.asked_time, self.target) = (None, Some(target));
         let before = CURRENT.replace(self);
         let status = step();
         CURRENT.set(before);
@@ -82,7 +82,7 @@ impl Inputs {
 
     /// Sets the inputs to their values at `time` unless the FMU has asked for these; returns its status.
     pub(super) fn settle(&mut self, time: f64) -> c_int {
-        if self.asked == Some(time) { 0 } else { self.apply(time) }
+        if self.asked_time == Some(time) { 0 } else { self.apply(time) }
     }
 
     /// Sets the inputs to their values at `time`; returns the status of the FMU.
@@ -90,7 +90,7 @@ impl Inputs {
         let elapsed = time - self.start;
         let all = self.present.iter_mut().zip(&self.values).zip(&self.derivatives);
         for ((present, value), derivatives) in all {
-            *present = at(*value, derivatives, elapsed);
+            *present = value_at(*value, derivatives, elapsed);
         }
         let Some((instance, set)) = self.target else { return 0 };
         let count = self.references.len();
@@ -101,7 +101,7 @@ impl Inputs {
 }
 
 /// Returns `value + sum(derivatives[k] s^(k + 1) / (k + 1)!)`.
-fn at(value: f64, [first, second, third]: &[f64; ORDERS], s: f64) -> f64 {
+fn value_at(value: f64, [first, second, third]: &[f64; ORDERS], s: f64) -> f64 {
     value + s * (first + s / 2.0 * (second + s / 3.0 * third))
 }
 
@@ -125,20 +125,20 @@ pub(super) unsafe extern "C" fn update(
     // SAFETY: null, or the inputs of the step that runs on this thread and waits for this callback.
     let inputs = unsafe { CURRENT.get().as_mut() };
     if let Some(inputs) = inputs.filter(|_| set_requested != 0) {
-        inputs.asked = Some(time);
+        inputs.asked_time = Some(time);
         inputs.apply(time);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::at;
+    use super::value_at;
 
     #[test]
     fn a_polynomial_of_order_3_is_that_of_taylor() {
         let taylor = |s: f64| 2.0 + 0.5 * s - 3.0 * s * s / 2.0 + 7.0 * s * s * s / 6.0;
         for s in [0.0, 0.25, 1.0, 3.0] {
-            assert!((at(2.0, &[0.5, -3.0, 7.0], s) - taylor(s)).abs() < 1e-12);
+            assert!((value_at(2.0, &[0.5, -3.0, 7.0], s) - taylor(s)).abs() < 1e-12);
         }
     }
 }

@@ -10,7 +10,7 @@ const SET: &str = "fmi3SetFloat64";
 
 /// The results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct StepDone {
+pub(crate) struct DoStepResult {
     /// `eventHandlingNeeded`.
     pub(crate) event: bool,
     /// `terminateSimulation`.
@@ -29,7 +29,7 @@ impl Component {
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<StepDone, CallError> {
+    ) -> Result<DoStepResult, CallError> {
         const NAME: &str = "fmi3DoStep";
         let function = function!(self.do_step, NAME);
         self.base.log_call(NAME, || format!("{time:?}, {size:?}, {never_back}"));
@@ -53,7 +53,7 @@ impl Component {
             )
         })?;
         let (event, terminate, early) = (event != 0, terminate != 0, early != 0);
-        Ok(StepDone { event, terminate, early, reached })
+        Ok(DoStepResult { event, terminate, early, reached })
     }
 
     /// Sets the derivatives of the inputs that `is_followed` accepts, for the step from `start` s, at which
