@@ -24,10 +24,9 @@ const HEADERS: [(&str, &str); 6] = [
 ];
 /// The parts of an FMU that a built one has, apart from its model description.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
-/// The number of the way in which libraries are built here: another way needs another number, as built FMUs
-/// are kept.
+/// The version of the way in which libraries are built here. Change it with this way: built FMUs are cached by it.
 const RECIPE: u32 = 1;
-/// Longest part of the output of a compiler that an error quotes.
+/// Largest number of characters of the output of a compiler that an error quotes.
 const OUTPUT: usize = 4000;
 
 /// Why the library of an FMU cannot be built.
@@ -37,7 +36,7 @@ pub enum CompileError {
     /// The FMU cannot be read or written, or has no source code.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// A file of the FMU does not say how the library is built.
+    /// The FMU does not state how its library is built, or states it wrongly.
     #[error("{}: {reason}", path.display())]
     Description {
         /// The FMU.
@@ -45,7 +44,7 @@ pub enum CompileError {
         /// What is missing or wrong.
         reason: String,
     },
-    /// There is no compiler.
+    /// No compiler runs.
     #[error("{}: no compiler for {language} here: tried {tried}; the variable {variable} names one", path.display())]
     NoCompiler {
         /// The FMU.
@@ -57,22 +56,22 @@ pub enum CompileError {
         /// The environment variable that names the compiler.
         variable: &'static str,
     },
-    /// The compiler refuses the source code.
+    /// The compiler or the linker fails.
     #[error("{}: {command} failed: {output}", path.display())]
     Failed {
         /// The FMU.
         path: PathBuf,
-        /// The program and the file.
+        /// The program and the file, or "linking".
         command: String,
         /// The start of its messages.
         output: String,
     },
-    /// A file cannot be read or written.
+    /// A file or folder cannot be read or written, or a program cannot be started.
     #[error("cannot {action} {}", path.display())]
     File {
         /// The operation.
         action: &'static str,
-        /// The file.
+        /// The file, folder or program.
         path: PathBuf,
         /// The reason given by the system.
         source: io::Error,
@@ -92,15 +91,15 @@ fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Co
 
 /// Returns an FMU with the content of the FMU at `path` and a library for this platform.
 ///
-/// If the FMU has a library for this platform, returns `path`. Otherwise the library is built from the
-/// folder `sources` of the FMU, as its `buildDescription.xml` states or, in FMI 2.0, the elements
-/// `SourceFiles`, by the compiler in the variable `CC` (C++: `CXX`) or the first one found. The built FMU is kept in
-/// the user's cache folder and used again for the same content and compiler.
+/// If the FMU has the libraries of its interfaces for this platform, returns `path`. Otherwise the libraries are built
+/// from the folder `sources` of the FMU, as its `buildDescription.xml` states or, in FMI 2.0, the elements
+/// `SourceFiles`, by the compiler in the variable `CC` (C++: `CXX`) or the first one that runs. The built FMU is stored
+/// in the user's cache folder and used again for the same content and compiler.
 ///
 /// # Errors
 ///
-/// [`CompileError`] if the FMU cannot be read, has neither a library nor source code, if there is no
-/// compiler, or if the compiler refuses the source code.
+/// [`CompileError`] if the FMU cannot be read, has neither a library nor source code, or does not state how it is
+/// built, if there is no compiler, if the compiler fails, or if the built FMU cannot be written.
 pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
     let unpacked =
         if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open_whole(path)? };
@@ -126,7 +125,7 @@ pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
     Ok(target)
 }
 
-/// Returns the names of the libraries of an FMU.
+/// Returns the model identifiers of an FMU, which are the names of its libraries.
 fn identifiers(description: &ModelDescription) -> Vec<String> {
     let simulation = description.stepped().map(|flags| flags.model_identifier);
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
@@ -141,7 +140,7 @@ fn file_name(path: &Path) -> String {
     format!("{}.fmu", path.file_stem().unwrap_or_default().to_string_lossy())
 }
 
-/// Returns the folder for built FMUs.
+/// Returns the folder for built FMUs: in the user's cache folder, or without one in the temporary folder.
 fn cache() -> PathBuf {
     let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     let home = || variable("HOME").map(PathBuf::from);
@@ -155,7 +154,7 @@ fn cache() -> PathBuf {
     user.unwrap_or_else(std::env::temp_dir).join("aso-ftc").join("compiled")
 }
 
-/// Returns the FMU without source code and documentation.
+/// Returns the content of the built FMU: the model description and [`PARTS`].
 fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
     let file = unpacked.folder().join(package::DESCRIPTION);
     let xml = fs::read_to_string(&file).map_err(file_error("read", &file))?;
@@ -169,13 +168,16 @@ fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
     Ok(content)
 }
 
-/// A compiler: its command and the text by which it presents itself.
+/// A compiler.
 struct Compiler {
+    /// The program and its arguments.
     words: Vec<String>,
+    /// The output of `--version`.
     version: String,
 }
 
 impl Compiler {
+    /// Returns the compiler in the variable `CC` or `CXX`; without the variable the first common one that runs.
     fn find(path: &Path, cpp: bool) -> Result<Self, CompileError> {
         let (variable, known, language) = if cpp {
             ("CXX", ["c++", "g++", "clang++"], "C++")
@@ -213,8 +215,9 @@ struct Build<'a> {
     sources: PathBuf,
     version: Version,
     configurations: Vec<BuildConfiguration>,
-    /// The compilers for C and, if it is needed, for C++.
+    /// The compiler for C.
     c: Compiler,
+    /// The compiler for C++, if there are such files.
     cpp: Option<Compiler>,
 }
 
@@ -235,7 +238,7 @@ impl<'a> Build<'a> {
         })
     }
 
-    /// Returns a name for the content of the FMU and the compilers.
+    /// Returns a hash of the content of the FMU and of the compilers: the name of its folder in the cache.
     fn key(&self, identifiers: &[String]) -> Result<String, CompileError> {
         let mut hasher = DefaultHasher::new();
         (RECIPE, std::env::consts::ARCH, std::env::consts::OS).hash(&mut hasher);
@@ -249,12 +252,12 @@ impl<'a> Build<'a> {
         Ok(format!("{:016x}", hasher.finish()))
     }
 
-    /// Builds the library `identifier`.
+    /// Builds the library `identifier` and returns the content of its file.
     fn library(&self, identifier: &str) -> Result<Vec<u8>, CompileError> {
         let is_called =
             |configuration: &&BuildConfiguration| configuration.model_identifier == identifier;
         let configuration = self.configurations.iter().find(is_called);
-        // Some FMUs state a former identifier.
+        // Some FMUs state a former identifier: the only configuration is used for any.
         let only = || self.configurations.first().filter(|_| self.configurations.len() == 1);
         let configuration = configuration.or_else(only).ok_or_else(|| {
             let reason = format!("no source files of {identifier} are stated");
@@ -317,6 +320,7 @@ impl<'a> Build<'a> {
         self.run(&mut command, file)
     }
 
+    /// Runs a command; `what` says in the error what it was for.
     fn run(&self, command: &mut Command, what: &str) -> Result<(), CompileError> {
         let program = command.get_program().to_string_lossy().into_owned();
         let output = command.output().map_err(file_error("start", Path::new(&program)))?;

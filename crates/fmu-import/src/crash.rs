@@ -47,9 +47,10 @@ static STATUS: AtomicI32 = AtomicI32::new(0);
 static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
-/// Activities besides functions of the standard. The dynamic linker is locked meanwhile: no other
-/// thread can start, or initialise what it destroys at its end.
+/// An activity besides functions of the standard. The dynamic linker is locked meanwhile: no other thread can start or
+/// register destructors of thread-local data.
 pub(crate) const LOADING: &str = "loading the library";
+/// Like [`LOADING`].
 pub(crate) const UNLOADING: &str = "unloading the library";
 
 /// The thread that runs the program's crash function.
@@ -58,7 +59,8 @@ static REPORTER: OnceLock<Thread> = OnceLock::new();
 /// The last failure, for the case that the process crashes before the program reports it.
 static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
 
-/// Notes a failure that the program is about to report: an FMU that crashes when it is freed would hide it.
+/// Notes a failure that the program is about to report, for a crash report. Otherwise an FMU that crashes when it is
+/// freed would hide it.
 pub fn note(failure: String) {
     *LAST_FAILURE.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
 }
@@ -84,10 +86,9 @@ pub enum Cause {
     Signal(i32),
     /// A call of `exit`, with its status if it is known.
     Exit(Option<i32>),
-    /// A call of [`give_up`], with the time for which a call had not returned after the signal, if that was the
-    /// reason.
+    /// A call of [`give_up`], with the time for which a call had not returned after the signal, if there was a signal.
     GivenUp(Option<Duration>),
-    /// The library of an FMU was not unloaded in time.
+    /// The library of an FMU was not unloaded within its time limit.
     Overdue,
     /// A function of an FMU did not return: an exception, `pthread_exit` or a cancellation left it.
     Unwound,
@@ -98,9 +99,9 @@ pub enum Cause {
 pub struct Ending {
     /// The cause.
     pub cause: Cause,
-    /// The call that caused the end; if it is unknown, all calls that have not returned.
+    /// The call that caused the end; if it is unknown, all calls that had not returned.
     pub calls: Vec<Call>,
-    /// The last failure before it, which may be the reason for it.
+    /// The last failure that [`note`] recorded before the end, a possible reason.
     pub before: Option<String>,
 }
 
@@ -155,7 +156,7 @@ fn write_ending(
     }
 }
 
-/// Returns the name and the meaning of a signal.
+/// Returns the name and the meaning of a fatal signal; "no common one" for others.
 #[cfg(unix)]
 fn signal_text(signal: i32) -> &'static str {
     signals::FATAL.iter().find(|(known, _)| *known == signal).map_or("no common one", |(_, t)| *t)
@@ -169,12 +170,13 @@ fn signal_text(_: i32) -> &'static str {
 /// Installs `last` as the crash function of this process.
 ///
 /// A fatal signal or an unexpected `exit` then runs `last` in a separate thread, and the process ends
-/// with the status that `last` returns. Signals are handled on Unix; on other systems only [`give_up`]
-/// runs `last`. If `last` itself crashes, because the FMU overwrote the memory of the program, one line
-/// with the cause and `advice` goes to standard error. Only the first call of `watch` has an effect.
+/// with the status that `last` returns. [`give_up`], [`Cause::Overdue`] and [`Cause::Unwound`] run `last` as well, also
+/// on systems other than Unix, where signals and `exit` are not handled. If `last` itself crashes, because the FMU
+/// overwrote the memory of the program, or does not return in time after a signal or `exit`, one line with the cause
+/// and `advice` goes to standard error. Only the first call of `watch` has an effect.
 ///
-/// The thread calls `prepare` at its start. It should use what `last` uses of the memory of a thread: the first
-/// use takes a lock of the dynamic linker, which an FMU that crashes in a constructor of its library holds.
+/// The separate thread calls `prepare` at its start. `prepare` should use all thread-local data that `last` uses: the
+/// first use takes a lock of the dynamic linker, which an FMU that crashes in a constructor of its library holds.
 ///
 /// # Errors
 ///
@@ -211,7 +213,7 @@ pub fn watch(
     Ok(())
 }
 
-/// Collects the cause of the end and the calls involved.
+/// Collects the cause of the end, the calls involved and the last failure.
 fn ending() -> Ending {
     let calls = place::calls(PLACE.load(Ordering::Relaxed)).collect();
     // A thread that will never continue may hold the lock.
@@ -261,7 +263,7 @@ impl fmt::Write for Line {
     }
 }
 
-/// Writes what is known of a crash of a program that called [`leave_file`].
+/// Writes the text of the file of [`leave_file`]: cause, calls, and all FMUs of this process.
 #[cfg(unix)]
 fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
     line.write_str("aso_ftc: ")?;
@@ -273,7 +275,7 @@ fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
     line.write_str("; isolate=True runs each FMU in a process of its own")
 }
 
-/// Writes the message for a crash function that crashes or does not return.
+/// Writes the message in place of the report of a crash function that crashes or does not return.
 #[cfg(unix)]
 fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;
@@ -297,8 +299,8 @@ fn start_report(cause: i32, place: usize) {
     }
 }
 
-/// Ends the process as after a crash, for a program whose FMU does not return, after it has `waited` since a
-/// signal. This function returns only if [`watch`] was not called.
+/// Ends the process as after a crash, because a call of an FMU does not return. `waited` is the time since the signal
+/// to end, if there was one. This function returns only if [`watch`] was not called.
 pub fn give_up(waited: Option<Duration>) {
     if REPORTER.get().is_some() {
         let waited = waited.map_or(0, |waited| waited.as_millis());
@@ -309,8 +311,9 @@ pub fn give_up(waited: Option<Duration>) {
     }
 }
 
-/// Ends the process if a call of the instance that is about to be dropped has not returned: then the stack
-/// is unwound by what left that call, and nothing of the FMU may be called any more.
+/// Ends the process if a call of the instance that is about to be dropped has not returned: an exception or the end of
+/// the thread left that call and unwinds the stack, so that the FMU may not be called any more. A panic of this program
+/// is no such case.
 pub(crate) fn check_returned(slot: &Slot) {
     if !slot.is_entered() || std::thread::panicking() {
         return;
@@ -326,8 +329,8 @@ pub(crate) fn check_returned(slot: &Slot) {
     leave(1);
 }
 
-/// Marks the work of the program as finished, with this exit status: a later `exit` is not reported as an
-/// FMU's.
+/// Marks the work of the program as finished, with this exit status: later signals and a later `exit` are not reported.
+/// Does nothing in a copy of the process that `fork` has made.
 pub fn done(status: u8) {
     #[cfg(unix)]
     if signals::is_copy() {
@@ -342,13 +345,13 @@ pub fn done(status: u8) {
 #[cfg(target_os = "linux")]
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
-/// Lets the process with this number know when the program has finished its work.
+/// Sets the process that is told when the program has finished its work.
 #[cfg(target_os = "linux")]
 pub(crate) fn be_supervised(supervisor: i32) {
     SUPERVISOR.store(supervisor, Ordering::Relaxed);
 }
 
-/// Sends the supervisor the signal that it waits for, if it is the parent of this process still.
+/// Sends the supervisor the signal for which it waits, if it is still the parent of this process.
 #[cfg(target_os = "linux")]
 fn wake_supervisor() {
     use rustix::process::{Signal, getppid, kill_process};
@@ -389,7 +392,7 @@ pub(crate) fn call_of_this_thread() -> Option<Call> {
     place::calls(last_of_this_thread()).next()
 }
 
-/// Ends the process at once, without running destructors of the program or of an FMU.
+/// Ends the process at once with this status. On Unix neither destructors nor exit handlers run.
 pub fn leave(status: u8) -> ! {
     done(status);
     #[cfg(unix)]

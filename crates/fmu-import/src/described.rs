@@ -7,11 +7,11 @@ use fmu_description::{ModelDescription, ParseError, Version};
 use crate::error::LoadError;
 use crate::library::describe_as;
 
-/// Why the model description that a library generates cannot be used.
+/// Why a library has no usable generated model description.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
-    /// The library does not generate a model description.
+    /// The library does not load, or does not generate a model description.
     #[error("the library of {name} does not describe itself")]
     None {
         /// Name of the model for the user.
@@ -27,24 +27,25 @@ pub enum DescriptionError {
         /// The reason.
         source: ParseError,
     },
-    /// The description breaks rules of the standard.
+    /// The description breaks rules of the standard, or was read with warnings.
     #[error("the variables of {name} break rules of {}:\n{}", version.release(), problems.join("\n"))]
     Rules {
         /// The version of FMI.
         version: Version,
         /// Name of the model for the user.
         name: String,
-        /// The rules, each with its section.
+        /// The warnings and the broken rules, each with its section.
         problems: Vec<String>,
     },
 }
 
-/// Returns the model description of FMI 2.0 or 3.0 of the library at `file`, as XML and as data. The
-/// crate `fmu` exported the library; `resources` is the folder of its resources; messages use `name`.
+/// Returns the model description that the library at `file` generates, as XML and as data: of FMI 3.0 if `version` is
+/// [`Version::V3`], otherwise of FMI 2.0. The crate `fmu` must have exported the library. `resources` is the folder of
+/// its resources; messages use `name`.
 ///
 /// # Errors
 ///
-/// [`DescriptionError`] if the library generates no description, an unreadable one, or one that
+/// [`DescriptionError`] if the library does not load, or generates no description, an unreadable one, or one that
 /// breaks rules of the standard.
 pub fn described_as(
     file: &Path,

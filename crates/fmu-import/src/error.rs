@@ -16,7 +16,7 @@ pub enum LoadError {
         /// How to solve the problem; empty if unknown.
         hint: String,
     },
-    /// A function is missing.
+    /// The library lacks a required function.
     #[error("{path}: the function {function} is missing")]
     Missing {
         /// The library.
@@ -24,7 +24,7 @@ pub enum LoadError {
         /// The function.
         function: String,
     },
-    /// The library has another version of FMI than its model description.
+    /// The library states another version of FMI than its model description, or none.
     #[error("{path}: {function} gives {actual:?}, expected {expected:?}")]
     Version {
         /// The library.

@@ -25,7 +25,7 @@ pub enum FmuError {
     /// The library cannot be loaded or instantiated.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The FMU has no co-simulation interface.
+    /// The FMU offers neither co-simulation nor scheduled execution.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
         /// The FMU.
@@ -61,7 +61,7 @@ pub enum FmuError {
         /// The FMU.
         path: PathBuf,
     },
-    /// The library fails; a possible cause is `needsExecutionTool`.
+    /// The library of an FMU with `needsExecutionTool` does not load or instantiate; the missing tool may be the cause.
     #[error("the FMU may need {tool} to be installed (needsExecutionTool is true)\n{source}")]
     NeedsTool {
         /// `generationTool`, or a description if the attribute is absent.
@@ -83,10 +83,8 @@ pub struct Fmu {
     pub(crate) content: Arc<Content>,
 }
 
-/// The library and the unpacked files of an FMU.
-///
-/// The only instance of an FMU that allows no other (`canBeInstantiatedOnlyOncePerProcess`). When it is
-/// freed, another one may follow.
+/// The reservation of an FMU that allows one instance only (`canBeInstantiatedOnlyOncePerProcess`). After its drop
+/// another instance may follow.
 pub(crate) struct OnlyInstance(Arc<Content>);
 
 impl Drop for OnlyInstance {
@@ -95,6 +93,8 @@ impl Drop for OnlyInstance {
     }
 }
 
+/// The library and the unpacked files of an FMU.
+///
 /// Fields are dropped in this order, which unloads the library before its file is removed.
 pub(crate) struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
@@ -103,13 +103,13 @@ pub(crate) struct Content {
     /// The name of its file, for messages about its library.
     name: String,
     binding: Binding,
-    /// Whether an FMU that allows one instance only has it.
+    /// Whether an FMU that allows one instance only has that instance.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled at the first message that needs one.
     names: OnceLock<HashMap<(char, u32), usize>>,
 }
 
-/// The library for co-simulation of an FMU, in the version of the FMU.
+/// The library for co-simulation or scheduled execution of an FMU, in the version of the FMU.
 #[derive(Clone)]
 pub(crate) enum CoSimulation {
     V1(Arc<v1::Library>),
@@ -118,13 +118,14 @@ pub(crate) enum CoSimulation {
 }
 
 impl Fmu {
-    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation.
-    /// `path` is an archive or a folder with an unpacked FMU.
+    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation or, if the FMU does
+    /// not offer it, for scheduled execution. `path` is an archive or a folder with an unpacked FMU.
     ///
     /// # Errors
     ///
-    /// [`FmuError`] if the FMU is not of version 1.0, 2.0 or 3.0, has no co-simulation interface or no
-    /// library for this platform, or if the library does not load.
+    /// [`FmuError`] if the FMU cannot be read, is not of version 1.0, 2.0 or 3.0, offers neither interface
+    /// ([`FmuError::NoCoSimulation`], [`FmuError::NoInterface`]), has no library for this platform, or if the library
+    /// does not load.
     pub fn open(path: &Path) -> Result<Self, FmuError> {
         let fmu = Self::open_any(path)?;
         if fmu.content.library.is_none() {
@@ -145,23 +146,25 @@ impl Fmu {
         Self::load(path, unpacked, Binding::Lenient)
     }
 
-    /// Opens an FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library
+    /// Opens an unpacked FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library
     /// defines.
     ///
     /// # Errors
     ///
-    /// Same as [`Fmu::open_any`].
+    /// Same as [`Fmu::open_any`], and [`LoadError::Refused`] for such a library.
     #[cfg(target_os = "linux")]
     pub(crate) fn open_strictly(folder: &Path) -> Result<Self, FmuError> {
         Self::load(folder, Unpacked::in_folder(folder)?, Binding::Strict)
     }
 
-    /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only.
+    /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only. The library for model
+    /// exchange is loaded with each instance.
     ///
     /// # Errors
     ///
-    /// [`FmuError`] if the FMU is not of version 1.0, 2.0 or 3.0, has neither interface
-    /// ([`FmuError::NoInterface`]) or no library for this platform, or if the library does not load.
+    /// [`FmuError`] if the FMU cannot be read, is not of version 1.0, 2.0 or 3.0, has no interface
+    /// ([`FmuError::NoInterface`]), or offers co-simulation or scheduled execution, but has no library for this
+    /// platform or one that does not load.
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
@@ -220,7 +223,7 @@ impl Fmu {
         Ok(view.map_err(unsupported)?.description)
     }
 
-    /// Reserves an FMU that allows one instance only.
+    /// Reserves an FMU that allows one instance only for the instance `name`; [`FmuError::OnlyOnce`] if it has one.
     pub(crate) fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
         if self.content.instantiated.swap(true, Ordering::Relaxed) {
             let (instance, model) = (name.to_owned(), self.description().model_name.clone());
@@ -229,12 +232,12 @@ impl Fmu {
         Ok(OnlyInstance(self.content.clone()))
     }
 
-    /// The library at `path` as it is to be loaded.
+    /// Returns how the library at `path` is loaded.
     pub(crate) fn loading<'a>(&'a self, path: &'a Path) -> Loading<'a> {
         Loading { path, fmu: &self.content.name, binding: self.content.binding }
     }
 
-    /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
+    /// Returns the lookup of variable names for messages of the FMU. Of several aliases it returns the one declared
     /// first.
     pub(crate) fn names(&self) -> Names {
         let content = self.content.clone();
@@ -252,13 +255,15 @@ impl Fmu {
         })
     }
 
-    /// Creates an instance of an FMU of FMI 2.0 for `interface`, with access to its C functions.
+    /// Creates an instance of an FMU of FMI 2.0 for `interface`, with access to its C functions. Does not check
+    /// `canBeInstantiatedOnlyOncePerProcess`.
     ///
     /// # Errors
     ///
-    /// [`FmuError::Version`] for another version of FMI; [`FmuError::NoInterface`] if the FMU lacks
-    /// `interface`; [`LoadError`] if the library does not load
-    /// or `fmi2Instantiate` fails.
+    /// [`FmuError::Version`] for another version of FMI; [`FmuError::NoInterface`] if the FMU lacks `interface`;
+    /// [`FmuError::Package`] without a library for this platform; [`FmuError::Load`], or [`FmuError::NeedsTool`] if the
+    /// FMU declares to need a tool, if the library does not load or `fmi2Instantiate` fails; [`FmuError::Location`] if
+    /// the path of the resources is no URI.
     pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
         let unpacked = &self.content.unpacked;
         let description = &unpacked.description;
@@ -285,7 +290,7 @@ impl Fmu {
     }
 }
 
-/// Returns the letter of a type in the messages of an FMU (section 2.1.5).
+/// Returns the letter of a type in the messages of an FMU (FMI 2.0.5, section 2.1.5).
 fn letter(kind: &Kind) -> char {
     match kind {
         Kind::Real(_) => 'r',
@@ -295,7 +300,7 @@ fn letter(kind: &Kind) -> char {
     }
 }
 
-/// Opens the library for co-simulation in the version of the FMU.
+/// Opens the library for co-simulation or scheduled execution in the version of the FMU.
 fn open_library(
     description: &ModelDescription,
     loading: &Loading<'_>,
@@ -315,7 +320,7 @@ fn open_library(
     library.map_err(|error| with_tool_hint(description, error))
 }
 
-/// Returns the interface of FMI 3.0 by which an FMU makes steps.
+/// Returns the interface of FMI 3.0 by which an FMU makes steps: co-simulation or, without it, scheduled execution.
 pub(crate) fn stepped(description: &ModelDescription) -> v3::Interface {
     match description.co_simulation {
         Some(_) => v3::Interface::CoSimulation,
@@ -330,7 +335,7 @@ pub(crate) fn resource_path(folder: &Path) -> Option<String> {
     Some(format!("{}{}", folder.display(), std::path::MAIN_SEPARATOR))
 }
 
-/// Adds the tool that the FMU declares to need (`needsExecutionTool`) to `error`.
+/// Converts `error`, with the tool that the FMU declares to need (`needsExecutionTool`), if any.
 pub(crate) fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
     let simulation = description.co_simulation.as_ref().map(|flags| flags.needs_execution_tool);
     let exchange = description.model_exchange.as_ref().map(|flags| flags.needs_execution_tool);

@@ -11,7 +11,7 @@ use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
 use slave::{CallError, CallSink, CommunicationStep, Events, Slave, StepResult, absent};
 
-/// An instance of an FMU in this process, for either interface.
+/// An instance of an FMU in this process, for any interface.
 pub struct Instance {
     pub(crate) inner: Inner,
     /// Dropped after `inner`.
@@ -42,15 +42,15 @@ impl Instance {
     /// limit. FMI 3.0 has no pending steps.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         match &mut self.inner {
-            Inner::V1(fmu) => fmu.component.base.time_limit = limit,
-            Inner::V2(fmu) => fmu.component.base.time_limit = limit,
+            Inner::V1(instance) => instance.component.base.time_limit = limit,
+            Inner::V2(instance) => instance.component.base.time_limit = limit,
             Inner::V3(_) => {}
         }
     }
 }
 
-/// Calls a method of the instance in the version of its FMU, or of a part of it; without a list of versions, of its
-/// component. In a version that is not listed the function is missing.
+/// Calls a method of the instance in the version of its FMU, or of the listed part of it. Without a list of versions,
+/// calls a method of the component. In a version that is not listed, returns the error that `$absent` is missing.
 macro_rules! of_version {
     ($instance:ident.$method:ident $arguments:tt) => {
         of_version!(

@@ -58,7 +58,7 @@ pub use unsupported::{Isolated, worker, worker_with};
 #[cfg(target_os = "linux")]
 pub use worker::{worker, worker_with};
 
-/// The first argument of a program that shall become a worker.
+/// The first and only argument of a program that is to become a worker.
 pub const WORKER: &str = "--fmu-worker";
 
 /// The environment variable that marks a process as a worker: the identifier of the process that
@@ -85,7 +85,7 @@ pub struct Options {
     /// The program that becomes the worker; `None`: this program.
     pub executable: Option<PathBuf>,
     /// How the worker integrates the instance, which is then one for model exchange; `None`: the instance
-    /// is one for co-simulation.
+    /// is one for co-simulation or scheduled execution.
     pub integration: Option<Integration>,
 }
 
@@ -108,7 +108,7 @@ pub enum IsolateError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// The FMU has no co-simulation interface, and [`Options::integration`] is not stated.
+    /// The FMU offers neither co-simulation nor scheduled execution, and [`Options::integration`] is not stated.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
         /// The FMU.
@@ -238,7 +238,7 @@ impl Package {
         &self.unpacked.description
     }
 
-    /// Returns what was accepted with a warning in the archive and the description.
+    /// Returns the warnings about the archive, then those about the description.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let description = self.unpacked.warnings.iter().map(ToString::to_string);
         self.unpacked.archive_warnings.iter().cloned().chain(description)
@@ -269,7 +269,8 @@ impl Package {
 ///
 /// # Errors
 ///
-/// [`IsolateError`] if the FMU cannot be read or lacks the interface, if no worker can be started, or if the FMU does not load, does not instantiate or ends its process.
+/// [`IsolateError`] if the FMU cannot be read or lacks the interface, if no worker can be started, or if the FMU does
+/// not load, does not instantiate or ends its process.
 pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
     Package::open(path)?.instantiate(name, options)
 }
@@ -278,10 +279,10 @@ pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, Isol
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorkerError {
-    /// No master started the program.
+    /// No master started the program, or it cannot set up what a worker needs.
     #[error("{WORKER} is for the master's own use: {what}")]
     Alone {
-        /// What the master did not supply.
+        /// What is missing.
         what: &'static str,
         /// The error of the operating system.
         source: io::Error,

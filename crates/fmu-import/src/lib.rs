@@ -1,10 +1,10 @@
-//! Loads FMUs (FMI 2.0) and calls them, in this process or in a separate process for each instance.
+//! Loads FMUs of FMI 1.0, 2.0 and 3.0 and calls them, in this process or in a separate process for each instance.
 //!
 //! [`Fmu::open`] unpacks an FMU, reads its description and loads its library; [`Fmu::instantiate`]
-//! returns an [`Instance`], which implements [`slave::Slave`]. [`isolate`] runs each instance in a
-//! separate process: a crash of the FMU ends only that process.
+//! returns an [`Instance`], which implements [`slave::Slave`]; [`Fmu::instantiate_equations`] returns an instance for
+//! model exchange. [`isolate`] runs each instance in a separate process: a crash of the FMU ends only that process.
 //!
-//! [`crash`] reports a crash of an FMU that runs in the process of the program; [`supervise`], on Linux, has
+//! [`crash`] reports a crash of an FMU that runs in the process of the program. On Linux, the module `supervise` has
 //! a second process watch the program.
 #![deny(unsafe_code)]
 

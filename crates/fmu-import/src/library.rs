@@ -42,7 +42,8 @@ use log::Sink;
 #[cfg(target_os = "linux")]
 pub(crate) use surroundings::Surroundings;
 
-/// Returns the model description that a library exported by `fmu::export!` generates.
+/// Returns the model description of FMI 2.0 that a library exported by `fmu::export!` generates. `resources` is the
+/// folder of its resources.
 ///
 /// # Errors
 ///
@@ -52,7 +53,8 @@ pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
     describe_as(path, resources, Version::V2)
 }
 
-/// Returns the model description of FMI 2.0 or 3.0 that a library exported by `fmu::export!` generates.
+/// Returns the model description that a library exported by `fmu::export!` generates: of FMI 3.0 if `version` is
+/// [`Version::V3`], otherwise of FMI 2.0.
 ///
 /// # Errors
 ///
@@ -84,6 +86,7 @@ pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<St
     }
 }
 
+/// Returns a C string of a text without its NUL characters.
 fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
@@ -103,8 +106,8 @@ unsafe fn copy_strings(pointers: &[*const c_char], values: &mut [String]) {
     }
 }
 
-/// Checks that the version of FMI that `function` returns is `expected` up to its last digit. A library may lack the
-/// function.
+/// Checks that the version of FMI that `get_version`, called `function`, returns starts with `expected` without
+/// trailing zeros: `2.1` passes as `2.0`. A library may lack the function.
 fn check_version(
     path: &Path,
     get_version: Option<unsafe extern "C" fn() -> *const c_char>,
@@ -148,7 +151,7 @@ impl Interface {
 pub(crate) type Library = Loaded<Functions>;
 
 impl Library {
-    /// Loads the library and checks that it has the functions of `interface`.
+    /// Loads the library, and checks its version and that it has the required functions of `interface`.
     pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
         let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
@@ -157,7 +160,7 @@ impl Library {
         Ok(Self::new(functions, loading.path, handle))
     }
 
-    /// Calls `fmi2Instantiate` for `interface`.
+    /// Calls `fmi2Instantiate` for `interface`. `resources` is the URI of the resources.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
         interface: Interface,
@@ -227,8 +230,8 @@ struct Hot {
 /// An FMU instance and its C functions. Dropping it calls `fmi2FreeInstance`; the library stays
 /// loaded until then.
 ///
-/// Each call returns a [`slave::CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
-/// `fmi2Warning`.
+/// Each call returns a [`slave::CallError`] if the library lacks the function, if its status is neither `fmi2OK` nor
+/// `fmi2Warning`, or if it writes beside a guarded array ([`Component::guard_arrays`]).
 pub struct Component {
     /// The pointers that [`Component::pass`] needs.
     hot: Hot,
@@ -256,12 +259,12 @@ impl Drop for Component {
 
 impl Component {
     /// Returns whether a call has returned `fmi2Warning` since the last call of this function.
-    /// Calls by [`Component::pass`] are not counted.
+    /// Warnings in [`Component::pass`] do not count.
     pub fn take_warning(&mut self) -> bool {
         self.base.take_warning()
     }
 
-    /// Lets the calls from now on get copies of arrays, with canaries. [`Component::pass`] does not.
+    /// Lets the calls from now on, except [`Component::pass`], get copies of arrays with canaries.
     pub fn guard_arrays(&mut self) {
         self.base.guard_arrays();
     }

@@ -1,7 +1,7 @@
-//! Supervision: the program works in a child process, and this one only waits and sees how the child ends.
+//! Supervision: the program works in a child process; this process waits for its end and reports it.
 //!
-//! [`split`] is for programs, before they start a thread. What an FMU does to its process, from `_exit` to a
-//! signal handler of its own, then leaves one process that can say which FMU, function and time was last.
+//! [`split`] is for programs, before they start a thread. An FMU can end its process by `_exit`, or install a signal
+//! handler of its own; the supervisor can still name the FMU, its last function and the time.
 #![expect(unsafe_code, reason = "fork, signals, and a page of memory that two processes share")]
 
 use std::fmt;
@@ -25,15 +25,16 @@ const AFTER_SIGNAL: Duration = Duration::from_secs(8);
 /// The interval of checks while one of these times passes.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Number of words of memory that both processes share for the program: 2 MiB, of which only what is used
-/// takes memory.
+/// Number of 64-bit words that both processes share for the program: 2 MiB, of which the system allocates only the
+/// pages that are used.
 const WORDS: usize = 1 << 18;
+/// The words that both processes share.
 static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 
 /// How the process of the program ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// With this exit status.
+    /// With this exit status; -1 if the system does not know it.
     Exited(i32),
     /// By this signal.
     Killed(i32),
@@ -58,20 +59,21 @@ impl fmt::Display for End {
 pub struct Ended {
     /// How it ended.
     pub end: End,
-    /// The exit status that the program chose; `None` if it was ended before.
+    /// The exit status that the program chose; `None` if the process ended before.
     pub status: Option<u8>,
-    /// The calls of FMUs that had not returned.
+    /// The calls of FMUs that had not returned at the end.
     pub calls: Vec<Call>,
     /// Whether the first step had started.
     pub has_begun_steps: bool,
 }
 
-/// Splits the program into two processes. Returns `None` in the one that shall do the work, and at the end of
-/// that one what is known of it in the other. Call it before the program starts a thread.
+/// Splits the program into two processes. In the child, which does the work, returns `None` at once. In the supervisor,
+/// waits for the end of the child and returns what is known of it. Call it before the program starts a thread.
 ///
 /// # Errors
 ///
-/// [`io::Error`] if the operating system refuses the memory or the process; the caller can work without.
+/// [`io::Error`] if the operating system refuses the memory, the signal mask or the process. The program can then work
+/// without a supervisor.
 pub fn split() -> io::Result<Option<Ended>> {
     share_record()?;
     share_memory()?;
@@ -95,7 +97,7 @@ pub fn split() -> io::Result<Option<Ended>> {
     }
 }
 
-/// Puts memory that a forked process shares in place of the pages of [`RECORD`], which are zero yet.
+/// Replaces the pages of [`RECORD`], which are still zero, by memory that a forked process shares.
 fn share_record() -> io::Result<()> {
     let (protection, flags) = (
         libc::PROT_READ | libc::PROT_WRITE,
@@ -108,7 +110,7 @@ fn share_record() -> io::Result<()> {
     if mapped == libc::MAP_FAILED { Err(io::Error::last_os_error()) } else { Ok(()) }
 }
 
-/// Maps zeros that a forked process shares.
+/// Sets [`MEMORY`] to new memory of zeros that a forked process shares.
 fn share_memory() -> io::Result<()> {
     let (protection, flags) =
         (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANONYMOUS);
@@ -133,7 +135,7 @@ pub fn memory() -> Option<&'static [AtomicU64]> {
     MEMORY.get().copied()
 }
 
-/// Lets this process end as soon as its supervisor ends.
+/// Lets the system kill this process when its supervisor ends. Ends it at once if the supervisor has ended already.
 fn end_with(supervisor: pid_t) {
     // SAFETY: no conditions.
     unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
@@ -297,12 +299,12 @@ impl Watch {
     }
 }
 
-/// The exit status that the program chose.
+/// Returns the exit status that the program chose; `None` before.
 fn chosen_status() -> Option<u8> {
     u8::try_from(RECORD.done.load(Ordering::Acquire) - 1).ok()
 }
 
-/// Returns the name of a signal.
+/// Returns the name of a signal, or "no common one".
 pub(crate) fn signal_name(signal: i32) -> &'static str {
     let known = [
         (Signal::HUP, "SIGHUP"),

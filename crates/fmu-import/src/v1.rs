@@ -1,7 +1,7 @@
 //! FMUs of FMI 1.0 for co-simulation (stand-alone) and for model exchange as slaves.
 //!
-//! FMI 1.0 has no initialization mode: `fmiInitializeSlave` or `fmiInitialize` is called when the master enters it. Values
-//! set before are start values; afterwards inputs can be set, and parameters are fixed.
+//! FMI 1.0 has no initialization mode: `fmiInitializeSlave` or `fmiInitialize` is called when the master enters it.
+//! Values set before are start values; afterwards inputs can be set, and parameters are fixed.
 
 mod equations;
 

@@ -1,23 +1,23 @@
-//! FMUs of FMI 2.0 for co-simulation as slaves.
+//! FMUs of FMI 2.0 for co-simulation and for model exchange as slaves.
 
 use crate::library::Component;
 use slave::{CallError, Failure};
 
-/// A co-simulation instance of an FMU of FMI 2.0 in this process.
+/// An instance of an FMU of FMI 2.0 in this process.
 pub(crate) struct Instance {
     pub(crate) component: Component,
     /// Buffer for Integers.
     integers: Vec<i32>,
 }
 
-/// Converts an integer to the type `what` of the FMU.
+/// Converts an integer to the type of the FMU. The error of `function` describes this type by `expected`.
 pub(crate) fn narrow<T: TryFrom<i64>>(
     function: &'static str,
-    what: &str,
+    expected: &str,
     value: i64,
 ) -> Result<T, CallError> {
     T::try_from(value).map_err(|_| {
-        let what = format!("cannot take the value {value}, expected {what}");
+        let what = format!("cannot take the value {value}, expected {expected}");
         CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
     })
 }

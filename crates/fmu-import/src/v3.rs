@@ -2,8 +2,8 @@
 //!
 //! In co-simulation the slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles
 //! the events and continues the step, so that the master sees one whole communication step (FMI 3.0.2,
-//! section 4.2), unless the master handles the events. In model exchange its caller does, and the slave ticks its
-//! clocks in them.
+//! section 4.2), unless the master handles the events. In model exchange the caller handles the events; input clocks
+//! tick in them.
 
 mod access;
 mod buffer;
@@ -50,12 +50,13 @@ pub(crate) struct Instance {
     /// Whether the FMU was instantiated with `eventModeUsed`.
     event_mode: bool,
     experiment: Experiment,
-    /// Whether the master handles the events, and whether a step then ends at the first one.
+    /// Whether the master handles the events.
     hands_over_events: bool,
+    /// Whether a step ends at the first event, if the master handles the events.
     stops_at_events: bool,
     state: State,
     clocked: ClockedRuns,
-    /// The states that belong to the FMU states of the slots.
+    /// The state of the slave for each slot of FMU states.
     slots: Vec<State>,
     /// Values of structural parameters, by value reference.
     sizes: HashMap<u32, u64>,
@@ -111,7 +112,7 @@ impl Instance {
             |name: &&str| description.log_categories.iter().any(|category| category.name == *name);
         let categories: Vec<&str> = STATUS_CATEGORIES.into_iter().filter(known).collect();
         if !categories.is_empty() {
-            // An FMU that refuses this is one without messages.
+            // An FMU that refuses this logs no messages.
             let _ = component.set_debug_logging(true, &categories);
         }
         let state = State {
@@ -142,7 +143,8 @@ impl Instance {
         &self.view.description
     }
 
-    /// Sets structural parameters in Configuration Mode; arrays whose dimensions they are change their sizes.
+    /// Sets structural parameters in Configuration Mode; arrays whose dimensions they are change their sizes. The FMU
+    /// is not called if the new sizes are impossible.
     pub(crate) fn configure(
         &mut self,
         description: &ModelDescription,
@@ -187,7 +189,7 @@ impl Instance {
 
     #[inline]
     pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        // A value reference that no variable has: the FMU says so.
+        // The FMU itself refuses a value reference that no variable has.
         if self.view.plain || self.plans.find(&self.view, list).is_err() {
             return self.component.get_float64(list, values);
         }

@@ -384,7 +384,8 @@ impl Exchange {
 fn carries_numbers(system: &System, input: Port) -> bool {
     let kind = ValueType::of(&system.variable(input).kind);
     !matches!(kind, ValueType::String | ValueType::Binary)
-        && system.connections.iter().any(|connection| {
-            connection.to == input && Way::of(system, connection) != Way::Tick
-        })
+        && system
+            .connections
+            .iter()
+            .any(|connection| connection.to == input && Way::of(system, connection) != Way::Tick)
 }

@@ -11,7 +11,7 @@ use fmu_description::xml::{self, Element};
 pub(super) struct BuildConfiguration {
     pub(super) model_identifier: String,
     pub(super) sets: Vec<SourceFileSet>,
-    /// Libraries of the system.
+    /// Names of libraries of the system, for the linker.
     pub(super) libraries: Vec<String>,
 }
 
@@ -19,16 +19,16 @@ pub(super) struct BuildConfiguration {
 #[derive(Default)]
 pub(super) struct SourceFileSet {
     language: Option<String>,
-    /// Paths below `sources`.
+    /// Paths of the files to compile, below `sources`.
     pub(super) files: Vec<String>,
-    /// `PreprocessorDefinition`: names and values.
+    /// `PreprocessorDefinition`: names and values, without optional ones.
     pub(super) definitions: Vec<(String, Option<String>)>,
-    /// Paths below `sources`.
+    /// Paths of folders of headers, below `sources`.
     pub(super) include_folders: Vec<String>,
 }
 
 impl SourceFileSet {
-    /// Whether the files are C++.
+    /// Returns whether the files are C++: by the stated language, otherwise if the extension of any file says so.
     pub(super) fn is_cpp(&self) -> bool {
         let is_cpp = |file: &String| {
             let extension = Path::new(file).extension().unwrap_or_default();
@@ -40,7 +40,8 @@ impl SourceFileSet {
         }
     }
 
-    /// The value of the compiler's option `-std`: `C99` is `gnu99`, as extensions of a compiler are common.
+    /// Returns the value of the compiler's option `-std`; `None` if the language states no year. `C99` becomes `gnu99`,
+    /// as extensions of a compiler are common.
     pub(super) fn standard(&self) -> Option<String> {
         let language = self.language.as_deref()?.to_ascii_lowercase();
         let year = language.strip_prefix('c')?;
@@ -49,13 +50,13 @@ impl SourceFileSet {
     }
 }
 
-/// Whether a stated file is no header, which is only included.
+/// Returns whether a stated file is compiled. Headers are only included.
 fn is_source(path: &String) -> bool {
     let extension = Path::new(path).extension().unwrap_or_default();
     !["h", "hh", "hpp", "hxx", "inc"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// Reads how the libraries of the FMU in `folder` are built; returns what is missing or wrong.
+/// Reads how the libraries of the FMU in `folder` are built. On failure returns what is missing or wrong.
 pub(super) fn read(folder: &Path) -> Result<Vec<BuildConfiguration>, String> {
     let file = folder.join("sources/buildDescription.xml");
     let configurations = if file.is_file() {
@@ -94,7 +95,7 @@ fn attribute(element: &Element, name: &str) -> Option<String> {
     attribute.map(|(_, value)| value.clone())
 }
 
-/// Returns the attribute `name`, a path below `sources`.
+/// Returns the attribute `name`, a path below `sources`. On failure returns what is wrong with it.
 fn path(element: &Element) -> Result<String, String> {
     let path = attribute(element, "name").unwrap_or_default();
     let mut parts = Path::new(&path).components();
@@ -104,7 +105,7 @@ fn path(element: &Element) -> Result<String, String> {
     is_inside.then_some(path.clone()).ok_or(format!("{}: found {path:?}, {expected}", element.name))
 }
 
-/// Returns the paths of the files to compile.
+/// Returns the paths of the files to compile: without headers.
 fn sources<'a>(files: impl Iterator<Item = &'a Element>) -> Result<Vec<String>, String> {
     let paths = files.map(path).collect::<Result<Vec<_>, _>>()?;
     Ok(paths.into_iter().filter(is_source).collect())
@@ -139,7 +140,7 @@ fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
     })
 }
 
-/// Returns the configuration of an interface of FMI 2.0.
+/// Returns the configuration of an interface of FMI 2.0 from its elements `SourceFiles`.
 fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
     let files = children(element, "SourceFiles").flat_map(|list| children(list, "File"));
     let set = SourceFileSet { files: sources(files)?, ..SourceFileSet::default() };

@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 
 use super::{OVERDUE, REPORTER, start_report};
 
-/// Ends the process as a crash does, unless it is dropped in time.
+/// A time limit that ends the process as a crash does, unless it is dropped in time.
 pub(crate) struct Limit {
+    /// Whether the limit has been dropped.
     ended: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }
 
 impl Limit {
-    /// Starts the time; `None` where the program does not watch for crashes, or no thread can start.
+    /// Starts the time limit; `None` if the program does not watch for crashes, or if no thread can start.
     pub(crate) fn new(time: Duration) -> Option<Self> {
         REPORTER.get()?;
         let [ready, ended] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
@@ -33,7 +34,7 @@ impl Limit {
             }
         };
         let thread = thread::Builder::new().name("limit".to_owned()).spawn(wait).ok()?;
-        // A thread takes the lock when it starts.
+        // A thread takes the lock of the dynamic linker when it starts: before the caller does.
         while !ready.load(Ordering::Acquire) {
             thread::yield_now();
         }

@@ -89,6 +89,7 @@ impl fmt::Debug for Name {
 
 /// The current function and time of one instance. Entering and leaving a function cost a few stores.
 pub(crate) struct Slot {
+    /// Whether an instance has the slot.
     is_used: AtomicBool,
     /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
@@ -106,7 +107,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Claims a slot for a new instance.
+    /// Claims a slot for a new instance. If no slot is free, instances share the last one.
     pub(crate) fn new(instance: &str) -> Arc<Self> {
         let mut slots = RECORD.slots.iter();
         let free = slots.position(|slot| !slot.is_used.swap(true, Ordering::AcqRel));
@@ -132,7 +133,8 @@ impl Place {
         &self.instance
     }
 
-    /// Notes an error of the instance for a crash report, and returns it.
+    /// Returns an error of the instance, and notes it for a crash report unless its status is `fmi2Discard` or
+    /// `fmi2Pending`.
     pub(crate) fn note_failure(&self, error: CallError) -> CallError {
         if !matches!(error.failure, Failure::Status(Status::Discard | Status::Pending)) {
             super::note(format!("{}: {error}", self.instance));
@@ -184,7 +186,7 @@ impl Slot {
         f64::from_bits(self.time.load(Ordering::Relaxed))
     }
 
-    /// Whether a call has not returned.
+    /// Returns whether a call of the instance has not returned.
     pub(crate) fn is_entered(&self) -> bool {
         !self.function.load(Ordering::Relaxed).is_null()
     }
@@ -194,7 +196,7 @@ impl Slot {
         Name { bytes, length: self.length.load(Ordering::Relaxed).min(NAME_LENGTH) }
     }
 
-    /// Returns the call that the instance executes.
+    /// Returns the call that the instance executes; `None` between calls.
     fn call(&self) -> Option<Call> {
         let function = self.function.load(Ordering::Relaxed);
         // SAFETY: null, or the address of the static reference passed to `enter`.
@@ -221,13 +223,13 @@ pub(crate) fn last_of_this_thread() -> usize {
     LAST.try_with(Cell::get).unwrap_or(0)
 }
 
-/// Returns the names of all instances that there were, as far as no other took their slots.
+/// Returns the names of the instances so far, except of those whose slot a later instance has taken.
 #[cfg(unix)]
 pub(super) fn instances() -> impl Iterator<Item = Name> {
     RECORD.used().iter().map(Slot::name)
 }
 
-/// Returns the name of the instance that has the slot at `address`.
+/// Returns the name of the instance with the slot at `address`; `None` if no instance has had such a slot.
 #[cfg(unix)]
 pub(super) fn instance(address: usize) -> Option<Name> {
     RECORD.used().iter().find(|slot| slot.is_at(address)).map(Slot::name)

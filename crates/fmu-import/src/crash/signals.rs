@@ -1,6 +1,6 @@
 //! The handlers of fatal signals and of `exit`.
 //!
-//! The handlers are async-signal-safe: they use atomics, `nanosleep`, `write`, `_exit`, formatting on
+//! The handlers are async-signal-safe: they use atomics, `nanosleep`, `open`, `write`, `close`, `_exit`, formatting on
 //! the stack, and `unpark`, which is an atomic exchange and one system call.
 #![expect(unsafe_code, reason = "signal handlers")]
 
@@ -22,7 +22,7 @@ use super::{
     EXIT, Line, RECORD, REPORT_LIMIT, STATUS, is_done, last_of_this_thread, place, start_report,
 };
 
-/// The signals that end a process, each with its name and meaning.
+/// The signals of a crash, each with its name and meaning.
 pub(super) const FATAL: [(c_int, &str); 6] = [
     (libc::SIGSEGV, "SIGSEGV: an invalid access to memory or a stack overflow"),
     (libc::SIGBUS, "SIGBUS: an invalid access to memory"),
@@ -52,7 +52,8 @@ thread_local! {
 /// Identifier of the process that called `watch`; processes forked by an FMU are not handled.
 static PROCESS: AtomicI32 = AtomicI32::new(0);
 
-/// In a copy of the process that `fork` has made, the address of the slot that its thread had entered last.
+/// In a copy of the process that `fork` has made, the address of the slot that its thread had entered last; otherwise
+/// [`NOT_FORKED`].
 static FORKED_BY: AtomicUsize = AtomicUsize::new(NOT_FORKED);
 const NOT_FORKED: usize = usize::MAX;
 
@@ -62,7 +63,7 @@ fn is_forked() -> bool {
     unsafe { libc::getpid() != PROCESS.load(Ordering::Relaxed) }
 }
 
-/// Whether SIGHUP is ignored, as `nohup` asks for.
+/// Returns whether SIGHUP is ignored, as `nohup` does it.
 pub(crate) fn ignores_hangup() -> bool {
     handler_of(libc::SIGHUP).is_ok_and(|handler| handler == libc::SIG_IGN)
 }
@@ -78,11 +79,13 @@ fn handler_of(signal: c_int) -> io::Result<libc::sighandler_t> {
 
 /// The last ending signal that the thread of [`on_ending_signal`] has not seen yet; 0: none.
 static ARRIVED: AtomicI32 = AtomicI32::new(0);
+/// The thread of [`on_ending_signal`].
 static SIGNAL_THREAD: OnceLock<Thread> = OnceLock::new();
 
-/// Calls `react` with the number of each signal that ends a program or announces its end, in a thread of its
-/// own. No descriptor is involved, because an FMU may close those that it did not open. Only the first call has
-/// an effect.
+/// Calls `react` with the number of each signal that ends a program or announces its end, in a separate thread. Of
+/// several signals that arrive before `react` is called only the last one counts; SIGHUP does not count if it is
+/// ignored. No file descriptor is involved, because an FMU may close those that it did not open. Only the first call
+/// has an effect.
 ///
 /// # Errors
 ///
@@ -115,7 +118,7 @@ extern "C" fn on_arrival(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     }
 }
 
-/// Whether this process is a copy that `fork` has made.
+/// Returns whether this process is a copy that `fork` has made.
 #[inline]
 pub(super) fn is_copy() -> bool {
     FORKED_BY.load(Ordering::Relaxed) != NOT_FORKED
@@ -129,6 +132,7 @@ pub fn end_copy() {
     }
 }
 
+/// Ends this copy of the process; the first copy prints a warning.
 #[cold]
 fn report_and_end_copy() -> ! {
     if RECORD.copies.fetch_add(1, Ordering::Relaxed) > 0 {
@@ -147,7 +151,7 @@ fn report_and_end_copy() -> ! {
     leave(0)
 }
 
-/// Runs in a copy of the process that `fork` has made.
+/// Marks this process as a copy; runs in each copy that `fork` has made.
 extern "C" fn on_fork() {
     FORKED_BY.store(last_of_this_thread(), Ordering::Relaxed);
 }
@@ -157,7 +161,7 @@ pub(super) fn mark_reporter() {
     IS_REPORTER.set(true);
 }
 
-/// Installs the handlers for all threads, and an alternate signal stack for the calling thread.
+/// Installs the handlers of signals, of `fork` and of `exit`, and an alternate signal stack for the calling thread.
 /// SIGXFSZ is ignored: a write beyond the file size limit (`ulimit -f`) returns an error.
 pub(super) fn install() -> io::Result<()> {
     // SAFETY: no conditions.
@@ -198,7 +202,7 @@ pub(crate) unsafe fn handle(
     check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })
 }
 
-/// Lets `signal`, whose handler calls this, act as by default.
+/// Lets `signal`, whose handler calls this function, act as by default.
 fn act_as_by_default(signal: c_int) {
     // SAFETY: restores the default; the signal is delivered when the handler returns.
     unsafe {
@@ -219,8 +223,8 @@ extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     wait();
 }
 
-/// Waits for the program's crash function, which ends the process. If that function has crashed or does
-/// not return in time, writes the fallback message and ends the process.
+/// Waits for the program's crash function, which ends the process. If that function does not return in time, or has
+/// crashed and so called this function, writes the fallback message and ends the process.
 fn wait() -> ! {
     if !IS_REPORTER.try_with(Cell::get).unwrap_or(false) {
         std::thread::sleep(REPORT_LIMIT + Duration::from_secs(1));
@@ -241,16 +245,16 @@ impl Line {
     }
 }
 
-/// Where [`leave_file`] lets a crash be written.
+/// The path of the file of [`leave_file`].
 static CRASH_FILE: OnceLock<CString> = OnceLock::new();
 
-/// Lets a crash of this process leave a file in `folder` that names the FMU, function and time, for a program
-/// that is not ours to end: it ends afterwards as it would have. Signals that the program handles are left to
-/// it. Only the first call has an effect, and none does in a program that calls [`super::watch`].
+/// Lets a crash of this process write a file `aso-ftc-crash-PID.txt` in `folder` that names the FMU, function and time.
+/// It is for libraries in programs of others: the signal then ends the program as without this function. Signals that
+/// the program handles already are left to it. Only the first call has an effect, and none after [`super::watch`].
 ///
 /// # Errors
 ///
-/// [`io::Error`] if the operating system refuses a signal handler.
+/// [`io::Error`] if the operating system refuses a signal handler, or if the path of the folder has a NUL.
 pub fn leave_file(folder: &Path) -> io::Result<()> {
     if super::REPORTER.get().is_some() {
         return Ok(());
@@ -294,7 +298,7 @@ pub(super) fn leave(status: c_int) -> ! {
     unsafe { libc::_exit(status) }
 }
 
-/// Handles a call of `exit`, by the program at its end or by an FMU.
+/// Handles a call of `exit`. It is reported unless the program has finished its work.
 fn exit_called(status: c_int) {
     if is_done() || is_forked() {
         return;
@@ -304,6 +308,7 @@ fn exit_called(status: c_int) {
     wait();
 }
 
+/// Registers [`exit_called`] for calls of `exit`.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn on_end_of_process() -> io::Result<()> {
     unsafe extern "C" {
@@ -316,6 +321,7 @@ fn on_end_of_process() -> io::Result<()> {
     check(unsafe { on_exit(ended, null_mut()) })
 }
 
+/// Registers [`exit_called`] for calls of `exit`, whose status this system does not tell.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 fn on_end_of_process() -> io::Result<()> {
     extern "C" fn ended() {

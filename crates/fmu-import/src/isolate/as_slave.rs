@@ -21,7 +21,7 @@ fn write_pairs<T: Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T
     writer.put_all(values);
 }
 
-/// Panics if a caller of [`Slave`] passes another number of values than references.
+/// Panics if the caller passes another number of values than references.
 #[inline]
 fn assert_equally_many<T>(references: &[u32], values: &[T]) {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
@@ -39,7 +39,7 @@ fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
     })
 }
 
-/// Defines the methods that are one request.
+/// Defines the methods that send one request and return its answer.
 macro_rules! requests {
     ($(fn $method:ident($($argument:ident: $type:ty)?) -> $result:ty = $request:expr;)*) => {
         $(fn $method(&mut self $(, $argument: $type)?) -> Result<$result, CallError> {
@@ -64,7 +64,7 @@ macro_rules! numbers {
 }
 
 impl Isolated {
-    /// Requests one value for each element of `values`.
+    /// Requests one value for each element of `values`. Another number of values ends the worker.
     fn request_all<T: DeserializeOwned>(
         &mut self,
         request: &Request<'_>,

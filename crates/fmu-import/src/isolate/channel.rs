@@ -45,7 +45,7 @@ pub(super) struct Channel {
     pub(super) shared: Arc<Shared>,
     socket: UnixStream,
     side: Side,
-    /// Number of next waits that do not yield.
+    /// Number of the next waits that block without yielding.
     waits_without_yield: u32,
 }
 
@@ -60,7 +60,7 @@ impl Channel {
         if self.side == Side::Master { (master, worker) } else { (worker, master) }
     }
 
-    /// Sets the turn and wakes the other side. A side that reads the turn also sees all earlier writes.
+    /// Sets the turn, and wakes the other side if it sleeps. A side that reads the turn also sees all earlier writes.
     #[inline]
     pub(super) fn post(&mut self, turn: u64) {
         self.shared.turn().store(turn, Ordering::SeqCst);
@@ -72,14 +72,14 @@ impl Channel {
         }
     }
 
-    /// Returns the turn if it differs from `old`.
+    /// Returns the turn if it differs from `old`, otherwise `None`.
     #[inline]
     fn poll(&self, old: u64) -> Option<WaitResult> {
         let turn = self.shared.turn().load(Ordering::SeqCst);
         (turn != old).then_some(WaitResult::Turn(turn))
     }
 
-    /// Waits until the turn differs from `old`.
+    /// Waits until the turn differs from `old`, the other side has ended, or the read timeout of the socket has passed.
     #[inline]
     pub(super) fn wait(&mut self, old: u64) -> WaitResult {
         for _ in 0..SPINS {

@@ -157,7 +157,7 @@ impl Function {
         self as u64
     }
 
-    /// Returns the function with this number.
+    /// Returns the function with this number; `None` if there is none.
     pub(super) fn from_word(word: u64) -> Option<Self> {
         Self::ALL.get(usize::try_from(word).ok()?).copied()
     }

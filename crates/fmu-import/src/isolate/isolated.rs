@@ -34,7 +34,7 @@ const START_LIMIT: Duration = Duration::from_secs(20);
 
 /// An instance in a process of its own.
 ///
-/// After a call that ended the process every further call returns the same error.
+/// After a call that ended the process, every further call returns the same failure.
 pub struct Isolated {
     pub(super) channel: Channel,
     process: Process,
@@ -47,11 +47,13 @@ pub struct Isolated {
     posted_at: Option<Instant>,
     /// Why the worker ended; `None` while it runs.
     ended: Option<Failure>,
-    /// Whether `fmi2FreeInstance` has been called.
+    /// Whether the worker has been asked to free the instance.
     freed: bool,
     time_limit: Option<Duration>,
     memory_limit: Option<u64>,
+    /// Longest wait between two checks: the read timeout of the socket.
     slice: Duration,
+    /// When the process was started.
     started: Instant,
     /// The bytes of a request or an answer, kept so that small ones need no allocation.
     pub(super) message: Vec<u8>,
@@ -95,10 +97,11 @@ impl Isolated {
         socket.set_write_timeout(Some(slice)).map_err(system("cannot set a time limit"))?;
         let executable = options.executable.clone().map_or_else(std::env::current_exe, Ok);
         let executable = executable.map_err(system("cannot find this program's file"))?;
-        let process = Process::start(&executable, name, worker_socket, memory).map_err(|source| {
-            let (executable, instance) = (executable.clone(), name.to_owned());
-            IsolateError::Start { executable, instance, source }
-        })?;
+        let process =
+            Process::start(&executable, name, worker_socket, memory).map_err(|source| {
+                let (executable, instance) = (executable.clone(), name.to_owned());
+                IsolateError::Start { executable, instance, source }
+            })?;
         let mut isolated = Self {
             channel: Channel::new(Arc::new(shared), socket, Side::Master),
             process,
@@ -133,7 +136,8 @@ impl Isolated {
         self.channel.shared.attached().load(Ordering::Relaxed) != 0
     }
 
-    /// Frees the instance and creates the instance `name` in the same process with the same library.
+    /// Frees the instance and creates the instance `name` in the same process with the same library. Of `options` only
+    /// [`Options::logging`] has an effect.
     ///
     /// # Errors
     ///
@@ -220,7 +224,7 @@ impl Isolated {
         self.posted_at = self.time_limit.map(|_| Instant::now());
     }
 
-    /// Waits for the answer to `function`; returns the results that `read` reads.
+    /// Waits for the answer to `function`; returns the results that `read` reads, or the error that the worker sent.
     #[inline]
     pub(super) fn answer<T>(
         &mut self,
@@ -258,7 +262,7 @@ impl Isolated {
         if reader.take::<u64>()? == VALUES { read(&mut reader) } else { None }
     }
 
-    /// Waits until the worker has answered.
+    /// Waits until the worker has answered. On failure returns why no answer can come.
     #[inline]
     fn wait(&mut self) -> Result<(), Failure> {
         let (posted, mut start) = (self.turn, self.posted_at.take());
@@ -273,8 +277,8 @@ impl Isolated {
         }
     }
 
-    /// Returns why no answer can come, or `Ok` if the wait may go on. Sets `start` to the start of the
-    /// wait if it is unknown.
+    /// Checks after a wait without an answer whether one can still come; the error says why not. Sets `start` to the
+    /// start of the wait if it is unknown.
     #[cold]
     fn check_timeout(
         &mut self,
@@ -307,7 +311,8 @@ impl Isolated {
         }
     }
 
-    /// Kills the worker after a failure; returns the error of `function`.
+    /// Kills the worker after a failure. Returns the error of the C function that the worker executed, or of `function`
+    /// if that is unknown.
     #[cold]
     pub(super) fn abandon(&mut self, function: Function, failure: Failure) -> CallError {
         self.process.kill();
@@ -341,7 +346,7 @@ impl Isolated {
         self.process.id()
     }
 
-    /// Lets the worker free the instance and end. Does nothing if that has happened already.
+    /// Lets the worker free the instance and end. Does nothing if this was requested before or the worker has ended.
     pub(super) fn free_instance(&mut self) -> Result<(), CallError> {
         if self.freed || self.ended.is_some() {
             return Ok(());
@@ -373,7 +378,7 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
     }
 }
 
-/// Returns the description of an integrated instance from that of the instance.
+/// A function that returns the description of an integrated instance from the description of the instance.
 pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 
 /// Returns the description of an instance if it differs from that of its FMU. On failure returns the

@@ -15,8 +15,8 @@ const AREA: usize = 8 * SPACING;
 const RING: usize = 1 << 15;
 /// Minimum number of words for arguments and results: 64 KiB.
 const MIN_AREA: usize = 1 << 13;
-/// Words for arguments and results per variable: `advance` with derivatives of two orders needs 16 if
-/// each variable is input and output.
+/// Words for arguments and results per variable. `advance` needs 2 + 3 n for an input with derivatives of n orders and
+/// 1 + 2 n for an output.
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
 const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0002;

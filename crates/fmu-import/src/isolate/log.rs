@@ -1,5 +1,5 @@
 //! Passes the messages of an FMU to the master through a ring buffer in shared memory, which survives
-//! a crash of the worker. Messages that do not fit are counted. A message is a word with the number of
+//! a crash of the worker. Messages that do not fit are dropped and counted. A message is a word with the number of
 //! its bytes, then its bytes.
 
 use std::collections::VecDeque;
@@ -20,9 +20,9 @@ use slave::CallError;
 
 /// The `target` of `tracing` events that carry messages of an FMU.
 const TARGET: &str = "fmu";
-/// Maximum number of bytes of a category.
+/// Maximum number of bytes of a category; the rest is cut off.
 const CATEGORY: usize = 256;
-/// Maximum number of bytes of a text.
+/// Maximum number of bytes of a text; the rest is cut off.
 const TEXT: usize = 4096;
 /// Maximum number of messages kept for an error.
 const KEPT: usize = 10;
@@ -30,7 +30,7 @@ const KEPT: usize = 10;
 const MESSAGES: u32 = 1000;
 /// Maximum number of bytes of messages logged per instance.
 const BYTES: usize = 16 << 20;
-/// Interval between two reports of the number of lost messages.
+/// Interval in which at most [`MESSAGES`] are logged, and between two reports of the number of lost ones.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Maximum number of bytes of a message: category, text, and their lengths, level and time.
 const MESSAGE: usize = CATEGORY + TEXT + 32;
@@ -49,6 +49,7 @@ impl Forward {
         Self { shared, head: Mutex::new(0) }
     }
 
+    /// Writes a message to the ring, or counts it as dropped.
     fn send(&self, level: Level, message: &Message) {
         let Ok(mut head) = self.head.lock() else { return };
         let ring = self.shared.ring();
@@ -89,6 +90,7 @@ fn at(ring: &[AtomicU64], count: u64) -> &AtomicU64 {
     &ring[(count % ring.len() as u64) as usize]
 }
 
+/// Returns the first `length` bytes of a text, which may end within a character.
 fn clip(text: &str, length: usize) -> &[u8] {
     &text.as_bytes()[..text.len().min(length)]
 }
@@ -148,10 +150,13 @@ impl Visit for Message {
     }
 }
 
-/// Limits the number of messages that an FMU may log.
+/// Limits the number of messages that an FMU may log in a [`WINDOW`], and the number of their bytes in total.
 struct Quota {
+    /// Start of the window.
     since: Instant,
+    /// Number of messages logged in the window.
     messages: u32,
+    /// Number of bytes logged in total.
     bytes: usize,
     /// Number of lost messages that has not been reported.
     lost: u64,
@@ -186,6 +191,7 @@ impl Quota {
         }
     }
 
+    /// Logs the number of lost messages, if any.
     fn report_lost(&mut self, instance: &str) {
         let count = std::mem::take(&mut self.lost);
         if count > 0 {
@@ -206,9 +212,10 @@ pub(super) struct Inbox {
     instance: String,
     /// Number of words read.
     tail: u64,
+    /// Number of dropped messages that are counted as lost.
     dropped: u64,
     quota: Quota,
-    /// The last messages since the last [`Inbox::take`].
+    /// The last messages, at most [`KEPT`], since the last [`Inbox::take`] or [`Inbox::clear`].
     recent: VecDeque<String>,
 }
 
@@ -225,7 +232,7 @@ impl Inbox {
         instance.clone_into(&mut self.instance);
     }
 
-    /// Logs all messages in the ring.
+    /// Logs the messages in the ring within the quota, and removes all of them.
     #[inline]
     pub(super) fn drain(&mut self, shared: &Shared) {
         if shared.log_head().load(Ordering::Acquire) != self.tail

@@ -13,7 +13,7 @@ use slave::{CallError, Failure};
 /// Maximum number of bytes of one text in an error.
 const TEXT: usize = 8192;
 
-/// A request to a worker. Commands of every step are no requests: see `words`.
+/// A request to a worker. The commands that run in every step are not encoded as requests: see `words`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request<'a> {
     /// Loads the FMU and creates an instance. The answer is an [`Opening`].
@@ -48,13 +48,13 @@ pub(super) enum Request<'a> {
     RestoreState(usize),
     SerializeState,
     DeserializeState(&'a [u8]),
-    /// Whether a step ends at the first event.
+    /// Hands the events over to the master; true if a step ends at the first event.
     HandOverEvents(bool),
     NextEvent,
     EnterEventMode,
     UpdateDiscreteStates,
     LeaveEventMode,
-    /// What the FMU has changed in the process.
+    /// Asks what the FMU has changed in the process.
     ProcessChanges,
     Free,
 }
@@ -128,7 +128,7 @@ enum RemoteFailure {
     InvalidAnswer(String),
 }
 
-/// Returns the first [`TEXT`] bytes of `text`.
+/// Returns the first [`TEXT`] bytes of `text`; a character that is cut becomes U+FFFD.
 fn clipped(text: &str) -> String {
     String::from_utf8_lossy(&text.as_bytes()[..text.len().min(TEXT)]).into_owned()
 }

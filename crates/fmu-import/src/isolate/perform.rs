@@ -31,7 +31,7 @@ pub(super) type CommandResult = Option<Result<(), CallError>>;
 /// An instance and the buffers of its calls, kept so that a step does not allocate.
 pub(super) struct Executor {
     instance: Box<dyn Slave>,
-    /// What creates another instance like this one.
+    /// Creates another instance of the same kind.
     pub(super) maker: Maker,
     references: Vec<u32>,
     reals: Vec<f64>,
@@ -71,7 +71,7 @@ impl Maker {
     }
 }
 
-/// The arguments and results of [`Slave::advance`].
+/// The arguments and results of a step, as in [`Slave::advance`].
 #[derive(Default)]
 struct Step {
     time: f64,
@@ -206,17 +206,18 @@ impl Executor {
     }
 }
 
-/// Returns the events of an instance that has handed them over.
+/// Returns the interface for the events of an instance; an error if it has none.
 fn events(instance: &mut dyn Slave) -> Result<&mut dyn Events, CallError> {
     instance.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
 
-/// Encodes an answer.
+/// Encodes a result or an error as the answer to a request.
 pub(super) fn reply(result: Result<impl Serialize, CallError>, answer: &mut Vec<u8>) {
     encode(&result.map_err(RemoteError::from), answer);
 }
 
 impl Step {
+    /// Reads the arguments, steps, and writes the results; `None` if the arguments are invalid.
     fn advance(
         &mut self,
         instance: &mut dyn Slave,
@@ -285,6 +286,7 @@ impl Step {
     }
 }
 
+/// Reads references, gets the values of these variables by `call`, and writes them.
 fn get<T: Word + Default>(
     reader: &mut Reader<'_>,
     writer: &mut Writer<'_>,
@@ -298,6 +300,7 @@ fn get<T: Word + Default>(
     Some(call(references, values).map(|()| writer.put_all(values)))
 }
 
+/// Reads references and values, and sets these variables by `call`.
 fn set<T: Word>(
     reader: &mut Reader<'_>,
     writer: &mut Writer<'_>,

@@ -71,7 +71,7 @@ impl<'a> Writer<'a> {
         self.position = self.position.saturating_add(1);
     }
 
-    /// Writes the values without their number.
+    /// Writes the values without their number; none of them if not all fit.
     #[inline]
     pub(super) fn put_all<T: Word>(&mut self, values: &[T]) {
         let end = self.position.saturating_add(values.len());
@@ -99,8 +99,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads values from an area from its start. All methods return `None` if the area ends or a word is
-/// invalid.
+/// Reads values from an area from its start. All methods return `None` if the area is too short or a word is invalid.
 pub(super) struct Reader<'a> {
     words: &'a [AtomicU64],
     position: usize,
@@ -126,7 +125,7 @@ impl<'a> Reader<'a> {
         T::from_word(word.load(Ordering::Relaxed))
     }
 
-    /// Fills `values`.
+    /// Reads as many values as `values` has, without their number.
     #[inline]
     pub(super) fn take_all<T: Word>(&mut self, values: &mut [T]) -> Option<()> {
         let words = self.next(values.len())?;

@@ -42,13 +42,13 @@ const NO_INTEGRATOR: &str = "this program cannot integrate model-exchange FMUs i
 /// Bytes of memory kept for the next request and for its answer.
 const BUFFER: usize = 1 << 16;
 
-/// Runs this process as a worker of the master that started it. Returns when the master frees the
-/// instance or ends. Standard output is redirected to standard error.
+/// Runs this process as a worker of the master that started it. Returns when the master frees the instance or closes
+/// the connection; if the master ends, the process is killed. Standard output is redirected to standard error.
 ///
 /// # Errors
 ///
-/// [`WorkerError::Alone`] if no master started this process; [`WorkerError::Corrupted`] if the FMU
-/// overwrote the shared memory.
+/// [`WorkerError::Alone`] if no master started this process, or if it cannot set up what a worker needs;
+/// [`WorkerError::Corrupted`] if the FMU overwrote the shared memory.
 pub fn worker() -> Result<(), WorkerError> {
     run(None)
 }
@@ -146,7 +146,7 @@ struct Worker {
     shared: Arc<Shared>,
     integrator: Option<Integrator>,
     executor: Option<Executor>,
-    /// The bytes of the next request that have arrived.
+    /// The bytes of the next request that have arrived so far.
     request: Vec<u8>,
     /// The surroundings before the FMU was loaded.
     before: Surroundings,
@@ -219,7 +219,8 @@ impl Worker {
         self.send_answer();
     }
 
-    /// Loads and instantiates the FMU.
+    /// Loads and instantiates the FMU. Only a memory limit that cannot be set is an error; other failures are in the
+    /// [`Opening`].
     fn open(&mut self, arguments: &Open<'_>) -> Result<Opening, CallError> {
         let Open { folder, name, logging, memory_limit, preload, integration, .. } = arguments;
         let guards = arguments.guard_arrays;
@@ -257,7 +258,7 @@ impl Worker {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
     }
 
-    /// Creates an instance and takes it over.
+    /// Creates an instance, which executes the following requests.
     fn create(&mut self, maker: Maker, name: &str, logging: bool) -> Opening {
         self.record(Function::Instantiate);
         match maker.make(name) {
@@ -278,7 +279,7 @@ impl Worker {
     }
 }
 
-/// Writes the bytes of `answer` from an offset on, as many as fit.
+/// Reads an offset and writes the bytes of `answer` from there on, as many as fit; `None` beyond the end.
 fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
     let offset = usize::try_from(reader.take::<u64>()?).ok()?;
     let rest = answer.get(offset..)?;

@@ -21,7 +21,7 @@ use crate::error::LoadError;
 pub(crate) struct Loaded<F> {
     pub(super) functions: F,
     path: PathBuf,
-    /// An instance returned `fmi2Fatal`: no function of any instance may be called (FMI 2.0.5, section 2.1.3).
+    /// Whether an instance returned `fmi2Fatal`: then no instance may be freed (FMI 2.0.5, section 2.1.3).
     corrupted: AtomicBool,
     _handle: Handle,
 }
@@ -40,8 +40,8 @@ pub(crate) struct Base<F> {
     pub(super) functions: F,
     /// The current function and time of the instance, for crash reports.
     pub(super) place: Arc<Place>,
-    /// Receives messages; the FMU holds its address. FMI 1.0 has no environment: its logger finds it by the thread
-    /// or the name of the instance.
+    /// Receives messages; the FMU holds its address. FMI 1.0 passes no such address: the logger finds the sink by the
+    /// thread or by the name of the instance.
     sink: Arc<Sink>,
     /// The callbacks of FMI 2.0; the FMU holds their address.
     pub(super) callbacks: Option<Arc<fmi2CallbackFunctions>>,
@@ -99,7 +99,7 @@ impl<F: Copy> Base<F> {
     }
 
     /// Returns whether the instance may be freed. Otherwise it may still use the library, the callbacks and the
-    /// sink: they are leaked.
+    /// sink: they are leaked. If a call of the instance has not returned, ends the process.
     pub(super) fn may_be_freed(&self) -> bool {
         crash::check_returned(&self.place);
         let is_lost = self.abandoned || self.library.corrupted.load(Ordering::Relaxed);
@@ -127,13 +127,13 @@ impl<F: Copy> Base<F> {
         }
     }
 
-    /// Marks the call as returned and converts its status to a result.
+    /// Marks the call as returned, logs its status and converts it to a result.
     #[inline]
     pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), CallError> {
         self.check_results(function, status, String::new)
     }
 
-    /// As [`Base::check`], for a call with results, which are logged.
+    /// Like [`Base::check`], and logs the status and the results of the call.
     #[inline]
     pub(super) fn check_results(
         &self,
@@ -151,7 +151,7 @@ impl<F: Copy> Base<F> {
         self.check_status(function, status)
     }
 
-    /// As [`Base::check_results`], for a call that may have been guarded.
+    /// Like [`Base::check_results`], for a call with guards: what it did beside its arrays is an error.
     #[inline]
     pub(super) fn check_guarded(
         &self,
@@ -166,7 +166,7 @@ impl<F: Copy> Base<F> {
         }
     }
 
-    /// As [`Base::check`], for a call that is not logged.
+    /// Like [`Base::check`], for a call that is not logged.
     #[inline]
     pub(super) fn check_status(
         &self,
@@ -204,7 +204,7 @@ impl<F: Copy> Base<F> {
         self.warned.take()
     }
 
-    /// Returns the error of a call, with the instance's recent messages.
+    /// Returns the error of a call, with the instance's recent messages, and notes it for a crash report.
     #[cold]
     pub(super) fn failed(&self, function: &'static str, failure: Failure) -> CallError {
         self.place.note_failure(CallError { function, failure, messages: self.sink.take() })

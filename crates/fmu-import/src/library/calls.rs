@@ -6,8 +6,8 @@ use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 use super::{Component, c_string, canary, copy_strings};
 use slave::{CallError, CompletedStep, EventInfo, absent};
 
-/// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
-/// if the library lacks it. `Base::check` marks its return.
+/// Evaluates to the C function in `$field` and marks it as entered. If the library lacks the function, the caller of
+/// the macro returns an error. `Base::check` marks the return.
 macro_rules! function {
     ($self:ident.$field:ident, $name:expr) => {
         match $self.base.functions.$field {
@@ -24,8 +24,8 @@ pub(super) use function;
 /// The end of the documentation of a call.
 macro_rules! errors {
     () => {
-        "\n\n# Errors\n\n[`CallError`] if the library lacks the function, or if its status is neither OK nor a \
-         warning."
+        "\n\n# Errors\n\n[`CallError`] if the library lacks the function, if its status is neither OK nor a \
+         warning, or if it writes beside a guarded array."
     };
 }
 pub(super) use errors;
@@ -94,7 +94,7 @@ macro_rules! values {
 }
 pub(super) use values;
 
-/// Defines the methods for Strings, as `values` does.
+/// Defines the methods for Strings, with the parameters of `values`.
 macro_rules! strings {
     (
         $visibility:vis fn $get:ident, $set:ident =
@@ -195,7 +195,8 @@ macro_rules! derivatives {
 }
 pub(super) use derivatives;
 
-/// Defines the methods of model exchange for time, states and what is a vector of them.
+/// Defines the methods of model exchange that set the time or the states, or get a vector: states, derivatives, nominal
+/// values, event indicators.
 macro_rules! equations {
     (
         $time_visibility:vis fn set_time = $set_time:literal;
@@ -276,7 +277,7 @@ equations! {
     pub fn get_event_indicators = "fmi2GetEventIndicators";
 }
 
-/// Returns the common length of both slices.
+/// Returns the common length of both slices; panics if they differ.
 #[inline]
 pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     assert_eq!(references.len(), values.len(), "references and values are equally many");

@@ -1,7 +1,7 @@
 //! Canaries: copies of the arrays that an FMU gets, with a pattern before and after each.
 //!
-//! An FMU that writes past an array, or into a constant one, changes memory of the program, unseen. With
-//! guards a call gets copies, which are compared after it; without, it gets the arrays themselves.
+//! An FMU that writes past an array, or into a constant one, changes memory of the program without an error. With
+//! guards a call gets copies, which are compared after it; without guards it gets the arrays themselves.
 #![expect(unsafe_code, reason = "arrays as bytes")]
 
 use std::ffi::c_int;
@@ -17,7 +17,7 @@ const MOST_BYTES: usize = 1 << 30;
 /// Largest number of states or event indicators, as a protection against wrong numbers.
 const MOST_NUMBERS: usize = 1 << 20;
 
-/// What arrays are called in a message.
+/// Names of arrays in messages.
 pub(super) const REFERENCES: &str = "value references";
 pub(super) const ORDERS: &str = "orders";
 pub(super) const SEED: &str = "seed values";
@@ -60,17 +60,17 @@ impl<T: Plain> Fence<T> {
         Self { memory, what }
     }
 
-    /// The array of the call.
+    /// Returns the pointer that the call gets.
     fn start(&mut self) -> *mut T {
         self.memory[MARGIN..].as_mut_ptr()
     }
 
-    /// The values after the call.
+    /// Returns the values after the call.
     fn values(&self) -> &[T] {
         &self.memory[MARGIN..self.memory.len() - MARGIN]
     }
 
-    /// What the call did beside the array.
+    /// Returns what the call wrote beside the array; `None` for nothing.
     fn escaped(&self) -> Option<String> {
         let is_clean = |part: &[T]| bytes(part).iter().all(|byte| *byte == PATTERN);
         let end = self.memory.len() - MARGIN;
@@ -82,7 +82,7 @@ impl<T: Plain> Fence<T> {
         Some(format!("wrote {place} of its array of {}", self.what))
     }
 
-    /// What the call did to the array, whose values are constant.
+    /// Returns what the call changed in the array, whose values are constant, or beside it; `None` for nothing.
     fn changed(&self, values: &[T]) -> Option<String> {
         let is_same = bytes(self.values()) == bytes(values);
         let changed = (!is_same).then(|| format!("changed its constant array of {}", self.what));
@@ -95,7 +95,7 @@ fn bytes<T: Plain>(values: &[T]) -> &[u8] {
     unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
 }
 
-/// Makes a call with one more array, which it fills.
+/// Makes a call with an array that it fills, besides the arrays that `call` has already.
 #[inline]
 pub(super) fn filled<T: Plain>(
     guards: bool,
@@ -112,7 +112,7 @@ pub(super) fn filled<T: Plain>(
     (status, violation.or_else(|| array.escaped()))
 }
 
-/// Makes a call with one more array, which is constant.
+/// Makes a call with a constant array, besides the arrays that `call` has already.
 #[inline]
 pub(super) fn constant<T: Plain>(
     guards: bool,
@@ -146,7 +146,7 @@ pub(super) fn constants(
     (status, violation.or_else(changed))
 }
 
-/// Makes a call that reads variables.
+/// Makes a call that reads variables: with constant references, and values that it fills.
 #[inline]
 pub(super) fn read<T: Plain>(
     guards: bool,
@@ -157,7 +157,7 @@ pub(super) fn read<T: Plain>(
     constant(guards, REFERENCES, references, |list| fill(guards, values, |array| call(list, array)))
 }
 
-/// Makes a call that sets variables.
+/// Makes a call that sets variables: with constant references and constant values.
 #[inline]
 pub(super) fn write<T: Plain>(
     guards: bool,
@@ -168,7 +168,7 @@ pub(super) fn write<T: Plain>(
     constant(guards, REFERENCES, references, |list| send(guards, values, |array| call(list, array)))
 }
 
-/// Makes a call that fills an array.
+/// Makes a call that fills an array of values.
 #[inline]
 pub(super) fn fill<T: Plain>(
     guards: bool,
@@ -178,7 +178,7 @@ pub(super) fn fill<T: Plain>(
     filled(guards, VALUES, values, |array| (call(array), None))
 }
 
-/// Makes a call with a constant array.
+/// Makes a call with a constant array of values.
 #[inline]
 pub(super) fn send<T: Plain>(
     guards: bool,
@@ -188,7 +188,7 @@ pub(super) fn send<T: Plain>(
     constant(guards, VALUES, values, |array| (call(array), None))
 }
 
-/// Returns `size` zero bytes for a state of the size that the FMU states.
+/// Returns `size` zero bytes for a state of the size that the FMU states; an error if this is too large.
 pub(super) fn bytes_of_state(size: usize) -> Result<Vec<u8>, Failure> {
     check_size(size, "state")?;
     let mut bytes = Vec::new();

@@ -39,7 +39,8 @@ pub(crate) struct Loading<'a> {
 }
 
 impl Loading<'_> {
-    /// Loads the library. If it lacks symbols of Python, loads the library of Python first.
+    /// Loads the library. If it lacks a symbol of Python, loads the library of Python and tries again. If it lacks
+    /// another function, loads it with a warning where [`Binding::Lenient`] allows this.
     pub(super) fn load(&self) -> Result<Handle, LoadError> {
         let place = Place::new(self.fmu);
         let open = || {
@@ -79,7 +80,8 @@ impl Loading<'_> {
         }
     }
 
-    /// Opens a library that lacks the function `symbol`, and warns; `None` if it is refused.
+    /// Opens a library that lacks the function `symbol`, and warns; `None` if the binding is strict, if the system
+    /// refuses the library, or if another library of the FMU lacks the function.
     #[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
     fn open_leniently(&self, symbol: &str) -> Option<Library> {
         use libloading::os::unix::{Library, RTLD_LAZY, RTLD_LOCAL};
@@ -111,7 +113,7 @@ impl Loading<'_> {
     }
 }
 
-/// Returns the symbol that a message of the dynamic linker names as undefined.
+/// Returns the symbol that a message of the dynamic linker names as undefined, if any.
 fn undefined(message: &str) -> Option<&str> {
     let symbol = message.split("undefined symbol: ").nth(1)?;
     symbol.split([' ', ',']).next()
@@ -147,7 +149,7 @@ impl Drop for Handle {
     }
 }
 
-/// Returns the message of the operating system.
+/// Returns the message of the operating system, without that of `libloading` before it.
 fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }

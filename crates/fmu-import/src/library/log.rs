@@ -49,7 +49,7 @@ impl Sink {
         messages.map(Vec::from).unwrap_or_default()
     }
 
-    /// Logs a message and keeps it for the next error.
+    /// Logs a message, with names in place of value references, and keeps it for the next error.
     pub(super) fn receive(&self, status: c_int, category: &str, text: &str) {
         let text = match &self.names {
             Some(names) => with_names(text, &**names),
@@ -77,8 +77,8 @@ fn log_message(instance: &str, time: Option<f64>, status: c_int, category: &str,
     }
 }
 
-/// Replaces `#r12#` by the name of the variable and `##` by `#` (FMI 2.0.5, section 2.1.5). Other
-/// text with a `#` is not changed.
+/// Replaces `#r12#` by the name of the variable and `##` by `#` (FMI 2.0.5, section 2.1.5). A reference
+/// without a name and other text with a `#` are not changed.
 fn with_names(text: &str, name: &dyn Fn(char, u32) -> Option<String>) -> String {
     let mut done = String::with_capacity(text.len());
     let mut rest = text;

@@ -24,13 +24,13 @@ for folder in folders:
             print(path)
 "#;
 
-/// Returns whether Python defines a symbol of this name.
+/// Returns whether the name of a symbol is one of Python's.
 pub(super) fn defines(symbol: &str) -> bool {
     symbol.trim_start_matches('_').starts_with("Py")
 }
 
-/// Loads the library of Python, visible to all libraries loaded later, and says which; returns why it
-/// cannot be loaded.
+/// Loads the library of Python, visible to all libraries loaded later, and warns which one. On failure returns why none
+/// can be loaded.
 pub(super) fn provide(fmu: &str) -> Result<(), String> {
     if is_visible() {
         return Err("the Python in the process lacks it".to_owned());

@@ -87,6 +87,7 @@ macro_rules! states {
                 bytes
             }
 
+            /// Serializes `state`; an error if the FMU states too large a size.
             fn serialized(&mut self, state: *mut c_void) -> Result<Vec<u8>, CallError> {
                 let mut size = 0;
                 let function = function!(self.serialized_state_size, $size);

@@ -49,8 +49,8 @@ impl Component {
     ///
     /// # Errors
     ///
-    /// [`CallError`] if the library lacks a function, if a call or the step fails, or if the step exceeds
-    /// the time limit.
+    /// [`CallError`] if the library lacks a function, if a call or the step fails, if the step exceeds the time limit,
+    /// or if the FMU reports an impossible time for a discarded step.
     #[inline]
     pub fn pass(
         &mut self,
@@ -118,6 +118,7 @@ impl Component {
         Ok(done)
     }
 
+    /// Calls `fmi2GetBooleanStatus` for `fmi2Terminated`.
     fn terminated(&mut self) -> Result<bool, CallError> {
         const NAME: &str = "fmi2GetBooleanStatus";
         let mut value = 0;
@@ -129,14 +130,14 @@ impl Component {
         Ok(value != 0)
     }
 
-    /// Returns whether the FMU requests the end of the simulation, as far as it says so.
+    /// Returns whether the FMU requests the end of the simulation; false if it does not answer this question.
     fn is_terminated(&mut self) -> bool {
         self.terminated().unwrap_or(false)
     }
 }
 
-/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. `terminated` asks the instance whether it
-/// requests the end of the simulation.
+/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. The function `terminated` returns whether the
+/// instance requests the end of the simulation.
 macro_rules! finish_step {
     (
         do_step = $do_step:literal, discard = $discard:literal;
@@ -146,8 +147,8 @@ macro_rules! finish_step {
         terminated = $terminated:path;
     ) => {
         impl Component {
-            /// Evaluates a step whose status is neither OK nor a warning: waits while it is pending, and asks for the
-            /// time reached if it was discarded.
+            /// Evaluates a step whose status is not OK: waits while it is pending, up to the time limit, and asks for
+            /// the time reached if it was discarded.
             #[cold]
             fn finish_step(
                 &mut self,
@@ -186,7 +187,8 @@ macro_rules! finish_step {
                 Ok(StepResult::Part { reached, terminated })
             }
 
-            /// Cancels the step. The instance may be freed only if this succeeds (FMI 2.0.5, section 4.2.4).
+            /// Cancels the step. The instance may be freed only if this succeeds (FMI 2.0.5, section 4.2.4);
+            /// otherwise it is abandoned.
             fn cancel(&mut self) {
                 self.base.place.enter(&$cancel);
                 let pointer = self.base.pointer;
@@ -196,6 +198,7 @@ macro_rules! finish_step {
                 self.base.abandoned = status != Some(Status::OK as c_int);
             }
 
+            /// Asks for the status of a pending step.
             fn status(&mut self) -> Result<c_int, CallError> {
                 let mut value = 0;
                 let function = function!(self.get_status, $get_status);
@@ -206,6 +209,7 @@ macro_rules! finish_step {
                 Ok(value)
             }
 
+            /// Asks for the time in s that a discarded step has reached.
             fn last_successful_time(&mut self) -> Result<f64, CallError> {
                 let mut value = f64::NAN;
                 let function = function!(self.get_real_status, $get_real_status);

@@ -9,12 +9,12 @@ use std::hint::black_box;
 /// The surroundings of all libraries of a process.
 pub(crate) struct Surroundings {
     environment: BTreeMap<OsString, OsString>,
-    /// Pairs of what it is and its value.
+    /// The other properties: names and values.
     others: [(&'static str, String); 4],
 }
 
 impl Surroundings {
-    /// Returns those of this process at present.
+    /// Returns the present surroundings of this process.
     pub(crate) fn now() -> Self {
         let folder = std::env::current_dir();
         let folder =

@@ -3,15 +3,15 @@
 /// Declares the function table and its loader.
 macro_rules! functions {
     ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// The functions of a library. The standard requires every function in every library; here a
-        /// missing function fails only when it is called.
+        /// The functions of a library. The standard requires every function in every library. Here a library may lack
+        /// those that [`Functions::require`] does not check: they fail when they are called.
         #[derive(Clone, Copy)]
         pub(crate) struct Functions {
             $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
         }
 
         impl Functions {
-            /// Looks up the functions, whose symbols have the names of the standard after `prefix`.
+            /// Looks up the functions. Their symbols are `prefix` and the name in the standard.
             pub(super) fn load(handle: &libloading::Library, prefix: &str) -> Self {
                 Self { $($field: {
                     // SAFETY: the standard gives this name this signature.
@@ -20,7 +20,7 @@ macro_rules! functions {
                 },)* }
             }
 
-            /// Checks that the library exports the functions `required`, whose symbols have `prefix`.
+            /// Checks that the library at `path` exports the functions `required`. `prefix` is that of their symbols.
             pub(super) fn require(
                 &self,
                 path: &std::path::Path,

@@ -1,8 +1,8 @@
 //! Functions that a library calls and that no library defines.
 //!
-//! The dynamic linker of glibc ends the process by `_exit` when such a function is called, which no
-//! handler sees. Here such functions lead to a function of ours, which aborts: a crash of the FMU,
-//! reported with FMU, function and time.
+//! The dynamic linker of glibc ends the process by `_exit` when such a function is called; no handler runs. Here a
+//! function of this module replaces such functions. It aborts, which is reported as a crash with FMU, function and
+//! time.
 #![expect(unsafe_code, reason = "the tables of the dynamic linker")]
 
 use std::collections::BTreeSet;
@@ -61,8 +61,8 @@ const JUMP_SLOT: u64 = if cfg!(target_arch = "x86_64") { 7 } else { 1026 };
 /// The names of all functions replaced in this process.
 static REPLACED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// Lets the functions that the library calls and that no library defines lead to
-/// [`undefined_function`]; returns their names.
+/// Replaces the functions that the library calls and that no library defines by [`undefined_function`]; returns their
+/// names. Does nothing on processors other than x86-64 and 64-bit ARM.
 ///
 /// # Safety
 ///
@@ -86,7 +86,7 @@ pub(super) unsafe fn replace(handle: *mut c_void) -> Vec<String> {
         }
         ((*at).tag == tag).then(|| (*at).value)
     };
-    // These processors' dynamic linker has replaced addresses in the file by addresses in memory.
+    // The dynamic linker of these processors has replaced addresses in the file by addresses in memory.
     let (Some(table), Some(bytes), Some(DT_RELA)) =
         (entry(DT_JMPREL), entry(DT_PLTRELSZ), entry(DT_PLTREL))
     else {

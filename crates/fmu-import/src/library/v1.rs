@@ -28,7 +28,7 @@ const MIME_TYPE: &CStr = c"application/x-fmu-sharedlibrary";
 pub(crate) type Library = Loaded<Functions>;
 
 impl Library {
-    /// Loads the library and checks its version and that it can run with `interface`.
+    /// Loads the library, and checks its version and that it has the required functions of `interface`.
     pub(crate) fn open(
         loading: &Loading<'_>,
         model_identifier: &str,

@@ -46,19 +46,19 @@ impl Interface {
     }
 }
 
-/// `clockUpdate`: after each model partition its output clocks and intervals are asked for in any case.
+/// `clockUpdate`: does nothing, because the importer asks for output clocks and intervals after each model partition.
 unsafe extern "C" fn clock_update(_environment: *mut c_void) {}
 
-/// `lockPreemption` and `unlockPreemption`: in simulated time, one model partition ends before the next one begins.
+/// `lockPreemption` and `unlockPreemption`: do nothing, because in simulated time model partitions run one by one.
 unsafe extern "C" fn preemption() {}
 
 /// A loaded library with the functions of FMI 3.0.
 pub(crate) type Library = Loaded<Functions>;
 
-/// The arguments of the function that creates an instance that depend on the FMU.
+/// The arguments of the function that creates an instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instantiation<'a> {
-    /// Which of the functions is called.
+    /// Selects the function.
     pub(crate) interface: Interface,
     /// `instanceName`.
     pub(crate) name: &'a str,
@@ -70,12 +70,12 @@ pub(crate) struct Instantiation<'a> {
     pub(crate) event_mode: bool,
     /// `earlyReturnAllowed`.
     pub(crate) early_return: bool,
-    /// The inputs that follow polynomials within a step, if the FMU asks for them.
+    /// `requiredIntermediateVariables`: the inputs that follow polynomials within a step, if the FMU asks for them.
     pub(crate) intermediate: &'a [u32],
 }
 
 impl Library {
-    /// Loads the library and checks its version and that it has the functions of `interface`.
+    /// Loads the library, and checks its version and that it has the required functions of `interface`.
     pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
         let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
@@ -84,7 +84,7 @@ impl Library {
         Ok(Self::new(functions, loading.path, handle))
     }
 
-    /// Calls the C function of `arguments.interface`; null if it fails.
+    /// Calls the C function of `arguments.interface`; returns null if it fails or is missing.
     fn create(&self, arguments: &Instantiation<'_>, sink: &Sink) -> Instance {
         let (name, token) = (c_string(arguments.name), c_string(arguments.token));
         let resources = arguments.resources.map(c_string);
@@ -143,7 +143,7 @@ impl Library {
         created.unwrap_or(std::ptr::null_mut())
     }
 
-    /// Creates an instance.
+    /// Creates an instance; an error with the messages of the FMU if it returns none.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
         arguments: &Instantiation<'_>,

@@ -1,5 +1,5 @@
-//! The functions of model exchange (FMI 1.0 for model exchange, section 3). FMI 1.0 has no modes: `fmiEventUpdate` is an
-//! event as a whole.
+//! The functions of model exchange (FMI 1.0 for model exchange, section 3). FMI 1.0 has no modes: `fmiEventUpdate` is
+//! an event as a whole.
 
 use super::Instance;
 use slave::{CallError, CompletedStep, EventInfo};

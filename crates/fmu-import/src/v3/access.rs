@@ -13,7 +13,7 @@ use super::refusal::{refused, unknown};
 use slave::CallError;
 
 impl Instance {
-    /// Performs `action` for the runs of the plan of a list.
+    /// Performs `action` for the runs of the plan of a list; an error if no variable has one of the references.
     fn for_runs(
         &mut self,
         function: &'static str,
@@ -28,7 +28,7 @@ impl Instance {
         done
     }
 
-    /// Reads numbers; `convert` takes one out of a buffer.
+    /// Reads numbers. `convert` returns one number of a buffer; `None` is an error.
     pub(super) fn read<T>(
         &mut self,
         function: &'static str,
@@ -59,7 +59,7 @@ impl Instance {
         })
     }
 
-    /// Passes numbers; `put` stores one in a buffer.
+    /// Passes numbers. `put` stores one number in a buffer; `None` is an error.
     pub(super) fn write<T: Copy + std::fmt::Debug>(
         &mut self,
         function: &'static str,
@@ -160,8 +160,9 @@ impl Instance {
         })
     }
 
-    /// Prepares to set variables: enters Event Mode if they may change there only and one of them
-    /// changes. Returns whether they must be set.
+    /// Returns whether variables must be passed to the FMU. If they may change in Event Mode only and one of them
+    /// changes, enters Event Mode. `bits` returns the bits of the value at a place, which are compared with those set
+    /// last.
     fn may_set(
         &mut self,
         event: bool,

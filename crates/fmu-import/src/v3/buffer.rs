@@ -7,10 +7,13 @@ use slave::CallError;
 
 /// A number of the C interface.
 trait Number: Copy + Default + PartialEq {
+    /// NaN for an integer beyond 64 bits with a sign.
     fn to_real(self) -> f64;
-    /// `None` if a number cannot be represented.
+    /// `None` if the type is no floating-point type or the number is beyond its range.
     fn from_real(value: f64) -> Option<Self>;
+    /// `None` for a floating-point type and beyond 64 bits with a sign.
     fn to_integer(self) -> Option<i64>;
+    /// `None` beyond the range of the type.
     fn from_integer(value: i64) -> Option<Self>;
     /// Returns bits that are equal for equal values only.
     fn bits(self) -> u64;
@@ -130,7 +133,7 @@ macro_rules! buffer {
                 }
             }
 
-            /// Reads all values from the FMU.
+            /// Reads all values from the FMU; none if they are no numbers.
             pub(super) fn get(
                 &mut self,
                 component: &mut Component,
@@ -142,7 +145,7 @@ macro_rules! buffer {
                 }
             }
 
-            /// Passes all values to the FMU.
+            /// Passes all values to the FMU; none if they are no numbers.
             pub(super) fn set(
                 &self,
                 component: &mut Component,
@@ -154,7 +157,7 @@ macro_rules! buffer {
                 }
             }
 
-            /// Returns value number `position` as a Real.
+            /// Returns value number `position` as a Real; `None` if the values are no numbers.
             pub(super) fn real(&self, position: usize) -> Option<f64> {
                 match self {
                     $(Buffer::$variant(values) => Some(values[position].to_real()),)*
@@ -171,7 +174,8 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns value number `position` as an Integer; `None` beyond 64 bits.
+            /// Returns value number `position` as an Integer; `None` if it is no integer, or beyond 64 bits with a
+            /// sign.
             pub(super) fn integer(&self, position: usize) -> Option<i64> {
                 match self {
                     $(Buffer::$variant(values) => values[position].to_integer(),)*
@@ -188,7 +192,7 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns bits that are equal for equal values only.
+            /// Returns bits of value number `position` that are equal for equal values only; 0 if it is no number.
             pub(super) fn bits(&self, position: usize) -> u64 {
                 match self {
                     $(Buffer::$variant(values) => values[position].bits(),)*

@@ -1,6 +1,6 @@
 //! Clocked variables. The FMU has their values only while one of their clocks ticks, in Event Mode, and in
-//! Initialization Mode (FMI 3.0.2, section 2.2.6): the slave remembers the outputs and locals of the last tick for
-//! who reads them later, and the inputs for the next tick.
+//! Initialization Mode (FMI 3.0.2, section 2.2.6). The slave remembers the outputs and locals of the last tick for
+//! later reads, and the inputs for the next tick.
 
 use std::collections::BTreeMap;
 
@@ -23,12 +23,13 @@ pub(super) enum ElementValue {
     Bytes(Vec<u8>),
 }
 
-/// The values by the position of the element among those that may change in Event Mode only.
+/// Remembered values, by the position of the element among those that may change in Event Mode only.
 pub(super) type Memory = BTreeMap<usize, ElementValue>;
 
-/// A value of a variable of type String or Binary.
+/// A value of type String or Binary.
 pub(super) trait TextOrBytes: Clone + Default {
     fn to_value(&self) -> ElementValue;
+    /// `None` if the value has another type.
     fn from_value(value: &ElementValue) -> Option<&Self>;
     /// Reads the values of whole variables.
     fn get(component: &mut Component, list: &[u32], values: &mut [Self]) -> Result<(), CallError>;
@@ -88,7 +89,8 @@ impl ClockedRuns {
 }
 
 impl Instance {
-    /// Whether the variables of a run may be neither read nor set now: they are clocked, and none of their clocks ticks.
+    /// Returns whether the variables of a run can be neither read nor set now: the initialization has ended, they are
+    /// clocked, and none of their clocks ticks. In scheduled execution they always can.
     pub(super) fn is_silent(&self, run: &Run) -> bool {
         let is_clocked = !run.clocks.is_empty() && !self.is_scheduled();
         let ticks = || self.state.mode == Mode::Event && self.state.clocks.is_active(&run.clocks);
@@ -130,7 +132,7 @@ impl Instance {
         run.shadows.iter().map(value).collect()
     }
 
-    /// Remembers the clocked outputs and locals of the clocks that tick.
+    /// Reads and remembers the clocked outputs and locals whose clocks tick.
     pub(super) fn read_clocked(&mut self) -> Result<(), CallError> {
         if self.clocked.others.is_empty() || !self.state.clocks.any_active() {
             return Ok(());
@@ -162,7 +164,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Passes the values that were set last to the clocked inputs of `clocks`, which have started to tick.
+    /// Passes the values that were set last to the clocked inputs of `clocks`, which have started to tick. Inputs that
+    /// were never set are left as they are.
     pub(super) fn set_clocked(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         let mut runs = std::mem::take(&mut self.clocked.inputs);
         let done = runs.iter_mut().try_for_each(|run| {

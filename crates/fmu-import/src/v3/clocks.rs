@@ -13,27 +13,29 @@ use super::refusal::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// Part of an interval below which a difference of times is rounding.
+/// A difference of times below this fraction of the interval, or of the time, is rounding.
 const ROUNDING: f64 = 1e-9;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
-/// An input clock that ticks at times.
+/// An input clock that ticks at known times.
 #[derive(Clone, Debug, Default)]
 struct TimedClock {
     reference: u32,
     attributes: ClockType,
-    /// Interval and time of the first tick in s, and number of ticks so far, if it is periodic.
+    /// Interval in s, if the clock is periodic.
     interval: f64,
     /// The interval as numerator and denominator, so that many ticks do not drift.
     fraction: Option<(u64, u64)>,
+    /// Time of the first tick in s, if the clock is periodic.
     first: f64,
+    /// Number of ticks since `first`.
     ticks: u64,
     /// Time of the next tick in s, if it is known.
     next: Option<f64>,
 }
 
-/// What a serialised state has of the clocks.
+/// The state of all clocks in a serialised state.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ClocksState {
     timed: Vec<TimedState>,
@@ -41,7 +43,7 @@ pub(super) struct ClocksState {
     ticked: Vec<u32>,
 }
 
-/// What a serialised state has of a clock that ticks at times.
+/// The state of a [`TimedClock`] in a serialised state.
 #[derive(Serialize, Deserialize)]
 struct TimedState {
     interval: f64,
@@ -61,18 +63,19 @@ pub(super) struct Clocks {
     active: Vec<u32>,
     /// The input clocks whose model partitions have to run.
     partitions: Vec<u32>,
-    /// The priorities of the input clocks.
+    /// The priorities of the clocks; the smallest number is the highest priority.
     priorities: HashMap<u32, i64>,
     /// The input clocks that ticked in the present event.
     event_ticks: Vec<u32>,
-    /// The clocks that ticked in the last step.
+    /// Whether each clock ticked in the last step.
     ticked: HashMap<u32, bool>,
     /// Triggered input clocks that tick at the start of the next step.
     requested: Vec<u32>,
+    /// Buffer for the values of the output clocks.
     flags: Vec<u8>,
 }
 
-/// Returns the value of a time stated in s or as a counter.
+/// Returns a time that is stated in s or as a counter with its resolution; `None` if it is not stated.
 fn seconds(decimal: Option<f64>, counter: Option<u64>, resolution: Option<u64>) -> Option<f64> {
     #[expect(clippy::cast_precision_loss, reason = "the nearest number")]
     let fraction = |(counter, resolution): (u64, u64)| counter as f64 / resolution as f64;
@@ -88,7 +91,7 @@ fn fraction(decimal: f64) -> Option<(u64, u64)> {
 }
 
 impl TimedClock {
-    /// Returns the time of the tick number `ticks`, the first one being 0: rounded once.
+    /// Returns the time in s of the tick number `ticks`, from 0. The rounding does not grow with the number.
     #[expect(clippy::cast_precision_loss, reason = "the nearest number")]
     fn tick(&self, ticks: u64) -> f64 {
         let elapsed = match self.fraction {
@@ -143,7 +146,8 @@ impl Clocks {
         clocks
     }
 
-    /// Determines the first ticks, in Initialization Mode.
+    /// Determines the first ticks, in Initialization Mode: asks the FMU for intervals and shifts that its description
+    /// does not state. An interval that is not positive or a negative shift of a periodic clock is an error.
     pub(super) fn start(&mut self, component: &mut Component, start: f64) -> Result<(), CallError> {
         for clock in &mut self.timed {
             let attributes = &clock.attributes;
@@ -198,17 +202,18 @@ impl Clocks {
         }
     }
 
-    /// Returns the time of the next tick in s.
+    /// Returns the time of the next tick in s, if one is known.
     pub(super) fn next(&self) -> Option<f64> {
         self.timed.iter().filter_map(|clock| clock.next).reduce(f64::min)
     }
 
-    /// Whether a clock ticks at `time`, or is requested to tick.
+    /// Returns whether a clock has to tick at `time`, or is requested to tick.
     pub(super) fn is_due(&self, time: f64) -> bool {
         !self.requested.is_empty() || self.timed.iter().any(|clock| clock.is_due(time))
     }
 
-    /// Moves the clocks that are due at `time` to their next ticks; returns their value references.
+    /// Moves the clocks that are due at `time` to their next ticks; returns their value references, after those of the
+    /// requested clocks.
     fn take_due(&mut self, time: f64) -> Vec<u32> {
         let mut due = std::mem::take(&mut self.requested);
         for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time)) {
@@ -237,8 +242,7 @@ impl Clocks {
         self.event_ticks.clear();
     }
 
-    /// Returns the clocks whose model partitions have to run, the one of the highest priority first: the smallest
-    /// number.
+    /// Returns and removes the clocks whose model partitions have to run, the highest priority first.
     pub(super) fn take_partitions(&mut self) -> Vec<u32> {
         let mut due = std::mem::take(&mut self.partitions);
         due.sort_by_key(|clock| self.priorities.get(clock).copied());
@@ -270,7 +274,7 @@ impl Clocks {
         Ok(())
     }
 
-    /// Asks for the intervals that an event at `time` may have changed.
+    /// Asks for the intervals that an event at `time`, in s, may have changed, and moves the next ticks.
     pub(super) fn ask_intervals(
         &mut self,
         component: &mut Component,
@@ -302,7 +306,7 @@ impl Clocks {
         Ok(())
     }
 
-    /// Stores in the buffer of a run which clocks tick `now`, or have ticked in the last step.
+    /// Stores in the buffer of a run which clocks tick at present (`now`), or have ticked in the last step.
     fn read(&self, run: &mut Run, now: bool) {
         for (place, reference) in run.references.iter().enumerate() {
             let ticked = || self.ticked.get(reference).copied().unwrap_or(false);
@@ -311,7 +315,7 @@ impl Clocks {
         }
     }
 
-    /// Returns the triggered input clocks of a run whose value is true.
+    /// Returns the clocks of a run whose value is true; an error if one is no triggered input clock.
     fn triggered(&self, function: &'static str, run: &Run) -> Result<Vec<u32>, CallError> {
         let all = run.references.iter().enumerate();
         let set = all.filter(|(place, _)| run.buffer.integer(*place) != Some(0));
@@ -342,7 +346,7 @@ impl Clocks {
         ClocksState { timed: self.timed.iter().map(state).collect(), ticked }
     }
 
-    /// Whether a serialised state can be one of these clocks.
+    /// Returns whether a serialised state fits the number and the references of these clocks.
     pub(super) fn fits(&self, state: &ClocksState) -> bool {
         state.timed.len() == self.timed.len()
             && state.ticked.iter().all(|reference| self.ticked.contains_key(reference))
@@ -374,7 +378,8 @@ impl Instance {
         self.activate(&due)
     }
 
-    /// Makes `clocks` tick in Event Mode: the FMU gets the values of their clocked inputs.
+    /// Makes `clocks` tick in Event Mode, and passes the values of their clocked inputs to the FMU. In scheduled
+    /// execution notes their model partitions to run.
     fn activate(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         if self.is_scheduled() {
             self.state.clocks.partitions.extend(clocks);
@@ -388,8 +393,8 @@ impl Instance {
         if self.is_scheduled() { Ok(()) } else { self.set_clocked(clocks) }
     }
 
-    /// Makes the triggered input clocks of a run tick whose value is true: now if the master handles the events,
-    /// otherwise at the start of the next step.
+    /// Makes those triggered input clocks of a run tick whose value is true: now if the master handles the events and
+    /// the initialization has ended, otherwise at the start of the next step.
     pub(super) fn let_tick(&mut self, function: &'static str, run: &Run) -> Result<(), CallError> {
         let mut clocks = self.state.clocks.triggered(function, run)?;
         if clocks.is_empty() {
@@ -404,7 +409,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Stores in the buffer of a run which clocks tick.
+    /// Stores in the buffer of a run which clocks tick: now in Event Mode if the master handles the events, otherwise
+    /// in the last step.
     pub(super) fn read_clocks(&mut self, run: &mut Run) -> Result<(), CallError> {
         let now = self.hands_over_events && self.state.mode == Mode::Event;
         if now {

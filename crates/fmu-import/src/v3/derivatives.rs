@@ -6,15 +6,18 @@ use super::Instance;
 use super::refusal::unknown;
 use slave::CallError;
 
-/// Variables of the FMU, and where the values of a list are among the values of a call.
+/// The whole variables to which the elements of a list belong.
 struct Whole {
+    /// Value references of the variables, in the FMU.
     references: Vec<u32>,
+    /// Number of all elements of the variables.
     count: usize,
+    /// Position of each value of the list among these elements.
     places: Vec<usize>,
 }
 
 impl Instance {
-    /// Whether the references are those of scalars of the FMU.
+    /// Returns whether all references are value references of scalars in the FMU.
     fn are_scalars(&self, list: &[u32]) -> bool {
         list.iter().all(|reference| {
             let place = self.view.locate(*reference);
@@ -25,7 +28,7 @@ impl Instance {
         })
     }
 
-    /// Returns the whole variables to which the elements of a list belong.
+    /// Returns the whole variables to which the elements of a list belong; an error if no variable has a reference.
     fn whole(&self, function: &'static str, list: &[u32]) -> Result<Whole, CallError> {
         let mut whole = Whole { references: Vec::new(), count: 0, places: Vec::new() };
         let mut known: HashMap<usize, usize> = HashMap::new();
@@ -44,7 +47,8 @@ impl Instance {
         Ok(whole)
     }
 
-    /// Returns `(dh/dv) seed`; the seed of elements that are not in the list is 0.
+    /// Sets `changes` to `(dh/dv) seed` for the unknowns h and the knowns v. The seed of elements of an array that are
+    /// not in `knowns` is 0.
     pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -61,8 +65,8 @@ impl Instance {
         for (place, value) in knowns.places.iter().zip(seed) {
             seeds[*place] += value;
         }
-        let (of, by) = (&unknowns.references, &knowns.references);
-        self.component.directional_derivative(of, by, &seeds, &mut derivatives)?;
+        let (rows, columns) = (&unknowns.references, &knowns.references);
+        self.component.directional_derivative(rows, columns, &seeds, &mut derivatives)?;
         for (change, place) in changes.iter_mut().zip(&unknowns.places) {
             *change = derivatives[*place];
         }
@@ -85,7 +89,7 @@ impl Instance {
         self.component.set_input_derivatives(list, orders, values, time, is_followed)
     }
 
-    /// Returns derivatives of outputs with respect to time.
+    /// Reads derivatives of outputs with respect to time.
     pub(crate) fn get_output_derivatives(
         &mut self,
         list: &[u32],

@@ -13,7 +13,8 @@ use fmu_description::{
 
 /// Largest number of elements of all arrays together.
 const MOST_ELEMENTS: usize = 1 << 24;
-/// Largest number of dependencies between elements; beyond it an unknown depends on all knowns.
+/// Largest number of dependencies between elements of all unknowns together; beyond it the dependencies of an unknown
+/// are not stated.
 const MOST_DEPENDENCIES: usize = 1 << 22;
 
 /// A variable of the FMU: a scalar or an array.
@@ -31,7 +32,7 @@ pub(super) struct Variable {
     pub(super) intermediate: bool,
     /// Value references of the clocks of the variable.
     pub(super) clocks: Vec<u32>,
-    /// Position of its first element among all elements of variables with `event`.
+    /// Position of its first element among all elements of variables with `event`; without meaning without `event`.
     pub(super) shadow: usize,
 }
 
@@ -44,7 +45,7 @@ pub(crate) struct ElementView {
     by_reference: HashMap<u32, usize>,
     /// The value reference of the first cell.
     base: u32,
-    /// Variable and element of each reference from `base` on.
+    /// Positions of variable and element of each reference from `base` on.
     cells: Vec<(usize, usize)>,
     /// Whether all floating-point variables are scalars of type `Float64` without clocks.
     pub(super) plain: bool,
@@ -111,7 +112,8 @@ impl ElementView {
         builder.finish(description)
     }
 
-    /// Returns variable and element of a value reference of [`ElementView::description`].
+    /// Returns the positions of variable and element of a value reference of [`ElementView::description`]; `None` if no
+    /// variable has it.
     pub(super) fn locate(&self, reference: u32) -> Option<(usize, usize)> {
         let virtual_position = reference.wrapping_sub(self.base) as usize;
         match self.cells.get(virtual_position) {
@@ -128,7 +130,7 @@ impl ElementView {
     }
 }
 
-/// Returns the extents of a variable.
+/// Returns the extents of a variable; none for a scalar. `sizes` take precedence over `starts`.
 fn extents(
     variable: &ScalarVariable,
     starts: &HashMap<u32, u64>,
@@ -171,7 +173,7 @@ fn free_references(description: &ModelDescription, count: usize) -> u32 {
     gap.map_or(0, |pair| pair[0] + 1)
 }
 
-/// Returns the indices of element number `position`: `[1,2]`.
+/// Returns the indices of element number `position`, from 0, as text: `[1,2]`.
 fn indices(mut position: usize, extents: &[u64]) -> String {
     let mut text = vec![String::new(); extents.len()];
     for (index, extent) in text.iter_mut().zip(extents).rev() {
@@ -182,7 +184,7 @@ fn indices(mut position: usize, extents: &[u64]) -> String {
     format!("[{}]", text.join(","))
 }
 
-/// Returns `kind` with the start value of one element.
+/// Returns `kind` with the start value number `position`, or without a start value if there is none.
 fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
     macro_rules! start {
         ($variant:ident, $copy:ident) => {
@@ -306,7 +308,7 @@ impl Builder {
         }
     }
 
-    /// Converts the indices between variables.
+    /// Converts the indices between variables. On failure returns the reason: two variables with one name.
     fn finish(mut self, description: &ModelDescription) -> Result<ElementView, String> {
         let mut names = HashSet::new();
         let variables = &self.view.description.variables;
@@ -351,7 +353,8 @@ impl Builder {
         self.ranges.get((index as usize).checked_sub(1)?).copied()
     }
 
-    /// Returns the new 1-based index of an element of the variable with the 1-based index `index`.
+    /// Returns the new 1-based index of an element of the variable with the 1-based index `index`; `None` if the
+    /// variable does not exist or has no elements.
     fn moved(&self, index: u32, element: usize) -> Option<u32> {
         let (start, size) = self.range(index)?;
         if size == 0 {
@@ -361,7 +364,8 @@ impl Builder {
         u32::try_from(start + element.min(size - 1) + 1).ok()
     }
 
-    /// Returns the rows of all elements: each depends on all elements of the dependencies.
+    /// Returns the rows of all elements. Each depends on all elements of the dependencies; beyond [`MOST_DEPENDENCIES`]
+    /// its dependencies are not stated.
     fn rows(&self, rows: &[Unknown]) -> Vec<Unknown> {
         let mut all = Vec::new();
         let mut left = MOST_DEPENDENCIES;

@@ -9,6 +9,7 @@ pub(super) enum Mode {
     Instantiated,
     Initialization,
     Event,
+    /// Step Mode, in model exchange Continuous-Time Mode.
     Step,
 }
 

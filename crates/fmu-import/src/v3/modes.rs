@@ -10,14 +10,14 @@ use slave::{CallError, EventInfo, Events, Failure, StepResult};
 
 /// Largest number of updates of the discrete states in one event.
 const UPDATES: u32 = 1000;
-/// Largest number of parts of a step that make no progress.
+/// Largest number of successive parts of a step that make no progress.
 const STANDSTILLS: u32 = 1000;
 /// Two times are equal if they differ by less than this fraction of the step.
 const ROUNDING: f64 = 1e-9;
-/// Smallest part of a step that is tried after `fmi3Discard`.
+/// After `fmi3Discard` a part of a step is halved if it is larger than this fraction of the step.
 const SMALLEST: f64 = 1e-6;
 
-/// What an instance knows beside the state of its FMU.
+/// The state of the slave, besides the state of the FMU.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
     pub(super) mode: Mode,
@@ -27,9 +27,9 @@ pub(super) struct State {
     pub(super) event: bool,
     /// Whether the FMU has requested the end of the simulation.
     pub(super) terminate: bool,
-    /// Time of the last step or event in s.
+    /// The time reached, in s.
     pub(super) time: f64,
-    /// Values set last of the elements that may change in Event Mode only.
+    /// Bits of the values set last of the elements that may change in Event Mode only; for Strings and binaries a hash.
     pub(super) held: Vec<Option<u64>>,
     /// Values of clocked elements at their last tick, and for their next one.
     pub(super) memory: super::clocked::Memory,
@@ -62,13 +62,14 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the time of the next time event or tick in s.
+    /// Returns the time of the next time event or tick in s, if one is known.
     pub(super) fn next_event_time(&self) -> Option<f64> {
         let events = [self.state.next_event, self.state.clocks.next()];
         events.into_iter().flatten().reduce(f64::min)
     }
 
-    /// Handles the event at the time reached: discrete states are updated until they do not change any more.
+    /// Handles the event at the time reached: updates the discrete states until they do not change any more. More than
+    /// [`UPDATES`] updates are an error.
     pub(super) fn handle_event(&mut self) -> Result<(), CallError> {
         self.enter_event_mode()?;
         let mut updates = 0;
@@ -89,7 +90,7 @@ impl Instance {
         self.leave_event_mode()
     }
 
-    /// Hands the events over to the master; returns whether there are any.
+    /// Hands the events over to the master; returns whether the FMU has Event Mode.
     pub(crate) fn hand_over_events(&mut self, stop: bool) -> bool {
         (self.hands_over_events, self.stops_at_events) = (true, stop);
         self.event_mode
@@ -185,11 +186,11 @@ impl Instance {
         let events = [self.state.next_event, self.state.clocks.next()].into_iter().flatten();
         let sizes = events.map(|event| event - now).filter(|size| *size > rounding);
         let least = sizes.fold(f64::INFINITY, f64::min);
-        // A step that ends shortly before its end would leave a rest that is rounding.
+        // An event shortly before the end counts as one at the end: the rest of the step would only be rounding.
         if least < left - rounding { least } else { left }
     }
 
-    /// Whether an event is due at `time`, in a step of `size` s.
+    /// Returns whether a time event or a tick is due at `time`, in a step of `size` s.
     fn is_event_due(&self, time: f64, size: f64) -> bool {
         self.state.next_event.is_some_and(|next| next <= time + ROUNDING * size)
             || self.state.clocks.is_due(time)

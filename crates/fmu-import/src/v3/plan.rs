@@ -1,4 +1,4 @@
-//! How a list of value references becomes C calls: one for each type.
+//! Plans: the C calls for a list of value references, one for each type, clock and kind of change.
 
 use std::collections::HashMap;
 
@@ -18,8 +18,7 @@ pub(super) struct Plan {
     pub(super) runs: Vec<Run>,
 }
 
-/// One call: variables of one type with the same clocks, all of which may or may not change outside of
-/// events.
+/// One call: variables of one type with the same clocks. Either all of them may change in Event Mode only, or none.
 #[derive(Debug)]
 pub(super) struct Run {
     pub(super) kind: NativeType,
@@ -29,7 +28,7 @@ pub(super) struct Run {
     pub(super) clocks: Vec<u32>,
     /// Value references of whole variables, for the C function.
     pub(super) references: Vec<u32>,
-    /// For each value: position in the list, position among the values of the call.
+    /// For each value of the list: its position in the list, its position among the values of the call.
     pub(super) places: Vec<(usize, usize)>,
     /// For each value of the call, its position among the shadows.
     pub(super) shadows: Vec<usize>,
@@ -93,7 +92,7 @@ fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
 }
 
 impl Run {
-    /// Returns the calls for whole `variables`.
+    /// Returns the calls for whole `variables`, without places in a list.
     pub(super) fn of_whole<'a>(variables: impl IntoIterator<Item = &'a Variable>) -> Vec<Self> {
         let mut runs = Vec::new();
         for variable in variables {
@@ -119,12 +118,13 @@ impl Run {
 #[derive(Debug, Default)]
 pub(super) struct Plans {
     plans: Vec<Plan>,
+    /// Position of the plan that the next new one replaces, if there are [`KEPT`].
     next: usize,
 }
 
 impl Plans {
-    /// Returns the position of the plan for a list. On failure returns the reference that no variable
-    /// has.
+    /// Returns the position of the plan for a list, which may be a new one. On failure returns the reference that no
+    /// variable has.
     pub(super) fn find(&mut self, view: &ElementView, list: &[u32]) -> Result<usize, u32> {
         if let Some(position) = self.plans.iter().position(|plan| plan.references == list) {
             return Ok(position);
@@ -140,7 +140,7 @@ impl Plans {
         Ok(place)
     }
 
-    /// Returns the runs of a plan; [`Plans::put_back`] returns them.
+    /// Removes and returns the runs of a plan. [`Plans::put_back`] stores them again.
     pub(super) fn take(&mut self, plan: usize) -> Vec<Run> {
         std::mem::take(&mut self.plans[plan].runs)
     }

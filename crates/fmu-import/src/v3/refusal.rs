@@ -1,8 +1,8 @@
-//! What an instance refuses by itself.
+//! Errors of calls that the importer refuses without the FMU.
 
 use slave::{CallError, Failure};
 
-/// Returns the error of an access that the FMU cannot be asked for.
+/// Returns the error of a call of `function` that is refused, or whose result is impossible, for the reason `what`.
 #[cold]
 pub(super) fn refused(function: &'static str, what: String) -> CallError {
     CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }

@@ -10,7 +10,7 @@ impl Instance {
         self.interface == Interface::ScheduledExecution
     }
 
-    /// Steps from `time` over `size` s.
+    /// Steps from `time` over `size` s. In scheduled execution the step is complete at once.
     pub(super) fn advance(
         &mut self,
         time: f64,
@@ -25,7 +25,7 @@ impl Instance {
     }
 
     /// Runs the model partitions of the input clocks that tick, in the order of their priorities. The clocks that tick
-    /// in consequence do so until the next call.
+    /// as a result do so until the next call.
     pub(super) fn run_partitions(&mut self) -> Result<EventInfo, CallError> {
         let time = self.state.time;
         for clock in self.state.clocks.take_partitions() {

@@ -1,4 +1,4 @@
-//! FMU states with what the slave knows beside them: mode, next event, clocks, values set last.
+//! FMU states together with the state of the slave: mode, next event, clocks, values set last.
 
 use serde::{Deserialize, Serialize};
 use slave::CallError;
@@ -10,7 +10,7 @@ use super::mode::Mode;
 use super::modes::State;
 use super::refusal::refused;
 
-/// The first bytes of a serialised state.
+/// The first bytes of a serialised state: name and version of its format.
 const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";

@@ -29,18 +29,23 @@ pub(super) struct Inputs {
     pub(super) start: f64,
     /// The last time for which the FMU asked, in s.
     asked_time: Option<f64>,
+    /// The inputs that have had derivatives in this or an earlier step.
     pub(super) references: Vec<u32>,
     /// The values at the start of the step.
     pub(super) values: Vec<f64>,
+    /// The derivatives of order 1 to [`ORDERS`] for this step.
     derivatives: Vec<[f64; ORDERS]>,
+    /// Position of each input in these lists, by value reference.
     index: HashMap<u32, usize>,
+    /// Buffer for the values at a time within the step.
     present: Vec<f64>,
+    /// The instance of the step and its function to set the inputs.
     target: Option<(Instance, SetFloat64)>,
 }
 
 impl Inputs {
-    /// Stores derivatives of the inputs that `is_followed` accepts; on failure returns an order that is not
-    /// supported.
+    /// Stores the derivatives of the inputs that `is_followed` accepts; all others become 0. On failure returns an
+    /// order that is not supported.
     pub(super) fn derive(
         &mut self,
         list: &[u32],
@@ -67,7 +72,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// Runs a part of the step of an instance, during which the FMU may ask for the inputs.
+    /// Runs a part of the step of the instance `target`, which may ask for the inputs meanwhile; returns its status.
     pub(super) fn during(
         &mut self,
         target: (Instance, SetFloat64),
@@ -80,12 +85,13 @@ impl Inputs {
         status
     }
 
-    /// Sets the inputs to their values at `time` unless the FMU has asked for these; returns its status.
+    /// Sets the inputs to their values at `time`, in s. Returns the status of the FMU, or 0 (OK) if the FMU has asked
+    /// for these values last.
     pub(super) fn settle(&mut self, time: f64) -> c_int {
         if self.asked_time == Some(time) { 0 } else { self.apply(time) }
     }
 
-    /// Sets the inputs to their values at `time`; returns the status of the FMU.
+    /// Sets the inputs to their values at `time`, in s; returns the status of the FMU.
     fn apply(&mut self, time: f64) -> c_int {
         let elapsed = time - self.start;
         let all = self.present.iter_mut().zip(&self.values).zip(&self.derivatives);

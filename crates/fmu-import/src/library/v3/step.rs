@@ -56,8 +56,8 @@ impl Component {
         Ok(DoStepResult { event, terminate, early, reached })
     }
 
-    /// Sets the derivatives of the inputs that `is_followed` accepts, for the step from `start` s, at which
-    /// they have their present values.
+    /// Sets the derivatives of the inputs that `is_followed` accepts, for the step from `start` s. Reads the present
+    /// values of these inputs, which are those at `start`. An order beyond [`ORDERS`] is an error.
     pub(crate) fn set_input_derivatives(
         &mut self,
         list: &[u32],
@@ -82,7 +82,7 @@ impl Component {
         read
     }
 
-    /// Sets the inputs whose derivatives are set to their values at `time` in s.
+    /// Passes the values at `time`, in s, of the inputs whose derivatives are set.
     pub(crate) fn settle_inputs(&mut self, time: f64) -> Result<(), CallError> {
         if !self.inputs.is_set {
             return Ok(());
@@ -92,7 +92,7 @@ impl Component {
         self.base.check_status(SET, status)
     }
 
-    /// Forgets the derivatives of the inputs, which are for one step.
+    /// Forgets the derivatives of the inputs: they hold for one step.
     pub(crate) fn forget_input_derivatives(&mut self) {
         self.inputs.is_set = false;
     }

@@ -1,4 +1,4 @@
-//! Get and set: one method for each type. As many values as the elements of all variables together.
+//! Get and set: one method for each type. There are as many values as the elements of all variables together.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use super::super::calls::{function, strings, values};
