@@ -13,7 +13,7 @@ pub(crate) use hamiltonian::Hamiltonian;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 pub(crate) use rank_one::RankOne;
 
-const WHAT: &str = "the QR algorithm for eigenvalues";
+const QR_ALGORITHM: &str = "the QR algorithm for eigenvalues";
 
 /// Largest number of QR iterations per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;
@@ -30,9 +30,9 @@ const LARGE: usize = 48;
 ///
 /// `a`: n x n, finite. Method: diagonal balancing (Parlett and Reinsch 1969), then the QR algorithm
 /// with a bounded number of iterations; about 25 n^3 operations, 10 n^3 from order 48 on, where no
-/// Schur form is computed. The result is exact for a
-/// matrix that differs from the balanced A by a few units of rounding of its norm. Complex
-/// eigenvalues are exact conjugates.
+/// Schur form is computed. If the algorithm fails, its other form is tried, then the Schur form of a
+/// reflected A. The result is exact for a matrix that differs from the balanced A by a few units of
+/// rounding of its norm. Complex eigenvalues are exact conjugates.
 ///
 /// # Example
 ///
@@ -48,36 +48,42 @@ const LARGE: usize = 48;
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `a`; [`Error::NotConverged`]
-/// when the QR algorithm does not end within 100 iterations per row.
+/// when no form of the QR algorithm converges within its limit, for the Schur form 100 iterations per
+/// row.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
     let balanced = Balance::new(a).matrix;
-    let alone = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
-    let of_the_form = || schur(&balanced).map(|form| diagonal_blocks(&form.unpack().1));
-    let reflected = || schur(&reflected(&balanced)).map(|form| diagonal_blocks(&form.unpack().1));
-    let mut eigenvalues = match (a.nrows() >= LARGE).then(alone).flatten() {
+    let without_form = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
+    let of_form = |m: &DMatrix<f64>| schur(m).map(|form| diagonal_blocks(&form.unpack().1));
+    let mut eigenvalues = match (a.nrows() >= LARGE).then(without_form).flatten() {
         Some(eigenvalues) => eigenvalues,
-        None => of_the_form().or_else(|error| alone().ok_or(error)).or_else(|_| reflected())?,
+        None => of_form(&balanced)
+            .or_else(|error| without_form().ok_or(error))
+            .or_else(|_| of_form(&reflect(&balanced)))?,
     };
     eigenvalues.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(eigenvalues)
 }
 
-/// The Schur form, with a bounded number of iterations.
+/// Computes the Schur form within 100 iterations per row.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`].
 pub(crate) fn schur<T>(m: &DMatrix<T>) -> Result<Schur<T, Dyn>, Error>
 where
     T: ComplexField<RealField = f64>,
 {
     let iterations = ITERATIONS_PER_ROW * m.nrows();
     let form = ZERO.iter().find_map(|&zero| Schur::try_new(m.clone(), zero, iterations));
-    form.ok_or(Error::NotConverged { what: WHAT, iterations })
+    form.ok_or(Error::NotConverged { what: QR_ALGORITHM, iterations })
 }
 
 /// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).
 ///
 /// The shifts of the QR algorithm do not converge on some matrices with many symmetries,
 /// permutations for example. The reflection breaks the symmetry and preserves the eigenvalues.
-fn reflected(m: &DMatrix<f64>) -> DMatrix<f64> {
+fn reflect(m: &DMatrix<f64>) -> DMatrix<f64> {
     let v = DVector::from_fn(m.nrows(), |i, _| 1.0 / as_number(i + 1));
     let h = DMatrix::identity(v.len(), v.len()) - &v * v.transpose() * (2.0 / v.norm_squared());
     &h * m * &h

@@ -13,10 +13,11 @@ const SWEEPS: usize = 60;
 /// A column shorter than this, relative to the Frobenius norm, counts as zero.
 const NEGLIGIBLE: f64 = 1e-40;
 
-/// M = U S V', V orthogonal, U with orthonormal columns, S diagonal and descending.
+/// The decomposition M = U S V', V orthogonal, S diagonal and descending.
 ///
-/// M is r x c, of any shape. Where c > r the last c - r singular values are zero and the last
-/// columns of V span the null space. Cost: about 10 r c^2 multiplications per sweep.
+/// M is r x c, of any shape. The columns of U are orthonormal where the singular values are not
+/// negligible. Where c > r at least c - r singular values are negligible, below 1e-40 of the norm, and
+/// the last columns of V span the null space. Cost: about 10 r c^2 multiplications per sweep.
 ///
 /// Source: M. R. Hestenes, Inversion of matrices by biorthogonalization, J. SIAM 6 (1958); the
 /// accuracy: J. Demmel and K. Veselic, Jacobi's method is more accurate than QR, SIAM J. Matrix
@@ -35,7 +36,7 @@ impl Svd {
     ///
     /// # Errors
     ///
-    /// [`Error::NotConverged`] after 60 sweeps.
+    /// [`Error::NotConverged`] after 60 sweeps; also for entries that are not finite.
     pub(crate) fn new(m: &DMatrix<f64>) -> Result<Self, Error> {
         let cols = m.ncols();
         let unit = power_of_two(m.amax());
@@ -55,13 +56,13 @@ impl Svd {
                 }
             }
             if !rotated {
-                return Ok(sorted(&images, &right, unit));
+                return Ok(assemble(&images, &right, unit));
             }
         }
         Err(Error::NotConverged { what: "the singular value iteration", iterations: SWEEPS })
     }
 
-    /// Number of singular values above `tolerance` times the largest.
+    /// Number of singular values above `tolerance` times the largest. M must have a column.
     pub(crate) fn rank(&self, tolerance: f64) -> usize {
         self.rank_above(tolerance * self.values[0])
     }
@@ -88,15 +89,15 @@ impl Svd {
     }
 }
 
-/// The 2-norm of a matrix: its largest singular value.
+/// The 2-norm of a matrix with at least one column: its largest singular value. The errors are those of [`Svd::new`].
 pub(crate) fn norm_2(m: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(Svd::new(m)?.values[0])
 }
 
 /// Singular values and right singular vectors of a complex matrix.
 ///
-/// M = R + i J is decomposed as the real matrix [R, -J; J, R], which has each singular value twice;
-/// a matrix without imaginary parts as R.
+/// M = R + i J is decomposed as the real matrix [R, -J; J, R], which has each singular value of M twice;
+/// a matrix with J = 0 as R.
 pub(crate) struct ComplexSvd {
     real: Svd,
     /// How often each singular value of M occurs in `real`: 1 or 2.
@@ -150,28 +151,28 @@ impl ComplexSvd {
     }
 }
 
-/// Cosine and sine that make two columns orthogonal and put the longer one first; None if the
-/// columns are so already.
+/// Returns cosine and sine of a rotation that makes two columns orthogonal, or exchanges orthogonal columns if the
+/// second one is longer; None if there is nothing to do. A column of at most `negligible` length counts as zero.
 fn rotation(m: &DMatrix<f64>, first: usize, second: usize, negligible: f64) -> Option<(f64, f64)> {
     let (a, b) = (m.column(first), m.column(second));
-    let (long, short) = (a.norm(), b.norm());
-    if short <= negligible && long >= short {
+    let (length_a, length_b) = (a.norm(), b.norm());
+    if length_b <= negligible && length_a >= length_b {
         return None;
     }
-    if long <= negligible {
+    if length_a <= negligible {
         return Some((0.0, -1.0));
     }
-    let cosine = a.dot(&b) / (long * short);
+    let cosine = a.dot(&b) / (length_a * length_b);
     if cosine.abs() <= f64::EPSILON * rounding_growth(m.nrows()) {
-        return if short > long { Some((0.0, -1.0)) } else { None };
+        return if length_b > length_a { Some((0.0, -1.0)) } else { None };
     }
-    let zeta = (short / long - long / short) / (2.0 * cosine);
+    let zeta = (length_b / length_a - length_a / length_b) / (2.0 * cosine);
     let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
     let c = 1.0 / tangent.hypot(1.0);
     Some((c, c * tangent))
 }
 
-/// Factor by which the rounding error of a dot product grows with its length.
+/// The rounding error of a dot product of this length, in units of rounding: the length, at least 4.
 fn rounding_growth(length: usize) -> f64 {
     f64::from(u32::try_from(length.max(4)).unwrap_or(u32::MAX))
 }
@@ -185,8 +186,8 @@ fn rotate(m: &mut DMatrix<f64>, first: usize, second: usize, c: f64, s: f64) {
     }
 }
 
-/// The decomposition from M V = U S, which is `images` times `unit`, and V.
-fn sorted(images: &DMatrix<f64>, right: &DMatrix<f64>, unit: f64) -> Svd {
+/// Assembles the decomposition, singular values descending, from V and M V = U S, which is `images` times `unit`.
+fn assemble(images: &DMatrix<f64>, right: &DMatrix<f64>, unit: f64) -> Svd {
     let norms: Vec<f64> = images.column_iter().map(|column| column.norm()).collect();
     let mut order: Vec<usize> = (0..norms.len()).collect();
     order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));

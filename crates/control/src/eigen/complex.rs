@@ -1,6 +1,6 @@
 //! Eigenvalues of a complex matrix, without vectors.
 
-use super::WHAT;
+use super::QR_ALGORITHM;
 use crate::Error;
 use nalgebra::{Complex, DMatrix};
 
@@ -11,7 +11,7 @@ const EXCEPTIONAL: usize = 10;
 /// After so many sweeps an entry counts as zero if it is small in comparison with the whole matrix.
 const PATIENCE: usize = 20;
 
-/// Computes the eigenvalues of a complex matrix, in no particular order.
+/// Computes the eigenvalues of a square complex matrix, in no particular order; none for an empty matrix.
 ///
 /// Method: Hessenberg form, then the explicit QR algorithm with the shift of Wilkinson and exceptional shifts, on
 /// the part that has not been deflated. The result is exact for a matrix that differs by a few units of
@@ -25,9 +25,12 @@ const PATIENCE: usize = 20;
 /// [`Error::NotConverged`] after 120 sweeps for one eigenvalue; also for entries that are not finite.
 pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
     let n = m.nrows();
-    let failed = || Error::NotConverged { what: WHAT, iterations: SWEEPS };
-    if n == 0 || !m.iter().all(|entry| entry.re.is_finite() && entry.im.is_finite()) {
-        return if n == 0 { Ok(Vec::new()) } else { Err(failed()) };
+    let failed = || Error::NotConverged { what: QR_ALGORITHM, iterations: SWEEPS };
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    if !m.iter().all(|entry| entry.re.is_finite() && entry.im.is_finite()) {
+        return Err(failed());
     }
     let mut h = m.clone().hessenberg().unpack_h();
     let norm = h.norm();
@@ -61,8 +64,8 @@ pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Compl
     Ok(eigenvalues)
 }
 
-/// The first row of the last block that no negligible subdiagonal entry divides. An entry is compared with its
-/// neighbours on the diagonal and with `norm`.
+/// Returns the first row of the block that ends in row `last` and has no negligible subdiagonal entry. An entry is
+/// negligible by comparison with its neighbours on the diagonal and with `norm`.
 fn start_of_block(h: &DMatrix<Complex<f64>>, last: usize, norm: f64) -> usize {
     let size = |at: (usize, usize)| h[at].re.abs() + h[at].im.abs();
     let negligible = |k: usize| {
@@ -82,7 +85,7 @@ fn wilkinson(h: &DMatrix<Complex<f64>>, last: usize) -> Complex<f64> {
     if farther.norm() > 0.0 { d - product / farther } else { d }
 }
 
-/// H - s I = Q R, then R Q + s I, on the rows and columns from `first` to `last`.
+/// One QR step on the rows and columns from `first` to `last`: H - s I = Q R, H becomes R Q + s I.
 fn sweep(h: &mut DMatrix<Complex<f64>>, first: usize, last: usize, shift: Complex<f64>) {
     for k in first..=last {
         h[(k, k)] -= shift;

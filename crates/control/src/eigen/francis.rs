@@ -53,7 +53,8 @@ pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     Some(eigenvalues)
 }
 
-/// The first row of the last block that no negligible subdiagonal entry divides.
+/// Returns the first row of the block that ends in row `last` and has no negligible subdiagonal entry. Entries up to
+/// `smallest` are always negligible.
 fn start_of_block(h: &DMatrix<f64>, last: usize, smallest: f64) -> usize {
     for k in (1..=last).rev() {
         let below = h[(k, k - 1)].abs();
@@ -89,7 +90,8 @@ struct Shift {
 }
 
 impl Shift {
-    /// The eigenvalues of the last 2 x 2 block; of two real ones the one nearer to the last entry, twice.
+    /// Returns the eigenvalues of the last 2 x 2 block; of two real ones the one nearer to the last entry, twice. Every
+    /// [`EXCEPTIONAL`] sweeps the shifts are those of LAPACK, which break cycles.
     fn new(h: &DMatrix<f64>, first: usize, last: usize, sweeps: usize) -> Self {
         if sweeps.is_multiple_of(EXCEPTIONAL) {
             let at_start = (sweeps / EXCEPTIONAL) % 2 == 1;
@@ -141,23 +143,23 @@ fn sweep(h: &mut DMatrix<f64>, first: usize, last: usize, shift: &Shift) {
         column = shift.column(h, start);
     }
     for k in start..last {
-        let three = k + 2 <= last;
+        let has_third = k + 2 <= last;
         if k > start {
-            column =
-                [h[(k, k - 1)], h[(k + 1, k - 1)], if three { h[(k + 2, k - 1)] } else { 0.0 }];
+            let third = if has_third { h[(k + 2, k - 1)] } else { 0.0 };
+            column = [h[(k, k - 1)], h[(k + 1, k - 1)], third];
         }
         let Some(reflection) = Reflection::new(column) else { continue };
         if k > start {
             h[(k, k - 1)] = reflection.image;
             h[(k + 1, k - 1)] = 0.0;
-            if three {
+            if has_third {
                 h[(k + 2, k - 1)] = 0.0;
             }
         } else if start > first {
             h[(k, k - 1)] *= 1.0 - reflection.weights[0];
         }
         let rows = first..(k + 3).min(last) + 1;
-        if three {
+        if has_third {
             reflection.apply(h, k, last, rows);
         } else {
             reflection.apply_to_two(h, k, last, rows);
@@ -174,7 +176,7 @@ struct Reflection {
 }
 
 impl Reflection {
-    /// None if the vector is on the axis.
+    /// None if the vector is on the axis already, or not finite.
     fn new([first, second, third]: [f64; 3]) -> Option<Self> {
         let size = first.abs() + second.abs() + third.abs();
         if second.abs() + third.abs() <= 0.0 || !size.is_finite() {
@@ -187,7 +189,7 @@ impl Reflection {
         Some(Self { v, weights: [tau, tau * v[0], tau * v[1]], image: image * size })
     }
 
-    /// To rows k to k + 2, from column k to `last`, and to columns k to k + 2 in `rows`.
+    /// Reflects rows k to k + 2, from column k to `last`, then columns k to k + 2 in `rows`.
     fn apply(&self, h: &mut DMatrix<f64>, k: usize, last: usize, rows: Range<usize>) {
         let n = h.nrows();
         let ([v, w], [x, y, z]) = (self.v, self.weights);
@@ -212,7 +214,7 @@ impl Reflection {
         }
     }
 
-    /// The same for two rows and columns.
+    /// Reflects rows k and k + 1, from column k to `last`, then columns k and k + 1 in `rows`.
     fn apply_to_two(&self, h: &mut DMatrix<f64>, k: usize, last: usize, rows: Range<usize>) {
         let (v, [x, y, _]) = (self.v[0], self.weights);
         for column in k..=last {

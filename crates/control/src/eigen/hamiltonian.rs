@@ -14,8 +14,10 @@ pub(crate) struct Hamiltonian {
 }
 
 impl Hamiltonian {
-    /// All blocks are n x n. The states are scaled, x = D z, and the costates by c D^-1, which changes no
-    /// eigenvalue; D and c follow from the balanced whole matrix.
+    /// Creates the matrix from its blocks, n x n each, with balanced states and costates.
+    ///
+    /// The states are scaled by the diagonal D, the costates by c D^-1, which keeps the matrix Hamiltonian and changes
+    /// no eigenvalue; D and c follow from the scales that balance the whole matrix.
     pub(crate) fn balanced(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> Self {
         let n = a.nrows();
         let scale = Balance::new(&block_2x2([a, g], [q, &-a.transpose()])).scale;
@@ -29,7 +31,7 @@ impl Hamiltonian {
         }
     }
 
-    /// The Frobenius norm.
+    /// The Frobenius norm of the balanced matrix.
     pub(crate) fn norm(&self) -> f64 {
         (2.0 * self.a.norm_squared() + self.g.norm_squared() + self.q.norm_squared()).sqrt()
     }
@@ -63,8 +65,10 @@ impl Hamiltonian {
     }
 }
 
-/// The matrix [M, N; K, M'] in the reduction. Before the step of a column the columns to the left of it
-/// have been reduced: they are zero in K, and not updated in N, as its rows give them.
+/// The matrix [M, N; K, M'] during the reduction, which proceeds by columns.
+///
+/// In the reduced columns K is zero. N is not updated there: its entries follow from the rows, because N is
+/// skew-symmetric.
 struct Square {
     m: DMatrix<f64>,
     n: DMatrix<f64>,
@@ -72,7 +76,8 @@ struct Square {
 }
 
 impl Square {
-    /// Reflects the states below `column`, and their costates, such that `vector` has only a first entry.
+    /// Transforms the states below `column`, and their costates, by the reflection that maps `vector` to a multiple of
+    /// the first axis; does nothing if `vector` is zero or has one entry.
     fn reflect(&mut self, column: usize, mut vector: DVector<f64>) {
         let size = vector.norm();
         if vector.len() < 2 || !size.is_normal() {
@@ -84,24 +89,25 @@ impl Square {
         let v = vector.normalize();
         // P = I - 2 v v'. M becomes P M P.
         let mut rows = self.m.view_mut((first, column), (below, below + 1));
-        let along = rows.tr_mul(&v);
-        rows.ger(-2.0, &v, &along, 1.0);
+        let product = rows.tr_mul(&v);
+        rows.ger(-2.0, &v, &product, 1.0);
         let mut columns = self.m.columns_mut(first, below);
-        let along = &columns * &v;
-        columns.ger(-2.0, &along, &v, 1.0);
+        let product = &columns * &v;
+        columns.ger(-2.0, &product, &v, 1.0);
         // A skew-symmetric N becomes N - p v' + v p' with p = 2 N v.
         let mut columns = self.n.columns_mut(first, below);
-        let along = &columns * &v;
-        columns.ger(-2.0, &along, &v, 1.0);
-        let along = along.rows(first, below);
-        self.n.view_mut((first, first), (below, below)).ger(2.0, &v, &along, 1.0);
+        let product = &columns * &v;
+        columns.ger(-2.0, &product, &v, 1.0);
+        let product = product.rows(first, below);
+        self.n.view_mut((first, first), (below, below)).ger(2.0, &v, &product, 1.0);
         let mut rest = self.k.view_mut((column, column), (below + 1, below + 1));
-        let along = rest.columns(1, below) * &v;
-        rest.columns_mut(1, below).ger(-2.0, &along, &v, 1.0);
-        rest.rows_mut(1, below).ger(2.0, &v, &along, 1.0);
+        let product = rest.columns(1, below) * &v;
+        rest.columns_mut(1, below).ger(-2.0, &product, &v, 1.0);
+        rest.rows_mut(1, below).ger(2.0, &v, &product, 1.0);
     }
 
-    /// Rotates the first state below `column` and its costate such that their entry of K is zero.
+    /// Rotates the first state below `column` and its costate such that the entry of K in this row and in `column`
+    /// becomes zero.
     fn rotate(&mut self, column: usize) {
         let (i, order) = (column + 1, self.m.nrows());
         let (x, y) = (self.m[(i, column)], self.k[(i, column)]);

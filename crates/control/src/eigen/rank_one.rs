@@ -14,14 +14,14 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability, IEEE
 /// Trans. Autom. Control 26 (1981): the controller-Hessenberg form.
 pub(crate) struct RankOne {
-    /// A.
+    /// A in these coordinates.
     hessenberg: DMatrix<f64>,
-    /// What g = 1 adds to the first row.
+    /// The first row of b c in these coordinates, 1 x n; the other rows are zero.
     row: DMatrix<f64>,
 }
 
 impl RankOne {
-    /// `a`: n x n, `b`: n x 1, `c`: 1 x n.
+    /// Transforms A, n x n, b, n x 1, and c, 1 x n. A b of length zero counts as no feedback.
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
         let Balance { mut matrix, scale } = Balance::new(a);
         let (b, mut row) = (divide_rows(b, &scale), multiply_columns(c, &scale));
@@ -33,14 +33,14 @@ impl RankOne {
             v[0] -= image;
             let v = v.normalize();
             // P = I - 2 v v': A becomes P A P, c becomes c P.
-            let along = matrix.tr_mul(&v);
-            matrix.ger(-2.0, &v, &along, 1.0);
-            let along = &matrix * &v;
-            matrix.ger(-2.0, &along, &v, 1.0);
-            let along = &row * &v;
-            row.ger(-2.0, &along, &v, 1.0);
+            let product = matrix.tr_mul(&v);
+            matrix.ger(-2.0, &v, &product, 1.0);
+            let product = &matrix * &v;
+            matrix.ger(-2.0, &product, &v, 1.0);
+            let product = &row * &v;
+            row.ger(-2.0, &product, &v, 1.0);
         }
-        // The reduction leaves the first axis where it is.
+        // The reduction to Hessenberg form does not change the first coordinate.
         let (q, hessenberg) = matrix.hessenberg().unpack();
         Self { hessenberg, row: row * q * image }
     }
@@ -56,7 +56,7 @@ impl RankOne {
         let dominates = added.norm() > matrix.norm();
         let mut first = matrix.row_mut(0);
         first += added;
-        // A is balanced; the feedback disturbs that only if it is larger.
+        // A is balanced; only a feedback larger than A needs a new balance.
         let balanced = if dominates { Balance::new(&matrix).matrix } else { matrix.clone() };
         francis::eigenvalues(balanced).map_or_else(|| eigenvalues(&matrix), Ok)
     }
