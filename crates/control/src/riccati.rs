@@ -58,9 +58,9 @@ pub struct Regulator {
 /// `a`: n x n; `b`: n x m; `weights`: see [`Weights`], for a sampled system the cost of one sample.
 /// Solves the Riccati equation of the domain, see [`crate::riccati`]. The stabilising solution
 /// exists and is unique when (A, B) is stabilisable and every mode of A - B R^-1 N' on the
-/// stability limit appears in the weight; both are decided by the smallest singular value of [A -
-/// lambda I, B], or of [A - lambda I; Q], in balanced coordinates, zero below 1e-13 n of the
-/// largest. Method: balancing of the Hamiltonian, structured doubling (after a Cayley transform for
+/// stability limit appears in the weight Q - N R^-1 N'. Both are decided by the smallest singular
+/// value of [A - lambda I, B], or of [A - lambda I; Q], with these two matrices for A and Q, in
+/// balanced coordinates; it is zero below 1e-13 n of the largest. Method: balancing of the Hamiltonian, structured doubling (after a Cayley transform for
 /// continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About
 /// (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to
 /// 15 doublings and 2 steps. The solution is returned only if A + B K is stable and every entry of
@@ -104,8 +104,8 @@ pub fn lqr(
     domain.check()?;
     let problem = ScaledProblem::new(a, b, weights, domain)?;
     existence::require(&problem)?;
-    let p = problem.refined(&problem.start()?)?;
-    let (p, gain) = (problem.restored(&p)?, problem.restored_gain(&p)?);
+    let p = problem.refine(&problem.start()?)?;
+    let (p, gain) = (problem.restore(&p)?, problem.restore_gain(&p)?);
     let eigenvalues = stability::require_stable("A + B K", &(a + b * &gain), domain)?;
     let residual = problem.residual(&p);
     if residual > ALLOWED_RESIDUAL {

@@ -7,18 +7,24 @@ use crate::eigen::eigenvalues;
 use nalgebra::DMatrix;
 
 const DOUBLINGS: usize = 60;
-const WHAT: &str = "structured doubling";
+const METHOD: &str = "structured doubling";
 
-/// A' P (I + G P)^-1 A - P + Q = 0, for G and Q positive semidefinite: the least such P.
+/// Solves A' P (I + G P)^-1 A - P + Q = 0; for G and Q positive semidefinite P is the least solution that is
+/// positive semidefinite.
 ///
-/// After k steps `h` is the solution over 2^k samples of the finite horizon.
+/// After k steps `h` is the solution over 2^k samples of the finite horizon. For an indefinite G the caller checks
+/// whether P is the solution that it needs.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`].
 pub(super) fn sampled(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,
     q: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, Error> {
     let (mut a, mut g, mut h) = (a.clone(), g.clone(), q.clone());
-    let failed = Error::NotConverged { what: WHAT, iterations: DOUBLINGS };
+    let failed = Error::NotConverged { what: METHOD, iterations: DOUBLINGS };
     for _ in 0..DOUBLINGS {
         let inverse = (identity(a.nrows()) + &g * &h).lu();
         let (Some(moved), Some(spread)) = (inverse.solve(&a), inverse.solve(&g)) else {
@@ -38,11 +44,15 @@ pub(super) fn sampled(
     Err(failed)
 }
 
-/// A' P + P A - P G P + Q = 0, for G and Q positive semidefinite: the least such P.
+/// Solves A' P + P A - P G P + Q = 0, with P as in [`sampled`].
 ///
 /// The Cayley transform with gamma maps an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
-/// (s - gamma). With gamma the geometric mean of the smallest and the largest modulus both converge
-/// equally fast.
+/// (s - gamma). With gamma the geometric mean of the smallest modulus above zero and the largest one,
+/// both converge equally fast.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`]; [`Error::NotFinite`] if the Hamiltonian matrix is not finite.
 pub(super) fn continuous(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,
@@ -58,11 +68,11 @@ pub(super) fn continuous(
     let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let gamma = if largest > 0.0 { (least * largest).sqrt() } else { 1.0 };
-    // [A - gamma I, -G; -Q, -(A - gamma I)'] takes the pencil to its symplectic form.
+    // Division by [A - gamma I, -G; -Q, -(A - gamma I)'] gives the pencil its symplectic form.
     let left = blocks(&(a - identity(n) * gamma));
     let right = blocks(&(a + identity(n) * gamma));
     let solved =
-        left.lu().solve(&right).ok_or(Error::NotConverged { what: WHAT, iterations: 0 })?;
+        left.lu().solve(&right).ok_or(Error::NotConverged { what: METHOD, iterations: 0 })?;
     let start = solved.view((0, 0), (n, n)).into();
     let g = symmetric_part(&solved.view((0, n), (n, n)).into());
     let h = symmetric_part(&-solved.view((n, 0), (n, n)).into_owned());

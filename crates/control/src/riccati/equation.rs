@@ -49,17 +49,19 @@ impl RiccatiEquation {
         })
     }
 
-    /// Largest entry of the left side relative to the sum of its absolute terms; the measure of an iteration.
+    /// Largest entry of the left side relative to the sum of its absolute terms, by which iterates are compared;
+    /// infinite if P has no gain or the left side is not finite.
     pub(super) fn entrywise_residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &p.abs(), 0.0)
     }
 
-    /// [`Self::entrywise_residual`] without the rounding of entries that are zero in theory: |P| as in
+    /// [`Self::entrywise_residual`] without the rounding errors of entries that are zero in theory: |P| as in
     /// [`lyapunov::Solution::residual`], each sum at least [`FLOOR`] times the largest one.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &sizes(p), FLOOR)
     }
 
+    /// The residual with `size` for |P| and each sum at least `floor` times the largest one.
     fn relative_residual(&self, p: &DMatrix<f64>, size: &DMatrix<f64>, floor: f64) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);

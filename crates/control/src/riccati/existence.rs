@@ -14,12 +14,17 @@ const TOLERANCE_PER_STATE: f64 = 1e-13;
 const NEAR: f64 = 1e-12;
 
 /// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q.
+///
+/// # Errors
+///
+/// [`Error::NotStabilisable`] with the eigenvalue; [`Error::Unweighted`] with the point of the limit;
+/// [`Error::NotConverged`].
 pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
-    let (a, b, domain) = (&problem.free, &problem.equation.b, problem.equation.domain);
-    let weighted = smallest_weight(a, &problem.free_q);
+    let (a, b, domain) = (&problem.decoupled_a, &problem.equation.b, problem.equation.domain);
+    let least_weight = smallest_weight(a, &problem.decoupled_q);
     for eigenvalue in eigenvalues(a)?.into_iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
         if domain.excess(eigenvalue) >= -NEAR * a.norm()
-            && deficient(&a.transpose(), &b.transpose(), eigenvalue)?
+            && is_deficient(&a.transpose(), &b.transpose(), eigenvalue)?
         {
             return Err(Error::NotStabilisable { eigenvalue });
         }
@@ -29,8 +34,8 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
             Domain::Sampled { .. } => Complex::from_polar(1.0, eigenvalue.arg()),
         };
         let largest = 2.0 * a.norm() + limit.norm();
-        let appears = weighted > tolerance(a) * largest;
-        if !appears && deficient(a, &problem.free_q, limit)? {
+        let appears = least_weight > tolerance(a) * largest;
+        if !appears && is_deficient(a, &problem.decoupled_q, limit)? {
             return Err(Error::Unweighted { weight: "Q", eigenvalue: limit });
         }
     }
@@ -38,7 +43,7 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
 }
 
 /// Whether [A - lambda I; C] has less than full column rank, C scaled to the size of A.
-fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result<bool, Error> {
+fn is_deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result<bool, Error> {
     let n = a.nrows();
     let size = if a.norm() > 0.0 { a.norm() } else { 1.0 };
     let unit = if c.norm() > 0.0 { size / c.norm() } else { 1.0 };
@@ -49,12 +54,13 @@ fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result
     Ok(ComplexSvd::new(&pencil)?.rank(tolerance(a)) < n)
 }
 
+/// Relative size of a singular value that counts as zero.
 fn tolerance(a: &DMatrix<f64>) -> f64 {
     TOLERANCE_PER_STATE * as_number(a.nrows())
 }
 
 /// A lower bound of the singular values of [A - lambda I; Q] for every lambda, Q scaled to the size
-/// of A: the smallest eigenvalue of Q, less its rounding.
+/// of A: the smallest eigenvalue of Q, less its rounding; NaN for Q = 0.
 fn smallest_weight(a: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
     let (size, n) = (a.norm() / q.norm(), q.nrows());
     let eigen = SymmetricEigen::try_new(q.clone(), f64::EPSILON, 100 * n);

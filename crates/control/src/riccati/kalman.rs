@@ -57,8 +57,9 @@ pub struct KalmanFilter {
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::NotSymmetric`] for a bad
 /// matrix, [`Error::OutOfRange`] for a bad period; [`Error::NotPositiveDefinite`] for V;
-/// [`Error::NotPositiveSemidefinite`] for W; [`Error::NotDetectable`]; [`Error::Unweighted`]; the
-/// numerical errors of [`lqr`].
+/// [`Error::NotPositiveSemidefinite`] for W; [`Error::NotDetectable`]; [`Error::Unweighted`];
+/// [`Error::NotConverged`], [`Error::ResidualTooLarge`], [`Error::NotHurwitz`], [`Error::NotSchur`],
+/// [`Error::Overflow`] when rounding prevents a solution.
 pub fn kalman(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

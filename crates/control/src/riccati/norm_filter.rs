@@ -1,4 +1,4 @@
-//! The filter whose error keeps a bound of its H-infinity norm.
+//! The filter whose error has an H-infinity norm below a bound.
 
 use super::problem::{balancing, divided, multiplied, similar};
 use super::{KalmanFilter, doubling, kalman};
@@ -6,11 +6,11 @@ use crate::blocks::symmetric_part;
 use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;
 
-/// Riccati equations that are solved for one bound, if doubling does not solve its equation directly.
+/// Largest number of Riccati equations that are solved for one bound where doubling does not solve its equation.
 const ITERATIONS: usize = 400;
 /// Relative change at which the iteration has converged.
 const CONVERGED: f64 = 1e-4;
-/// Largest growth of X from the Kalman filter's on, beyond which the bound counts as too small.
+/// The bound counts as too small when the norm of X exceeds that of the Kalman filter's covariance by this factor.
 const GROWTH: f64 = 1e8;
 /// Largest relative difference of the covariances of the Kalman filter by doubling and by [`kalman`] at which
 /// doubling is trusted for bounds, too.
@@ -47,11 +47,12 @@ pub struct NormFilterProblem<'a> {
 /// A filter of any order exists if and only if there is a solution X >= 0 that stabilises `A_s` - X G, in sampled
 /// time `A_s` (I + X G)^-1; X >= 0 is equivalent to A - L C being stable.
 ///
-/// Method: doubling in balanced coordinates. Where it does not find the covariance of the Kalman filter, as it may not for
-/// unstable modes that no w moves: X is the limit of the covariances of Kalman filters, each with the process noise that X of the one
-/// before adds. They grow from that of the Kalman filter, and stay below the solution X if there is one, so
-/// they converge if and only if gamma is above the least norm. Their number grows without limit towards that
-/// norm; 400 reach to about 2 % above it.
+/// Method: doubling in balanced coordinates, if it finds the covariance of the Kalman filter, which it may not for
+/// unstable modes that no w moves. Otherwise X is the limit of a sequence of covariances of Kalman filters: each filter
+/// has the additional process noise that belongs to the X before it. The sequence starts at the covariance of the
+/// Kalman filter, grows, and stays below the solution X if there is one, so it converges if and only if gamma is above
+/// the least norm. The number of steps grows without limit towards that norm; 400 steps are enough down to about 2 %
+/// above it.
 ///
 /// Source: K. M. Nagpal, P. P. Khargonekar, Filtering and smoothing in an H-infinity setting, IEEE
 /// Trans. Autom. Control 36 (1991), theorem 3.1; sampled: B. Hassibi, A. H. Sayed, T. Kailath, Linear
@@ -72,9 +73,10 @@ pub struct NormFilter {
     /// S R^-1.
     correlated: DMatrix<f64>,
     domain: Domain,
+    /// The Kalman filter for `A_s`, C, Q and R.
     filter: KalmanFilter,
-    /// Whether doubling finds the covariance of the Kalman filter.
-    doubles: bool,
+    /// Whether doubling finds the covariance of the Kalman filter, so that it solves the equation of each bound.
+    by_doubling: bool,
 }
 
 impl NormFilter {
@@ -82,8 +84,8 @@ impl NormFilter {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for B, D or E; [`Error::NotPositiveDefinite`] if a measurement has no noise; otherwise same
-    /// as [`kalman`].
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for B, D or E; [`Error::NotPositiveDefinite`] if a
+    /// measurement has no noise; otherwise same as [`kalman`].
     pub fn new(problem: &NormFilterProblem<'_>, domain: Domain) -> Result<Self, Error> {
         let NormFilterProblem { a, c, disturbance: b, feedthrough: d, output } = *problem;
         let (n, p, k) = (check::square("A", a)?, c.nrows(), b.ncols());
@@ -101,7 +103,7 @@ impl NormFilter {
         let a = a - &correlated * c;
         let filter = kalman(&a, c, &process, &noise, domain)?;
         let measured = symmetric_part(&c.tr_mul(&factor.solve(c)));
-        let mut all = Self {
+        let mut filters = Self {
             a,
             c: c.clone(),
             process,
@@ -111,13 +113,13 @@ impl NormFilter {
             correlated,
             domain,
             filter,
-            doubles: false,
+            by_doubling: false,
         };
-        let covariance = &all.filter.covariance;
-        all.doubles = all
-            .doubled(f64::INFINITY)
+        let covariance = &filters.filter.covariance;
+        filters.by_doubling = filters
+            .solve_by_doubling(f64::INFINITY)
             .is_some_and(|x| (x - covariance).norm() <= SAME * covariance.norm());
-        Ok(all)
+        Ok(filters)
     }
 
     /// Returns the gain of the Kalman filter, the limit for large bounds.
@@ -136,11 +138,11 @@ impl NormFilter {
     /// [`Error::OutOfRange`] for `gamma`.
     pub fn gain(&self, gamma: f64) -> Result<Option<DMatrix<f64>>, Error> {
         check::positive("gamma", gamma)?;
-        if self.doubles {
-            let stable = |x| self.stabilising(&x, gamma);
-            return Ok(self.doubled(gamma).and_then(stable));
+        if self.by_doubling {
+            let gain = |x| self.stabilising_gain(&x, gamma);
+            return Ok(self.solve_by_doubling(gamma).and_then(gain));
         }
-        Ok(self.iterated(gamma))
+        Ok(self.iterate(gamma))
     }
 
     /// G.
@@ -149,8 +151,8 @@ impl NormFilter {
         symmetric_part(&(&self.measured - output.tr_mul(&output)))
     }
 
-    /// X by doubling.
-    fn doubled(&self, gamma: f64) -> Option<DMatrix<f64>> {
+    /// Computes X by doubling; None if it does not converge.
+    fn solve_by_doubling(&self, gamma: f64) -> Option<DMatrix<f64>> {
         let (a, g) = (self.a.transpose(), self.information(gamma));
         let scale = balancing(&a, &g, &self.process);
         let q = multiplied(&self.process, &scale);
@@ -162,8 +164,8 @@ impl NormFilter {
         Some(divided(&x.ok()?, &scale))
     }
 
-    /// The gain of X, if X is the stabilising and positive semidefinite solution.
-    fn stabilising(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
+    /// Returns the gain of X; None if X is not the stabilising and positive semidefinite solution.
+    fn stabilising_gain(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
         let g = self.information(gamma);
         let game = match self.domain {
             Domain::Continuous => &self.a - x * g,
@@ -172,15 +174,15 @@ impl NormFilter {
                 &self.a * (identity + x * g).try_inverse()?
             }
         };
-        let gain = self.gain_of(&(x + self.added(x, gamma)?))?;
+        let gain = self.gain_of(&(x + self.increment(x, gamma)?))?;
         let stable = |matrix| stability::require_stable("", matrix, self.domain).is_ok();
         let error = &self.a - &gain * &self.c;
         (stable(&game) && stable(&error)).then(|| gain + &self.correlated)
     }
 
-    /// The process noise that X adds: X E' E X / `gamma^2`, in sampled time X E' (`gamma^2` I - E X E')^-1 E X, by
-    /// which the covariance then grows itself.
-    fn added(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
+    /// Y - X in sampled time, X E' (`gamma^2` I - E X E')^-1 E X; zero in continuous time. None if `gamma^2` I - E X E'
+    /// is not positive definite.
+    fn increment(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
         if self.domain == Domain::Continuous {
             return Some(DMatrix::zeros(x.nrows(), x.ncols()));
         }
@@ -190,7 +192,7 @@ impl NormFilter {
         Some(symmetric_part(&output.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&output))))
     }
 
-    /// L - S R^-1 for a covariance: X, in sampled time Y.
+    /// L - S R^-1 for a covariance, which is X, in sampled time Y; None if it cannot be computed.
     fn gain_of(&self, covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let crossed = &self.c * covariance;
         Some(match self.domain {
@@ -203,24 +205,23 @@ impl NormFilter {
         })
     }
 
-    /// The gain by Kalman filters.
-    fn iterated(&self, gamma: f64) -> Option<DMatrix<f64>> {
+    /// Computes the gain by a sequence of Kalman filters; None if it does not converge.
+    fn iterate(&self, gamma: f64) -> Option<DMatrix<f64>> {
         let first = self.filter.covariance.norm();
         let mut x = self.filter.covariance.clone();
         for _ in 0..ITERATIONS {
-            let added = match self.domain {
+            let noise = match self.domain {
                 Domain::Continuous => {
                     let output = &self.output * &x / gamma;
                     symmetric_part(&output.tr_mul(&output))
                 }
-                Domain::Sampled { .. } => self.added(&x, gamma)?,
+                Domain::Sampled { .. } => self.increment(&x, gamma)?,
             };
-            let next =
-                kalman(&self.a, &self.c, &(&self.process + &added), &self.noise, self.domain);
-            let next = next.ok()?;
+            let process = &self.process + &noise;
+            let next = kalman(&self.a, &self.c, &process, &self.noise, self.domain).ok()?;
             let update = match self.domain {
                 Domain::Continuous => next.covariance,
-                Domain::Sampled { .. } => next.covariance - added,
+                Domain::Sampled { .. } => next.covariance - noise,
             };
             let size = update.norm();
             if (&update - x).norm() <= CONVERGED * size {
@@ -266,12 +267,12 @@ mod tests {
     #[test]
     fn the_filter_of_an_integrator_has_the_gain_of_the_scalar_equation() {
         let filter = scalar(0.0, Domain::Continuous);
-        assert!(filter.doubles);
+        assert!(filter.by_doubling);
         let by_doubling = filter.gain(1.25).unwrap().unwrap();
         assert!((by_doubling[(0, 0)] - 1.0 / 0.6).abs() < 1e-12);
-        assert!((filter.iterated(1.25).unwrap()[(0, 0)] - 1.0 / 0.6).abs() < 1e-3);
+        assert!((filter.iterate(1.25).unwrap()[(0, 0)] - 1.0 / 0.6).abs() < 1e-3);
         assert_eq!(filter.gain(0.9).unwrap(), None);
-        assert_eq!(filter.iterated(0.9), None);
+        assert_eq!(filter.iterate(0.9), None);
         assert!(filter.gain(0.0).is_err());
     }
 
@@ -280,7 +281,7 @@ mod tests {
     fn a_sampled_filter_exists_above_the_limit_of_the_scalar_equation() {
         for a in [0.0, 0.5, -1.0, 1.0, 2.0_f64] {
             let (filter, least) = (scalar(a, SAMPLED), (1.0 + a * a).sqrt());
-            for gain in [filter.gain(1.001 * least).unwrap(), filter.iterated(1.05 * least)] {
+            for gain in [filter.gain(1.001 * least).unwrap(), filter.iterate(1.05 * least)] {
                 let gain = gain.unwrap();
                 let error = StateSpace {
                     a: row(&[a - gain[(0, 0)]]),
@@ -293,7 +294,7 @@ mod tests {
                 assert!(norm > 0.999 * least && norm < 1.05 * least, "{a}: {norm}, {least}");
             }
             assert_eq!(filter.gain(0.999 * least).unwrap(), None, "{a}");
-            assert_eq!(filter.iterated(0.99 * least), None, "{a}");
+            assert_eq!(filter.iterate(0.99 * least), None, "{a}");
         }
     }
 
@@ -324,7 +325,7 @@ mod tests {
             output: &row(&[1.0, 0.0]),
         };
         let filter = NormFilter::new(&problem, Domain::Continuous).unwrap();
-        for gain in [filter.gain(10.0).unwrap(), filter.iterated(10.0)] {
+        for gain in [filter.gain(10.0).unwrap(), filter.iterate(10.0)] {
             let error = &a - gain.unwrap() * problem.c;
             assert!(stability::require_stable("", &error, Domain::Continuous).is_ok());
         }

@@ -14,14 +14,16 @@ use nalgebra::{DMatrix, DVector};
 
 const NEWTON_STEPS: usize = 60;
 
+/// The problem in balanced coordinates `x_s`, with inputs `u_s` for which R = I.
+///
 /// x = S `x_s` with a positive diagonal S, u = L^-T `u_s` with R = L L'.
 pub(super) struct ScaledProblem {
     pub(super) equation: RiccatiEquation,
     /// A - B N', the dynamics after the substitution of u that removes the product of x and u from
     /// the cost.
-    pub(super) free: DMatrix<f64>,
-    /// Q - N N'.
-    pub(super) free_q: DMatrix<f64>,
+    pub(super) decoupled_a: DMatrix<f64>,
+    /// Q - N N', the weight of the states after this substitution.
+    pub(super) decoupled_q: DMatrix<f64>,
     /// Diagonal of S, powers of two.
     scale: DVector<f64>,
     /// L.
@@ -29,6 +31,13 @@ pub(super) struct ScaledProblem {
 }
 
 impl ScaledProblem {
+    /// Checks the matrices and scales the problem.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::NotSymmetric`] for a bad matrix;
+    /// [`Error::NotPositiveDefinite`] for R; [`Error::NotPositiveSemidefinite`] for Q - N R^-1 N';
+    /// [`Error::Overflow`]; [`Error::NotConverged`].
     pub(super) fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
@@ -47,45 +56,56 @@ impl ScaledProblem {
         let factor = weights.r.clone().cholesky().ok_or(indefinite)?.l();
         let b = check::in_range("B R^-1 B'", per_unit(b, &factor))?;
         let n = check::in_range("N R^-1 N'", per_unit(&n, &factor))?;
-        let free = check::in_range("A - B R^-1 N'", a - &b * n.transpose())?;
-        let free_q =
+        let decoupled_a = check::in_range("A - B R^-1 N'", a - &b * n.transpose())?;
+        let decoupled_q =
             check::in_range("Q - N R^-1 N'", &weights.q - symmetric_part(&(&n * n.transpose())))?;
-        require_semidefinite(&free_q, &weights.q)?;
-        let scale = balancing(&free, &check::in_range("B R^-1 B'", &b * b.transpose())?, &free_q);
+        require_semidefinite(&decoupled_q, &weights.q)?;
+        let effect = check::in_range("B R^-1 B'", &b * b.transpose())?;
+        let scale = balancing(&decoupled_a, &effect, &decoupled_q);
         let (a, q) = (similar(a, &scale), multiplied(&weights.q, &scale));
         let (b, n) = (divide_rows(&b, &scale), multiply_rows(&n, &scale));
         Ok(Self {
-            free: similar(&free, &scale),
-            free_q: multiplied(&free_q, &scale),
+            decoupled_a: similar(&decoupled_a, &scale),
+            decoupled_q: multiplied(&decoupled_q, &scale),
             equation: RiccatiEquation { a, b, q, n, domain },
             scale,
             factor,
         })
     }
 
-    /// Computes a stabilising P near the solution.
+    /// Computes a P from which Newton's method converges to the stabilising solution.
     ///
     /// Doubling computes the least semidefinite solution, which does not stabilise an unstable mode
     /// that does not appear in Q. With Q + d I every mode appears, and Newton's method converges
     /// from there to the stabilising solution.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`], [`Error::NotFinite`] when doubling fails for Q + d I, too.
     pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
         let effect = symmetric_part(&(&self.equation.b * self.equation.b.transpose()));
         let solve = |q: &DMatrix<f64>| match self.equation.domain {
-            Domain::Continuous => doubling::continuous(&self.free, &effect, q),
-            Domain::Sampled { .. } => doubling::sampled(&self.free, &effect, q),
+            Domain::Continuous => doubling::continuous(&self.decoupled_a, &effect, q),
+            Domain::Sampled { .. } => doubling::sampled(&self.decoupled_a, &effect, q),
         };
-        if let Ok(p) = solve(&self.free_q)
+        if let Ok(p) = solve(&self.decoupled_q)
             && self.equation.newton(&p).is_some()
         {
             return Ok(p);
         }
-        let order = self.free.nrows();
-        let size = self.free_q.amax().max(self.free.amax());
-        solve(&(&self.free_q + DMatrix::from_diagonal_element(order, order, size)))
+        let order = self.decoupled_a.nrows();
+        let size = self.decoupled_q.amax().max(self.decoupled_a.amax());
+        solve(&(&self.decoupled_q + DMatrix::from_diagonal_element(order, order, size)))
     }
 
-    /// Applies Newton's method until the residual stops decreasing.
-    pub(super) fn refined(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    /// Applies Newton's method until its step or the residual is within rounding errors; returns the P of the
+    /// smallest residual.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`] if the method ends before that, after 60 steps or because a step cannot be computed,
+    /// and the residual is not allowed either.
+    pub(super) fn refine(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let (mut best, mut residual) = (start.clone(), self.equation.entrywise_residual(start));
         let mut p = start.clone();
         for _ in 0..NEWTON_STEPS {
@@ -107,8 +127,8 @@ impl ScaledProblem {
         Err(Error::NotConverged { what, iterations: NEWTON_STEPS })
     }
 
-    /// P of the problem without scales.
-    pub(super) fn restored(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    /// Converts P to the problem without scales; [`Error::Overflow`] if it leaves the range.
+    pub(super) fn restore(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         check::in_range("P", divided(p, &self.scale))
     }
 
@@ -117,8 +137,9 @@ impl ScaledProblem {
         self.equation.residual(&multiplied(p, &self.scale))
     }
 
-    /// L^-T K S^-1.
-    pub(super) fn restored_gain(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    /// Returns the gain of a scaled P for the problem without scales, L^-T K S^-1; [`Error::Overflow`] if it cannot be
+    /// computed or leaves the range.
+    pub(super) fn restore_gain(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let gain =
             self.equation.gain(p).and_then(|gain| self.factor.tr_solve_lower_triangular(&gain));
         let gain = gain.ok_or(Error::Overflow { what: "K" })?;
@@ -126,7 +147,7 @@ impl ScaledProblem {
     }
 }
 
-/// M L^-T.
+/// M L^-T with L = `factor`; NaN if L is singular.
 fn per_unit(m: &DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
     let solved = factor.solve_lower_triangular(&m.transpose());
     solved.map_or_else(|| DMatrix::from_element(m.nrows(), m.ncols(), f64::NAN), |x| x.transpose())
