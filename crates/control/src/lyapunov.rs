@@ -7,7 +7,7 @@ use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, mul
 use crate::blocks::symmetric_part;
 use crate::svd::Svd;
 use crate::{Domain, Error, check, stability};
-use doubling::doubled;
+use doubling::solve_by_doubling;
 use nalgebra::DMatrix;
 use triangular::Triangular;
 
@@ -29,7 +29,7 @@ pub struct Solution {
     /// |Q|; in sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|. Here
     /// `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
     pub residual: f64,
-    /// Norm of the left side plus Q relative to the norm of Q (Frobenius). For a badly scaled A the
+    /// Norm of the left side plus Q relative to the norm of Q (Frobenius); for Q = 0 the norm itself. For a badly scaled A the
     /// rounding of P alone keeps it far above the rounding error; below 1 / sqrt(n) with Q = I it
     /// still proves A stable.
     pub defect: f64,
@@ -42,8 +42,8 @@ pub struct Solution {
 /// and Stewart), refinement; about 100 n^3 multiplications. From 48 states on a Cayley transform and
 /// doubling (R. A. Smith, SIAM J. Appl. Math. 16, 1968) come first, about 3 n^3 multiplications of the
 /// fastest kind for each of some 15 doublings. A result with a residual above 1e-12 is compared with that
-/// of the other method. Every entry of the residual is at most
-/// 1e-9 of the sum of the absolute terms it is made of.
+/// of the other method, and the one with the smaller residual is returned. Every entry of the residual is
+/// at most 1e-9 of the sum of its absolute terms.
 ///
 /// Source: R. H. Bartels and G. W. Stewart, Solution of the matrix equation A X + X B = C, Comm.
 /// ACM 15 (1972), algorithm 432.
@@ -74,7 +74,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
 /// The solution exists and is unique, and is symmetric positive definite when Q is: the sum of A'^k
 /// Q A^k over k from 0 on. Method: balancing of A, complex Schur form, substitution, refinement;
 /// about 100 n^3 multiplications; from 48 states on doubling first, as in [`lyapunov`]. Every entry of the
-/// residual is at most 1e-9 of the sum of the absolute terms it is made of.
+/// residual is at most 1e-9 of the sum of its absolute terms.
 ///
 /// Source: G. Kitagawa, An algorithm for solving the matrix equation X = F X F' + S, Int. J.
 /// Control 25 (1977).
@@ -116,7 +116,8 @@ pub fn definite_range(p: &DMatrix<f64>) -> Result<(f64, f64), Error> {
     Ok((values[values.len() - 1].powi(2), values[0].powi(2)))
 }
 
-/// Checks that a matrix differs from its transpose by no more than rounding.
+/// Checks that a square matrix differs from its transpose by at most one unit of rounding of its largest entry;
+/// otherwise [`Error::NotSymmetric`].
 pub(crate) fn symmetric(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     let allowed = f64::EPSILON * m.amax();
     for col in 0..m.ncols() {
@@ -175,11 +176,15 @@ impl Equation {
         Ok(Solution { p, residual, defect })
     }
 
-    /// Computes P for a stable A and a symmetric Q.
+    /// Computes P for a stable A and a symmetric Q, without a check of the arguments or of the residual.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`] when the Schur form is not found; [`Error::Overflow`].
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Balance { matrix, scale } = Balance::new(a);
         let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
-        let by_doubling = || doubled(&matrix, &scaled_q, self.domain, self.remainder);
+        let by_doubling = || solve_by_doubling(&matrix, &scaled_q, self.domain, self.remainder);
         let by_schur_form = || self.by_schur_form(&matrix, &scaled_q);
         let residual = |p: &DMatrix<f64>| self.residual(&matrix, p, &scaled_q);
         let fast = (matrix.nrows() >= LARGE).then(by_doubling).flatten();
@@ -210,14 +215,15 @@ impl Equation {
     }
 }
 
-/// |P|, where an entry that is zero in theory counts as the rounding it holds: at least the root of
-/// `P[i,i] P[j,j]`.
+/// |P| with entries of at least the root of `P[i,i] P[j,j]`, so that an entry that is zero in theory counts
+/// with the size of its rounding error.
 pub(crate) fn sizes(p: &DMatrix<f64>) -> DMatrix<f64> {
     let size = |i: usize, j: usize| (p[(i, i)] * p[(j, j)]).abs().sqrt().max(p[(i, j)].abs());
     DMatrix::from_fn(p.nrows(), p.ncols(), size)
 }
 
-/// The largest entry of |remainder| relative to the same entry of `terms`.
+/// The largest entry of |remainder| relative to the same entry of `terms`; entries for which that is zero are left
+/// out.
 pub(crate) fn relative(remainder: &DMatrix<f64>, terms: &DMatrix<f64>) -> f64 {
     remainder.zip_map(terms, |r, t| if t > 0.0 { r.abs() / t } else { 0.0 }).amax()
 }

@@ -62,8 +62,9 @@ impl Rank {
 ///
 /// `a`: n x n; `b`: n x m. The powers of A are never formed: the staircase algorithm reduces (A, B)
 /// by orthogonal transformations and adds up the ranks of its steps, after balancing the states and
-/// giving each input unit length. About 20 n^3 multiplications. Tolerance: 100 n eps, relative to
-/// the norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
+/// giving each input unit length. If this rank is not full, it is also computed without balancing, and
+/// the larger one counts. About 20 n^3 multiplications, for each. Tolerance: 100 n eps, relative to the
+/// norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability,
 /// IEEE Trans. Autom. Control 26 (1981), section IV.
@@ -84,7 +85,7 @@ impl Rank {
 /// [`Error::NotConverged`] when a singular value iteration does not end.
 pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     check::with_inputs(a, b)?;
-    Ok(Staircase::new(a, b)?.answer)
+    Ok(Staircase::new(a, b)?.decision)
 }
 
 /// Rank of the observability matrix [C; C A; ...; C A^(n-1)] of x' = A x, y = C x.
@@ -98,10 +99,10 @@ pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error
 /// [`Error::NotConverged`] when a singular value iteration does not end.
 pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
     check::with_outputs(a, c)?;
-    Ok(Staircase::new(&a.transpose(), &c.transpose())?.answer)
+    Ok(Staircase::new(&a.transpose(), &c.transpose())?.decision)
 }
 
-/// Checks that a pair is controllable.
+/// Checks that (A, B) is controllable; otherwise [`Error::NotControllable`], or an error of [`controllability`].
 pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     let rank = controllability(a, b)?;
     if rank.is_full() {
@@ -110,7 +111,7 @@ pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result
     Err(Error::NotControllable { rank: rank.rank, n: rank.n })
 }
 
-/// Checks that a pair is observable.
+/// Checks that (A, C) is observable; otherwise [`Error::NotObservable`], or an error of [`observability`].
 pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<(), Error> {
     let rank = observability(a, c)?;
     if rank.is_full() {
@@ -162,32 +163,35 @@ pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode
     modes_of(&Staircase::new(&a.transpose(), &c.transpose())?)
 }
 
+/// The uncontrollable modes of the pair of a staircase form; none if it is controllable.
 fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
-    if staircase.answer.is_full() {
+    if staircase.decision.is_full() {
         return Ok(Vec::new());
     }
-    let rest = to_complex(&staircase.rest.transpose());
-    let values = eigenvalues(&staircase.rest)?;
-    let same = staircase.answer.tolerance.sqrt() * (1.0 + staircase.rest.norm());
+    let transposed = to_complex(&staircase.uncontrollable.transpose());
+    let values = eigenvalues(&staircase.uncontrollable)?;
+    let tolerance = staircase.decision.tolerance.sqrt() * (1.0 + staircase.uncontrollable.norm());
     let mode = |(at, &eigenvalue): (usize, &Complex<f64>)| {
-        let earlier = values[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
-        let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
+        let is_equal = |other: &&Complex<f64>| (*other - eigenvalue).norm() <= tolerance;
+        let earlier = values[..at].iter().filter(is_equal);
+        let order = transposed.nrows();
+        let shifted = &transposed - DMatrix::identity(order, order) * eigenvalue;
         let svd = ComplexSvd::new(&shifted)?;
         let (value, vector) = svd.nth_smallest(earlier.count());
-        let vector = if value <= same { vector } else { svd.nth_smallest(0).1 };
+        let vector = if value <= tolerance { vector } else { svd.nth_smallest(0).1 };
         Ok(mode_in_given_coordinates(eigenvalue, staircase, &vector))
     };
     values.iter().enumerate().map(mode).collect()
 }
 
 /// The mode whose left eigenvector has the given coordinates in the basis of the uncontrollable
-/// states.
+/// states, in the coordinates of A.
 fn mode_in_given_coordinates(
     eigenvalue: Complex<f64>,
     staircase: &Staircase,
     coordinates: &DVector<Complex<f64>>,
 ) -> Mode {
-    let balanced = to_complex(&staircase.rest_basis) * coordinates;
+    let balanced = to_complex(&staircase.uncontrollable_basis) * coordinates;
     let size = |state: usize| balanced[state].norm();
     let mut dominant: Vec<usize> = (0..balanced.len()).collect();
     dominant.sort_by(|&i, &j| size(j).total_cmp(&size(i)));

@@ -85,9 +85,10 @@ pub struct Certificate {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`]; [`Error::OutOfRange`] for `alpha` or `beta`;
+/// Same as [`Gains::check`]; [`Error::OutOfRange`] for `alpha`, `beta` or their product;
 /// [`Error::NotControllable`]; [`Error::NotHurwitz`] when the observer is unstable;
-/// [`Error::NotPositiveDefinite`] when rounding errors hide that P > 0; same as [`lyapunov`].
+/// [`Error::NotPositiveDefinite`] when rounding errors hide that P > 0; [`Error::NotConverged`],
+/// [`Error::Overflow`], [`Error::ResidualTooLarge`] as for [`lyapunov`].
 pub fn certify(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -123,11 +124,12 @@ pub fn certify(
     })
 }
 
-/// Factors by which right-hand sides are enlarged until the inequality is proven despite rounding.
+/// Fractions by which right-hand sides are enlarged, one after the other, until the inequality is proven despite
+/// rounding.
 #[cfg(feature = "lmi")]
 const ENLARGEMENTS: [f64; 5] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
 
-/// Checks z' = F z + G w with |w| <= bound.
+/// Checks the matrices of z' = F z + G w and the bound of |w|, which must be above zero.
 #[cfg(feature = "lmi")]
 fn check_system(f: &DMatrix<f64>, g: &DMatrix<f64>, bound: f64) -> Result<(), Error> {
     let n = check::square("error dynamics", f)?;

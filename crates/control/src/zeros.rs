@@ -13,9 +13,9 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
-/// A singular value counts as zero below this times the number of rows and columns, relative to the
-/// norm of the scaled matrices.
-const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
+/// A singular value counts as zero below this times the number of states, inputs and outputs together,
+/// relative to the norm of the scaled matrices.
+const TOLERANCE_PER_SIGNAL: f64 = 100.0 * f64::EPSILON;
 
 /// The invariant zeros of a system, and the rank of its transfer function.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,14 +67,14 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
     check::shape("C", c, (c.nrows(), n))?;
-    let system = scaled(a, b, c);
+    let system = scale_system(a, b, c);
     let size = system.a.norm().hypot(system.b.norm()).hypot(system.c.norm());
-    let all = n + b.ncols() + c.nrows();
-    let zero = TOLERANCE_PER_STATE * check::as_number(all) * size;
-    let (system, _) = reduced(system, DMatrix::zeros(0, n), zero)?;
+    let signals = n + b.ncols() + c.nrows();
+    let zero = TOLERANCE_PER_SIGNAL * check::as_number(signals) * size;
+    let (system, _) = reduce(system, DMatrix::zeros(0, n), zero)?;
     let dual = system.dual();
-    let none = DMatrix::zeros(0, dual.a.nrows());
-    let square = reduced(dual, none, zero)?.0.dual();
+    let no_outputs = DMatrix::zeros(0, dual.a.nrows());
+    let square = reduce(dual, no_outputs, zero)?.0.dual();
     let rank = square.d.nrows();
     if square.a.is_empty() {
         return Ok(Zeros { finite: Vec::new(), rank });
@@ -82,14 +82,14 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     if rank == 0 {
         return Ok(Zeros { finite: eigenvalues(&square.a)?, rank });
     }
-    let through = square.d.lu().solve(&square.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
-    let dynamics = check::in_range("A - B D^-1 C", square.a - square.b * through)?;
+    let quotient = square.d.lu().solve(&square.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
+    let dynamics = check::in_range("A - B D^-1 C", square.a - square.b * quotient)?;
     Ok(Zeros { finite: eigenvalues(&dynamics)?, rank })
 }
 
-/// The system {A, B, C, 0} with balanced states, and inputs and outputs scaled to the norm of A. It
-/// has the same zeros.
-fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
+/// The system {A, B, C, 0} with balanced states, and columns of B and rows of C scaled to the norm of A
+/// (1 for A = 0). It has the same zeros.
+fn scale_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
     let Balance { matrix, scale } = Balance::of_system(a, b, c);
     let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
     let c = multiply_columns(c, &scale).transpose();
@@ -102,7 +102,8 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
     }
 }
 
-/// The subsystem with the same zeros whose D has full row rank, and further outputs z = `output` x of its states.
+/// Reduces a system to a subsystem with the same zeros whose D has full row rank. Returns this subsystem, and the
+/// matrix of further outputs z = `output` x for its states.
 ///
 /// One pass of the reduction, with `zero` the threshold of the ranks:
 ///
@@ -114,7 +115,11 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
 ///    become outputs of the free states.
 ///
 /// The passes end when C2 fixes no further state.
-fn reduced(
+///
+/// # Errors
+///
+/// [`Error::NotConverged`].
+fn reduce(
     mut system: StateSpace,
     mut output: DMatrix<f64>,
     zero: f64,

@@ -7,19 +7,20 @@ use nalgebra::DMatrix;
 
 const DOUBLINGS: usize = 60;
 
-/// M' P M - P = -Q by P = sum of M'^k Q M^k, twice as many terms in each step, refined once.
+/// Solves the equation of the domain by doubling.
 ///
-/// The equation A' P + P A = -Q takes this form by the Cayley transform with gamma > 0,
+/// M' P M - P = -Q has P = sum of M'^k Q M^k; each step doubles the number of terms. The result is refined once. The
+/// equation A' P + P A = -Q takes this form by the Cayley transform with gamma > 0,
 ///
 /// ```text
 /// M = (A + gamma I) F,  Q_M = 2 gamma F' Q F,  F = (A - gamma I)^-1
 /// ```
 ///
-/// `remainder`: the left side plus Q. None if a power of M overflows or does not decay (A is not clearly stable), or if
-/// P overflows.
+/// `remainder`: the left side plus Q. None if a power of M overflows or does not decay (A is not clearly stable), if a
+/// matrix has no inverse, or if P overflows.
 ///
 /// Source: R. A. Smith, Matrix equation XA + BX = C, SIAM J. Appl. Math. 16 (1968).
-pub(super) fn doubled(
+pub(super) fn solve_by_doubling(
     a: &DMatrix<f64>,
     q: &DMatrix<f64>,
     domain: Domain,
@@ -54,7 +55,7 @@ pub(super) fn doubled(
     p.iter().all(|entry| entry.is_finite()).then_some(p)
 }
 
-/// M, M^2, M^4, ... until they have decayed.
+/// M, M^2, M^4, ... up to the first one whose square is negligible; None if there is none among 60, or one overflows.
 fn powers(first: DMatrix<f64>) -> Option<Vec<DMatrix<f64>>> {
     let mut powers = vec![first];
     for _ in 0..DOUBLINGS {

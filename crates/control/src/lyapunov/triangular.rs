@@ -4,7 +4,7 @@ use crate::Error;
 use crate::eigen::schur;
 use nalgebra::{Complex, DMatrix};
 
-/// A = U T U*, T upper triangular.
+/// The complex Schur form A = U T U*, T upper triangular.
 pub(super) struct Triangular {
     u: DMatrix<Complex<f64>>,
     t: DMatrix<Complex<f64>>,
@@ -16,7 +16,7 @@ impl Triangular {
         Ok(Self { u, t })
     }
 
-    /// A' P + P A = -Q: T* Y + Y T = -U* Q U column by column, forward in the rows; P = Re(U Y U*).
+    /// Solves A' P + P A = -Q: T* Y + Y T = -U* Q U column by column, forward in the rows; P = Re(U Y U*).
     pub(super) fn continuous(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
         let (t, n) = (&self.t, self.t.nrows());
         let mut y = self.enter_schur_basis(q);
@@ -35,12 +35,12 @@ impl Triangular {
         self.leave_schur_basis(&y)
     }
 
-    /// A' P A - P = -Q: T* Y T - Y = -U* Q U column by column, forward in the rows.
+    /// Solves A' P A - P = -Q: T* Y T - Y = -U* Q U column by column, forward in the rows; P = Re(U Y U*).
     pub(super) fn discrete(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
         let (t, n) = (&self.t, self.t.nrows());
         let mut y = self.enter_schur_basis(q);
         for col in 0..n {
-            // Column `col` of Y T, as far as it is known.
+            // Column `col` of Y T without the entries of Y that are not known yet.
             let mut product = y.columns(0, col) * t.view((0, col), (col, 1));
             for row in 0..n {
                 let mut sum = -y[(row, col)];

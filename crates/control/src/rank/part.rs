@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 /// The controllable part of x' = A x + B u, and the modes that no feedback moves.
 ///
 /// ```text
-/// z = T x:  z' = A_1 z + (rest) + B_1 u
+/// z = T x:  z' = A_1 z + (effect of the uncontrollable states) + B_1 u
 /// eigenvalues of A + B K_1 T = those of A_1 + B_1 K_1 and those of the fixed modes
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -29,15 +29,15 @@ pub struct ControllablePart {
 impl ControllablePart {
     /// K, m x n, of the feedback u = `K_1` z of the controllable part: K = `K_1` T.
     #[must_use]
-    pub fn gain(&self, of_part: &DMatrix<f64>) -> DMatrix<f64> {
-        of_part * &self.coordinates
+    pub fn gain(&self, part_gain: &DMatrix<f64>) -> DMatrix<f64> {
+        part_gain * &self.coordinates
     }
 }
 
 /// Splits x' = A x + B u into the controllable part and the uncontrollable modes.
 ///
-/// `a`: n x n; `b`: n x m. T = `Q_1`' S^-1 with the balancing S and the orthonormal basis `Q_1` of
-/// the staircase form. Method, cost and tolerance: see [`super::controllability`].
+/// `a`: n x n; `b`: n x m. T = `Q_1`' S^-1 with the scales S of the states and the orthonormal basis
+/// `Q_1` of the controllable states in the staircase form. Method, cost and tolerance: see [`super::controllability`].
 ///
 /// # Example
 ///
@@ -64,8 +64,8 @@ pub fn controllable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Controlla
     Ok(ControllablePart {
         a: staircase.reached_dynamics(),
         b: staircase.reached_input(b),
-        coordinates: divide_columns(&staircase.reached_basis.transpose(), &staircase.scale),
-        basis: multiply_rows(&staircase.reached_basis, &staircase.scale),
+        coordinates: divide_columns(&staircase.controllable_basis.transpose(), &staircase.scale),
+        basis: multiply_rows(&staircase.controllable_basis, &staircase.scale),
         fixed: modes_of(&staircase)?,
     })
 }

@@ -11,79 +11,90 @@ use nalgebra::{DMatrix, DVector};
 /// the scaled matrix.
 const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 
+/// The controllable and the uncontrollable states of a pair (A, B).
+///
 /// With x = S z: S^-1 A S [Q1, Q2] = [Q1, Q2] [A1, *; 0, R], Q2' S^-1 B = 0.
 pub(crate) struct Staircase {
-    pub(crate) answer: Rank,
+    pub(crate) decision: Rank,
     /// Q1, n x rank, orthonormal: the controllable states.
-    pub(crate) reached_basis: DMatrix<f64>,
+    pub(crate) controllable_basis: DMatrix<f64>,
     /// Q2, n x (n - rank), orthonormal: the uncontrollable states, Q2' S^-1 A S = R Q2'.
-    pub(crate) rest_basis: DMatrix<f64>,
-    /// R.
-    pub(crate) rest: DMatrix<f64>,
+    pub(crate) uncontrollable_basis: DMatrix<f64>,
+    /// R, the dynamics of the uncontrollable states.
+    pub(crate) uncontrollable: DMatrix<f64>,
     /// Diagonal of S, powers of two.
     pub(crate) scale: DVector<f64>,
+    /// S^-1 A S.
     balanced: DMatrix<f64>,
 }
 
 impl Staircase {
-    /// In balanced coordinates, or in the given ones if their rank is larger: states that do not act on each other are
-    /// scaled without end.
+    /// Computes the form in balanced coordinates, or without balancing if the rank is larger then: balancing scales
+    /// states that do not act on each other without end.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`].
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
-        let balanced = Self::with(Balance::new(a), b)?;
-        if balanced.answer.is_full() {
+        let balanced = Self::in_coordinates(Balance::new(a), b)?;
+        if balanced.decision.is_full() {
             return Ok(balanced);
         }
-        let unscaled = Self::with(Balance::none(a), b)?;
-        Ok(if unscaled.answer.rank > balanced.answer.rank { unscaled } else { balanced })
+        let unscaled = Self::in_coordinates(Balance::none(a), b)?;
+        Ok(if unscaled.decision.rank > balanced.decision.rank { unscaled } else { balanced })
     }
 
-    fn with(balance: Balance, b: &DMatrix<f64>) -> Result<Self, Error> {
+    fn in_coordinates(balance: Balance, b: &DMatrix<f64>) -> Result<Self, Error> {
         let Balance { matrix: balanced, scale } = balance;
         let n = balanced.nrows();
-        let (mut rest, mut rest_basis) = (balanced.clone(), DMatrix::identity(n, n));
-        let mut reached = Vec::with_capacity(n);
+        let (mut uncontrollable, mut basis) = (balanced.clone(), DMatrix::identity(n, n));
+        let mut controllable = Vec::with_capacity(n);
         let mut link = unit_columns(&divide_rows(b, &scale));
         let tolerance = TOLERANCE_PER_STATE * as_number(n);
         let mut margin = f64::INFINITY;
-        let size = rest.norm();
+        let size = uncontrollable.norm();
         let mut reference = link.norm();
-        while !rest.is_empty() {
+        while !uncontrollable.is_empty() {
             let step = Svd::new(&link.transpose())?;
             let rank = step.rank_above(tolerance * reference);
             if rank == 0 {
                 break;
             }
             margin = margin.min(step.values[rank - 1] / reference);
-            let transformed = step.right.transpose() * &rest * &step.right;
+            let transformed = step.right.transpose() * &uncontrollable * &step.right;
             let left = transformed.nrows() - rank;
             link = transformed.view((rank, 0), (left, rank)).into();
-            rest = transformed.view((rank, rank), (left, left)).into();
-            let new_basis: DMatrix<f64> = rest_basis * step.right;
-            reached.extend((0..rank).map(|column| new_basis.column(column).into_owned()));
-            rest_basis = new_basis.columns(rank, left).into();
+            uncontrollable = transformed.view((rank, rank), (left, left)).into();
+            let new_basis: DMatrix<f64> = basis * step.right;
+            controllable.extend((0..rank).map(|column| new_basis.column(column).into_owned()));
+            basis = new_basis.columns(rank, left).into();
             reference = size;
         }
-        let rank = reached.len();
+        let rank = controllable.len();
         let margin = if rank == 0 { 0.0 } else { margin };
-        let reached_basis = DMatrix::from_fn(n, rank, |i, j| reached[j][i]);
-        let answer = Rank { rank, n, tolerance, margin };
-        Ok(Self { answer, reached_basis, rest_basis, rest, scale, balanced })
+        Ok(Self {
+            decision: Rank { rank, n, tolerance, margin },
+            controllable_basis: DMatrix::from_fn(n, rank, |i, j| controllable[j][i]),
+            uncontrollable_basis: basis,
+            uncontrollable,
+            scale,
+            balanced,
+        })
     }
 
     /// Q1' S^-1 A S Q1: the dynamics of the controllable states.
     pub(crate) fn reached_dynamics(&self) -> DMatrix<f64> {
-        self.reached_basis.tr_mul(&self.balanced) * &self.reached_basis
+        self.controllable_basis.tr_mul(&self.balanced) * &self.controllable_basis
     }
 
     /// Q1' S^-1 B for a B whose columns are in the span of the controllable states.
     pub(crate) fn reached_input(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        self.reached_basis.tr_mul(&divide_rows(b, &self.scale))
+        self.controllable_basis.tr_mul(&divide_rows(b, &self.scale))
     }
 
-    /// Q1' S C', the transposed output matrix of the controllable states, and the norm of S C'; the
-    /// argument is C'.
+    /// Returns Q1' S C', the transposed output matrix of the controllable states, and the norm of S C', for C'.
     pub(crate) fn reached_output(&self, c_transposed: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
         let scaled = multiply_rows(c_transposed, &self.scale);
-        (self.reached_basis.tr_mul(&scaled), scaled.norm())
+        (self.controllable_basis.tr_mul(&scaled), scaled.norm())
     }
 }

@@ -93,7 +93,7 @@ fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
 /// The states that w reaches; None if these are all, or none.
 fn reached_part(system: &StateSpace) -> Result<Option<StateSpace>, Error> {
     let staircase = Staircase::new(&system.a, &system.b)?;
-    if staircase.answer.is_full() || staircase.answer.rank == 0 {
+    if staircase.decision.is_full() || staircase.decision.rank == 0 {
         return Ok(None);
     }
     let (c, _) = staircase.reached_output(&system.c.transpose());

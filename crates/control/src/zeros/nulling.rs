@@ -1,23 +1,23 @@
 //! The motions that the outputs of a system do not show.
 
-use super::{TOLERANCE_PER_STATE, reduced};
+use super::{TOLERANCE_PER_SIGNAL, reduce};
 use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::blocks::stacked;
 use crate::svd::Svd;
 use crate::{Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The motions x' = A x with w = W x for which y = C x + D w = 0: A has the invariant zeros as eigenvalues.
+/// The motions for which y stays zero: v' = S v with w = W v and z = Z v, where v has s entries.
 pub(crate) struct Nulling {
-    /// r x r, the dynamics.
+    /// S, s x s, whose eigenvalues are the invariant zeros.
     pub(crate) dynamics: DMatrix<f64>,
-    /// k x r: w of a state.
+    /// W, k x s.
     pub(crate) input: DMatrix<f64>,
-    /// z = E x + G w of a state.
+    /// Z, r x s.
     pub(crate) output: DMatrix<f64>,
 }
 
-/// The motions of x' = A x + B w that y = C x + D w does not show, with z = E x + G w.
+/// Computes the motions of x' = A x + B w that y = C x + D w does not show, with z = E x + G w.
 ///
 /// `system`: A to D; `output`: E, r x n; `direct`: G, r x k. None if w is not determined by y: D of the reduced
 /// system is not square then, and some w has no effect on y. Method: [`super::zeros()`], with D; states are
@@ -37,7 +37,7 @@ pub(crate) fn output_nulling(
     let columns = lengths(&stacked(&b, &system.d)).map(|length| size / length);
     let rows = stacked(&c.transpose(), &system.d.transpose());
     let rows = lengths(&rows).map(|length| size / length);
-    let all = a.nrows() + b.ncols() + c.nrows();
+    let signals = a.nrows() + b.ncols() + c.nrows();
     let scaled = StateSpace {
         b: multiply_columns(&b, &columns),
         c: DMatrix::from_diagonal(&rows) * c,
@@ -47,19 +47,19 @@ pub(crate) fn output_nulling(
     };
     let norms = [&scaled.a, &scaled.b, &scaled.c, &scaled.d].map(DMatrix::norm);
     let size = norms.into_iter().fold(0.0, f64::hypot);
-    let zero = TOLERANCE_PER_STATE * check::as_number(all) * size;
-    let (core, output) = reduced(scaled, multiply_columns(output, &scale), zero)?;
+    let zero = TOLERANCE_PER_SIGNAL * check::as_number(signals) * size;
+    let (core, output) = reduce(scaled, multiply_columns(output, &scale), zero)?;
     let inputs = core.b.ncols();
     if core.d.nrows() != inputs || Svd::new(&core.d)?.rank_above(zero) < inputs {
         return Ok(None);
     }
-    let through = core.d.lu().solve(&core.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
-    let dynamics = check::in_range("A - B D^-1 C", core.a - core.b * &through)?;
-    let input = -(DMatrix::from_diagonal(&columns) * through);
+    let quotient = core.d.lu().solve(&core.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
+    let dynamics = check::in_range("A - B D^-1 C", core.a - core.b * &quotient)?;
+    let input = -(DMatrix::from_diagonal(&columns) * quotient);
     Ok(Some(Nulling { dynamics, output: output + direct * &input, input }))
 }
 
-/// The length of each column; 1 for a column of zeros.
+/// The lengths of the columns; 1 for a column of zeros.
 fn lengths(m: &DMatrix<f64>) -> DVector<f64> {
     let length = |column: nalgebra::DVectorView<'_, f64>| match column.norm() {
         length if length > 0.0 => length,
