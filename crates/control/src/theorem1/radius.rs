@@ -129,6 +129,21 @@ fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64
     let scaled_y = scaled_y.evaluate(&unknowns);
     Ok(Some(DMatrix::from_fn(n, n, |i, j| {
         let reserve = if i == j { SOLVER_ERROR } else { 0.0 };
-        (scaled_y[(i, j)] + reserve) * d[i] * d[j]
+        // The product of both factors first: the result is symmetric to the last digit.
+        (scaled_y[(i, j)] + reserve) * (d[i] * d[j])
     })))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// [`lyapunov`] refuses a right-hand side that is not symmetric.
+    #[test]
+    fn the_surplus_is_symmetric_to_the_last_digit() {
+        let f = DMatrix::from_row_slice(3, 3, &[-1., 3., 0.2, -0.7, -2., 11., 0.3, -5., -0.9]);
+        let g = DMatrix::from_row_slice(3, 1, &[0.3, 1.7, 0.9]);
+        let surplus = best_surplus(&f, &g).unwrap().unwrap();
+        assert_eq!(surplus, surplus.transpose());
+    }
 }
