@@ -28,10 +28,9 @@ use standard::standard_directions;
 use subspace::AssignableSubspaces;
 
 /// Inputs count as dependent when a singular value of B, its columns scaled to length one, is below
-/// this.
+/// this fraction of the largest.
 const DEPENDENT_INPUTS: f64 = 1e-13;
-/// The eigenvalue error of an alternative is at most that of the chosen gain times the first, or the
-/// second.
+/// The eigenvalue error of an alternative is at most `LESS_EXACT` times that of the chosen gain, or at most `EXACT`.
 const LESS_EXACT: f64 = 10.0;
 const EXACT: f64 = 1e-9;
 
@@ -200,9 +199,9 @@ pub(crate) enum Coordinates<'a> {
 /// Which placements are computed.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Extent {
-    /// The chosen one.
+    /// The chosen one alone.
     Chosen,
-    /// Alternatives to it, too.
+    /// The chosen one and alternatives to it.
     Alternatives,
 }
 
@@ -224,7 +223,12 @@ impl PlacementProblem<'_> {
         Ok(self.alternatives(coordinates, Extent::Chosen)?.chosen)
     }
 
-    /// Assigns the eigenvalues, if `extent` says so by several choices of eigenvectors.
+    /// Assigns the eigenvalues by the chosen eigenvectors, by those of the standard methods and, with
+    /// [`Extent::Alternatives`], by others.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`place`].
     pub(crate) fn alternatives(
         &self,
         coordinates: &Coordinates<'_>,
@@ -297,15 +301,17 @@ impl PlacementProblem<'_> {
     }
 }
 
-/// The eigenvectors that can be assigned, in given coordinates.
+/// The eigenvectors that can be assigned, in coordinates z with x = S z, S diagonal.
 struct Assignable {
+    /// S^-1 A S.
     a: DMatrix<f64>,
-    /// The inputs combined such that the columns are orthonormal.
+    /// S^-1 B X, n x r, its columns orthonormal.
     b: DMatrix<f64>,
-    /// The combinations, m x r.
+    /// X, m x r.
     basis: DMatrix<f64>,
+    /// The subspaces of the eigenvectors for these A and B.
     problem: AssignableSubspaces,
-    /// Diagonal S with x = S z, z the coordinates of the problem.
+    /// Diagonal of S.
     units: DVector<f64>,
 }
 
@@ -320,13 +326,13 @@ impl Assignable {
         Ok(Self { a, b, basis, problem, units: units.clone() })
     }
 
-    /// K.
+    /// The gain K for x of the given directions.
     fn gain(&self, directions: &[DVector<f64>]) -> Result<DMatrix<f64>, Error> {
         let gain = &self.basis * deflation::gain(&self.a, &self.b, &self.problem, directions)?;
         check::in_range("K", divide_columns(&gain, &self.units))
     }
 
-    /// The eigenvectors of length one in the coordinates `scale`.
+    /// The eigenvectors in the coordinates x divided by `scale`, scaled to length one there.
     fn eigenvectors(&self, directions: &[DVector<f64>], scale: &DVector<f64>) -> DMatrix<f64> {
         self.problem.unit_eigenvectors(directions, &scale.component_div(&self.units))
     }
@@ -353,6 +359,7 @@ impl Assignment {
     }
 }
 
+/// Checks the number of the eigenvalues and that they are finite.
 fn check_poles(poles: &[Complex<f64>], n: usize) -> Result<(), Error> {
     if poles.len() != n {
         return Err(Error::PoleCount { expected: n, actual: poles.len() });

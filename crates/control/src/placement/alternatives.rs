@@ -21,7 +21,7 @@ pub struct Alternatives {
     /// Others, the lowest peak of S first, at most 21, above 24 states at most 2. Condition number
     /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
     pub others: Vec<Placement>,
-    /// The results of two methods, up to 24 states: of method 0 of Kautsky, Nichols and Van Dooren,
+    /// The results of two standard methods, up to 24 states, None if there is none: of method 0 of Kautsky, Nichols and Van Dooren,
     /// which needs real eigenvalues, and of the method of Tits and Yang, each with start and end as in
     /// scipy's `place_poles`. They are references for a choice, with figures that may be above those of
     /// the others. With one independent input both are the chosen one.
@@ -34,11 +34,12 @@ impl Alternatives {
         std::iter::once(&self.chosen).chain(&self.others)
     }
 
-    /// The candidates for a pair of feedback and observer: the chosen one and the others, and the results
-    /// of the standard methods, which come second.
+    /// The candidates for a pair of feedback and observer: first the chosen one and the others, second the results
+    /// of the standard methods that differ from the chosen one.
     ///
-    /// Of both only those whose condition number and gain are at most 9 % above the lower ones of the
-    /// standard methods, unless there are none.
+    /// Both lists have only placements whose condition number and gain are at most 9 % above the lower ones of the
+    /// standard methods, if there are such methods. If only the first list is empty, the second one takes its
+    /// place; if both are, the first list is that of all placements without the standard methods.
     #[must_use]
     pub fn candidates(&self) -> [Vec<&Placement>; 2] {
         let figures = |placement: &Placement| {
@@ -61,7 +62,8 @@ impl Alternatives {
         }
     }
 
-    /// The pairs of the results of the same standard method, see [`Self::standard`].
+    /// The pairs of the results of the same standard method for `self` and `other`; a method without a result for one of
+    /// them has no pair. See [`Self::standard`].
     pub fn standard_pairs<'a>(
         &'a self,
         other: &'a Self,
@@ -130,7 +132,7 @@ pub fn alternatives_discrete(
     problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
 }
 
-/// The largest number of alternatives for `n` states.
+/// The largest number of alternatives for `n` states; not limited up to the order `LARGEST_DESCENT`.
 pub(super) fn most_alternatives(n: usize) -> usize {
     if n <= LARGEST_DESCENT { usize::MAX } else { MOST_OF_LARGE }
 }

@@ -1,7 +1,7 @@
 //! The choice among eigenvectors by condition number, gain and peak of S together.
 
 use super::eigenvectors::{Directions, descend};
-use super::figures::{COUNT, FeedbackLoop};
+use super::figures::{COUNT, FeedbackLoop, Weighting};
 use crate::Error;
 use nalgebra::DVector;
 
@@ -49,18 +49,19 @@ impl<'a> Search<'a> {
     /// `widest`: those of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
     /// Tits and Yang find. The references of condition number and gain are the least among `widest`, or
     /// up to 10 % lower if a candidate is; that of S is the least peak that descents find with condition
-    /// number and gain within 5 % of their references, or as near as possible. The first candidate is kept (None) if it is
-    /// within 11 % in condition number and gain and within 2 % in S. Otherwise descents minimise a smooth
-    /// maximum of the three relative figures; of all directions that were found, those whose largest
-    /// relative figure is least are returned.
+    /// number and gain within 5 % of their references, or as near as possible.
+    ///
+    /// Returns None to keep the first candidate: if it is within 11 % in condition number and gain and within 2 % in
+    /// S, or if `widest` has no figures to refer to. Otherwise descents minimise a smooth maximum of the three relative
+    /// figures, and the directions of all searches whose largest relative figure is least are returned.
     pub(crate) fn choose(
         &mut self,
         candidates: &[Directions],
         widest: &[Directions],
     ) -> Result<Option<Directions>, Error> {
-        let (of_candidates, smooth_of_candidates) = self.offer(candidates)?;
+        let (of_candidates, smooth_of_candidates) = self.add(candidates)?;
         let first = self.results.first().map(|(figures, _)| *figures);
-        let (of_widest, smooth_of_widest) = self.offer(widest)?;
+        let (of_widest, smooth_of_widest) = self.add(widest)?;
         self.widest = of_widest;
         if !of_widest.iter().all(|figure| figure.is_normal()) {
             return Ok(None);
@@ -84,7 +85,7 @@ impl<'a> Search<'a> {
         let mut starts = self.results.clone();
         starts.sort_by(|x, y| ratio(x.0, reference).total_cmp(&ratio(y.0, reference)));
         for (_, start) in starts.iter().take(DESCENTS) {
-            self.descend(start, &|figures| least_peak(figures, &smooth))?;
+            self.descend(start, &|figures| penalised_peak(figures, &smooth))?;
         }
         if let Some((figures, directions)) = self.least_peak(reference) {
             reference[2] = figures[2];
@@ -95,13 +96,13 @@ impl<'a> Search<'a> {
         }
         let best = self.best(reference).cloned();
         for start in candidates.first().cloned().into_iter().chain(best) {
-            self.descend(&start, &|figures| maximum(figures, &smooth))?;
+            self.descend(&start, &|figures| smooth_maximum(figures, &smooth))?;
         }
         Ok(self.best(reference).cloned())
     }
 
-    /// Returns the directions that were found, or are in `more`, which are of largest volume, and
-    /// differ from `chosen` and from each other, the lowest peak of S first.
+    /// Returns the directions of all searches, and those in `more`, which are of largest volume, that differ from
+    /// `chosen` and from each other, the lowest peak of S first.
     ///
     /// Their condition number and gain are at most 9 % above the least ones of largest volume.
     pub(crate) fn others(
@@ -109,10 +110,10 @@ impl<'a> Search<'a> {
         chosen: &Directions,
         more: &[Directions],
     ) -> Result<Vec<Directions>, Error> {
-        let (of_more, _) = self.offer(more)?;
+        let (of_more, _) = self.add(more)?;
         let [condition, gain, _] = least(self.widest, of_more);
-        let is_near = |figures: Figures| ratio(figures, [condition, gain, f64::INFINITY]);
-        self.results.retain(|(figures, _)| is_near(*figures) <= ALTERNATIVE);
+        let reference = [condition, gain, f64::INFINITY];
+        self.results.retain(|(figures, _)| ratio(*figures, reference) <= ALTERNATIVE);
         self.results.sort_by(|x, y| x.0[2].total_cmp(&y.0[2]));
         let mut known: Vec<Figures> = self.feedback.figures(chosen)?.into_iter().collect();
         self.results.retain(|(figures, _)| {
@@ -125,8 +126,9 @@ impl<'a> Search<'a> {
         Ok(self.results.into_iter().map(|(_, directions)| directions).collect())
     }
 
-    /// Adds directions; returns their least figures and the least logarithms of the smooth ones.
-    fn offer(&mut self, all: &[Directions]) -> Result<(Figures, Figures), Error> {
+    /// Adds directions; returns their least figures and the least logarithms of the smooth ones. Directions without
+    /// figures are left out.
+    fn add(&mut self, all: &[Directions]) -> Result<(Figures, Figures), Error> {
         let (mut exact, mut smooth) = ([f64::INFINITY; COUNT], [f64::INFINITY; COUNT]);
         for directions in all {
             let values = (self.feedback.figures(directions)?, self.feedback.smooth(directions));
@@ -158,14 +160,15 @@ impl<'a> Search<'a> {
         best.map(|(_, directions)| directions)
     }
 
+    /// Adds the end of a descent of an objective from `start`.
     fn descend(
         &mut self,
         start: &Directions,
-        weigh: &dyn Fn(&Figures) -> (f64, Figures),
+        weighting: &Weighting,
     ) -> Result<(), Error> {
-        let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weigh);
+        let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weighting);
         let end = descend(self.feedback.problem, start.clone(), &slope, TOLERANCE)?;
-        self.offer(&[end])?;
+        self.add(&[end])?;
         Ok(())
     }
 }
@@ -183,8 +186,9 @@ fn ratio(figures: Figures, reference: Figures) -> f64 {
     figures.iter().zip(reference).map(|(figure, reference)| figure / reference).fold(0.0, f64::max)
 }
 
-/// ln(sum of e^(k x)) / k of the differences x, near their largest, and its partial derivatives.
-fn maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
+/// ln(sum of e^(k x)) / k of the differences x from the reference, which is near the largest of them, and its partial
+/// derivatives.
+fn smooth_maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
     let excess: Figures = std::array::from_fn(|figure| figures[figure] - reference[figure]);
     let largest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights = excess.map(|excess| (SHARPNESS * (excess - largest)).exp());
@@ -194,7 +198,7 @@ fn maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
 
 /// The peak of S with a penalty on condition number and gain above their references, and its partial
 /// derivatives.
-fn least_peak(figures: &Figures, reference: &Figures) -> (f64, Figures) {
+fn penalised_peak(figures: &Figures, reference: &Figures) -> (f64, Figures) {
     let mut value = figures[COUNT - 1];
     let mut weights = [0.0, 0.0, 1.0];
     for figure in 0..COUNT - 1 {

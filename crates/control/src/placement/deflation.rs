@@ -16,8 +16,8 @@ const DEPENDENT: f64 = 1e-14;
 ///
 /// K V = G alone loses as many digits of the eigenvalues as the condition number of V has. Here one
 /// eigenvalue, or pair, after the other is assigned in the part of the state space that is normal
-/// to the eigenvectors before it, so that in the orthonormal basis found the matrix A + B K is
-/// block triangular to a few rounding errors of its norm: the deflation of G. S. Miminis and C. C.
+/// to the eigenvectors before it, so that in the orthonormal basis of these parts A + B K is block
+/// triangular to a few rounding errors of its norm: the deflation of G. S. Miminis and C. C.
 /// Paige, A direct algorithm for pole assignment of time-invariant multi-input linear systems using
 /// state feedback, Automatica 24 (1988).
 pub(crate) fn gain(
@@ -53,7 +53,7 @@ pub(crate) fn gain(
 }
 
 /// The solution (V; G) nearest to a chosen one, in the part of the state space that `rest` spans;
-/// without a choice the one with the largest V for its length.
+/// without a choice the solution of length one with the largest V.
 fn nearest_solution(
     rest: &DMatrix<f64>,
     a: &DMatrix<f64>,

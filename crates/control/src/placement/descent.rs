@@ -6,7 +6,7 @@ const ITERATIONS: usize = 300;
 const TRIALS: usize = 20;
 /// Fraction of the predicted decrease that a step must reach.
 const ENOUGH: f64 = 1e-4;
-/// Fraction of the slope that may remain after a step.
+/// Fraction of the slope that a step may leave.
 const FLATTER: f64 = 0.9;
 /// Relative rounding error of a value; within it a step is accepted if it reduces the slope.
 const NOISE: f64 = 1e-15;
@@ -41,7 +41,7 @@ pub(crate) fn minimise(
     };
     let mut here = Point { at: start, value, gradient };
     let mut inverse_hessian = DMatrix::identity(dimension, dimension);
-    let mut mark = here.value;
+    let mut earlier = here.value;
     for iteration in 1..=ITERATIONS {
         let direction = -(&inverse_hessian * &here.gradient);
         if here.gradient.norm() <= FLAT || direction.dot(&here.gradient) >= 0.0 {
@@ -54,15 +54,16 @@ pub(crate) fn minimise(
         update(&mut inverse_hessian, &step, &change);
         here = next;
         if iteration % PATIENCE == 0 {
-            if here.value > mark - tolerance {
+            if here.value > earlier - tolerance {
                 break;
             }
-            mark = here.value;
+            earlier = here.value;
         }
     }
     (here.at, here.value)
 }
 
+/// Searches for the next point along `direction`; None if no trial lowers the value.
 fn search(
     function: &dyn Fn(&DVector<f64>) -> Evaluation,
     from: &Point,
@@ -70,18 +71,18 @@ fn search(
 ) -> Option<Point> {
     let slope = direction.dot(&from.gradient);
     let noise = NOISE * from.value.abs();
-    let lowered = |value: f64, gradient: &DVector<f64>, length: f64| {
+    let is_accepted = |value: f64, gradient: &DVector<f64>, length: f64| {
         value < from.value + ENOUGH * length * slope
             || (value <= from.value + noise && direction.dot(gradient).abs() < -FLATTER * slope)
     };
     let (mut low, mut high, mut length) = (0.0, f64::INFINITY, 1.0);
-    let mut lower = None;
+    let mut accepted = None;
     for _ in 0..TRIALS {
         let at = &from.at + direction * length;
         match function(&at) {
-            Some((value, gradient)) if lowered(value, &gradient, length) => {
+            Some((value, gradient)) if is_accepted(value, &gradient, length) => {
                 let flat_enough = direction.dot(&gradient) > FLATTER * slope;
-                lower = Some(Point { at, value, gradient });
+                accepted = Some(Point { at, value, gradient });
                 if flat_enough {
                     break;
                 }
@@ -91,10 +92,10 @@ fn search(
         }
         length = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low };
     }
-    lower
+    accepted
 }
 
-/// H becomes (I - r s y') H (I - r y s') + r s s' with r = 1 / s'y.
+/// The BFGS update of an inverse Hessian: H becomes (I - r s y') H (I - r y s') + r s s' with r = 1 / s'y.
 fn update(h: &mut DMatrix<f64>, s: &DVector<f64>, y: &DVector<f64>) {
     let curvature = s.dot(y);
     if curvature <= f64::EPSILON * s.norm() * y.norm() {

@@ -27,18 +27,19 @@ pub(crate) type Directions = Vec<DVector<f64>>;
 /// The directions of largest volume from each of several fixed starts.
 pub(crate) fn widest_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
-    (0..starts).map(|start| project(problem, spread(problem, start))).collect()
+    (0..starts).map(|start| enlarge_volume(problem, start_directions(problem, start))).collect()
 }
 
-/// Those from further starts; none above the order `LARGEST_DESCENT` and with one input.
+/// The directions of largest volume from further starts; none above the order `LARGEST_DESCENT`, and none with one
+/// input.
 pub(crate) fn more_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let small = problem.scale.len() <= LARGEST_DESCENT && problem.inputs() > 1;
     let further = if small { STARTS..2 * STARTS } else { 0..0 };
-    further.map(|start| project(problem, spread(problem, start))).collect()
+    further.map(|start| enlarge_volume(problem, start_directions(problem, start))).collect()
 }
 
-/// The directions of least condition number that descents from `starts` find; above the order
-/// `LARGEST_DESCENT` those of the best start.
+/// The directions of least condition number that descents from the first three `starts` find; above the order
+/// `LARGEST_DESCENT` the best of these starts.
 pub(crate) fn best_conditioned(
     problem: &AssignableSubspaces,
     starts: &[Directions],
@@ -63,8 +64,8 @@ pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(Svd::new(&eigenvectors.transpose())?.condition())
 }
 
-/// Quasi-random directions: the fractional parts of multiples of square roots.
-fn spread(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
+/// Quasi-random directions: the fractional parts of 1000 sqrt(k), another range of k for each start.
+fn start_directions(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
     let count = problem.scale.len() * problem.inputs();
     let mut seed = (2 + start * count..).map(|k| (1000.0 * as_number(k).sqrt()).fract() - 0.5);
     let mut direction = |space: &AssignableSubspace| {
@@ -76,14 +77,14 @@ fn spread(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
 }
 
 /// Replaces each eigenvector, or pair, in turn by the one that spans the largest volume with the
-/// others; several sweeps.
+/// others, in 20 sweeps; ends early if the eigenvectors become dependent.
 ///
 /// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
 /// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the
 /// others a volume in proportion to v1' (p q' - q p') v2 with two vectors p, q normal to them,
 /// greatest at an eigenvector of a symmetric matrix: A. L. Tits and Y. Yang, Globally convergent
 /// algorithms for robust pole assignment by state feedback, IEEE Trans. Autom. Control 41 (1996).
-fn project(
+fn enlarge_volume(
     problem: &AssignableSubspaces,
     mut directions: Vec<DVector<f64>>,
 ) -> Result<Vec<DVector<f64>>, Error> {
@@ -108,7 +109,8 @@ fn project(
     Ok(directions)
 }
 
-/// The w that spans the largest volume, `normals` spanning what is normal to the other vectors.
+/// The w, of any length, whose eigenvectors span the largest volume with the others; the columns of `normals` span
+/// the complement of the others.
 fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> {
     let n = normals.nrows();
     if space.poles.count() == 1 {
@@ -131,12 +133,12 @@ pub(crate) struct Slope {
     pub(crate) value: f64,
     /// With respect to the eigenvectors V.
     pub(crate) of_v: DMatrix<f64>,
-    /// With respect to the responses G; None if the function does not depend on them.
+    /// With respect to the responses of the problem, r rows; None if the function does not depend on them.
     pub(crate) of_g: Option<DMatrix<f64>>,
 }
 
-/// Descent in local coordinates that are centred anew in each round, until a round lowers the value
-/// by less than `tolerance`. The function is None where it is not defined.
+/// Minimises a function by descents in local coordinates around the end of the descent before, until one lowers the
+/// value by less than `tolerance`, at most five. The function is None where it is not defined.
 pub(crate) fn descend(
     problem: &AssignableSubspaces,
     mut directions: Directions,
@@ -182,12 +184,14 @@ struct Chart {
 }
 
 impl Chart {
+    /// Local coordinates that are zero at `centres`.
     fn around(problem: &AssignableSubspaces, centres: Vec<DVector<f64>>) -> Result<Self, Error> {
         let pairs = problem.spaces.iter().zip(&centres);
         let normals = pairs.map(|(space, w)| normals(space, w)).collect::<Result<_, _>>()?;
         Ok(Self { centres, normals })
     }
 
+    /// The directions at local coordinates t.
     fn directions(&self, t: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut first = 0;
         let direction = |(centre, normals): (&DVector<f64>, &DMatrix<f64>)| {

@@ -13,14 +13,14 @@ use std::f64::consts::PI;
 /// Number of figures.
 pub(crate) const COUNT: usize = 3;
 /// Frequencies for each decade at which S is evaluated, from a tenth of the slowest eigenvalue to
-/// ten times the fastest, and their largest number.
+/// ten times the fastest, in sampled time to half of the sample rate, and their largest number.
 const PER_DECADE: f64 = 12.0;
 const MOST_FREQUENCIES: f64 = 80.0;
-/// Exponent of the mean over the frequencies that takes the place of the maximum in the descent.
-const MEAN: f64 = 24.0;
+/// Exponent of the sum of powers over the frequencies that replaces the maximum in the descent.
+const EXPONENT: f64 = 24.0;
 
 /// Maps the logarithms of the figures to an objective and its partial derivatives.
-pub(crate) type Weigh<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + 'a;
+pub(crate) type Weighting<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + 'a;
 
 /// The feedback u = K x of a plant, as a function of the chosen eigenvectors.
 ///
@@ -39,7 +39,7 @@ pub(crate) struct FeedbackLoop<'a> {
     points: Vec<Complex<f64>>,
 }
 
-/// V, V^-1, G and V^-1 B for chosen directions.
+/// The eigenvectors and responses of chosen directions: V, V^-1, G and V^-1 B.
 struct Eigenstructure {
     v: DMatrix<f64>,
     inverse: DMatrix<f64>,
@@ -47,8 +47,8 @@ struct Eigenstructure {
     input: DMatrix<f64>,
 }
 
-/// The logarithm of a figure, smooth, and its gradients with respect to V and to G.
-struct Smooth {
+/// The logarithm of a smooth bound of a figure, and its gradients with respect to V and to G.
+struct SmoothFigure {
     value: f64,
     of_v: DMatrix<f64>,
     of_g: DMatrix<f64>,
@@ -69,7 +69,8 @@ impl<'a> FeedbackLoop<'a> {
         self.problem.spaces.iter().map(|space| space.poles)
     }
 
-    fn at(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
+    /// None where the eigenvectors are dependent.
+    fn eigenstructure(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
         let v = self.problem.eigenvectors(directions);
         let inverse = self.problem.inverse(directions)?;
         let responses = self.problem.scaled_responses(directions);
@@ -79,12 +80,12 @@ impl<'a> FeedbackLoop<'a> {
     }
 
     /// Condition number of the eigenvectors, 2-norm of K, largest singular value of S over the
-    /// frequencies (1 without frequencies); None where the eigenvectors are dependent.
+    /// frequencies, at least 1; None where the eigenvectors are dependent or a figure is not finite.
     pub(crate) fn figures(
         &self,
         directions: &[DVector<f64>],
     ) -> Result<Option<[f64; COUNT]>, Error> {
-        let Some(structure) = self.at(directions) else {
+        let Some(structure) = self.eigenstructure(directions) else {
             return Ok(None);
         };
         let condition = condition(&structure.v)?;
@@ -100,18 +101,23 @@ impl<'a> FeedbackLoop<'a> {
     }
 
     /// The logarithms of smooth bounds of the figures: Schatten norms of order 16 in place of the
-    /// 2-norms, a mean over the frequencies in place of the maximum.
+    /// 2-norms, a sum of powers over the frequencies in place of the maximum. None where the
+    /// eigenvectors are dependent.
     pub(crate) fn smooth(&self, directions: &[DVector<f64>]) -> Option<[f64; COUNT]> {
-        let structure = self.at(directions)?;
-        Some(self.all(&structure).map(|figure| figure.value))
+        let structure = self.eigenstructure(directions)?;
+        Some(self.smooth_figures(&structure).map(|figure| figure.value))
     }
 
-    /// `weigh` maps the values of [`Self::smooth`] to an objective and its partial derivatives;
-    /// returns the objective and its gradients with respect to V and to G, in the given inputs.
-    pub(crate) fn objective(&self, directions: &[DVector<f64>], weigh: &Weigh) -> Option<Slope> {
-        let structure = self.at(directions)?;
-        let figures = self.all(&structure);
-        let (value, weights) = weigh(&[0, 1, 2].map(|figure: usize| figures[figure].value));
+    /// The objective that `weighting` makes of the values of [`Self::smooth`], and its gradients with respect to
+    /// V and to the responses of the problem; None where it is not finite or the eigenvectors are dependent.
+    pub(crate) fn objective(
+        &self,
+        directions: &[DVector<f64>],
+        weighting: &Weighting,
+    ) -> Option<Slope> {
+        let structure = self.eigenstructure(directions)?;
+        let figures = self.smooth_figures(&structure);
+        let (value, weights) = weighting(&[0, 1, 2].map(|figure: usize| figures[figure].value));
         let mut of_v = DMatrix::zeros(structure.v.nrows(), structure.v.ncols());
         let mut of_g = DMatrix::zeros(structure.g.nrows(), structure.g.ncols());
         for (figure, weight) in figures.iter().zip(weights) {
@@ -123,7 +129,7 @@ impl<'a> FeedbackLoop<'a> {
         (value.is_finite() && finite).then_some(Slope { value, of_v, of_g })
     }
 
-    fn all(&self, structure: &Eigenstructure) -> [Smooth; COUNT] {
+    fn smooth_figures(&self, structure: &Eigenstructure) -> [SmoothFigure; COUNT] {
         [structure.condition(), structure.gain(), self.peak(structure)]
     }
 
@@ -159,8 +165,8 @@ impl<'a> FeedbackLoop<'a> {
         })
     }
 
-    /// dS = dG Z - G (s I - M)^-1 V^-1 dV V^-1 B.
-    fn peak(&self, structure: &Eigenstructure) -> Smooth {
+    /// The smooth peak of S; dS = dG Z - G (s I - M)^-1 V^-1 dV V^-1 B.
+    fn peak(&self, structure: &Eigenstructure) -> SmoothFigure {
         let (n, m) = structure.input.shape();
         let mut of_v = DMatrix::zeros(n, n);
         let mut of_g = DMatrix::zeros(m, n);
@@ -172,10 +178,10 @@ impl<'a> FeedbackLoop<'a> {
         });
         let norms: Vec<_> = norms.collect();
         let largest = norms.iter().map(|(_, _, value, _)| *value).fold(f64::NEG_INFINITY, f64::max);
-        let weight = |value: f64| (MEAN * (value - largest)).exp();
+        let weight = |value: f64| (EXPONENT * (value - largest)).exp();
         let total: f64 = norms.iter().map(|(_, _, value, _)| weight(*value)).sum();
         if norms.is_empty() {
-            return Smooth { value: 0.0, of_v, of_g };
+            return SmoothFigure { value: 0.0, of_v, of_g };
         }
         let mut back = DMatrix::zeros(n, m);
         let transposed = structure.g.transpose();
@@ -188,13 +194,13 @@ impl<'a> FeedbackLoop<'a> {
             of_g += (&re * z.map(|entry| entry.re).transpose()
                 + &im * z.map(|entry| entry.im).transpose())
                 * share;
-            // (s I - M)^-H G' D: the resolvent of M' at the conjugate point.
+            // The real part of (s I - M)^-H G' D, by the resolvent of M' for the conjugate of G' D.
             let (re, im) = (&transposed * re, &transposed * im);
             let d = DMatrix::from_fn(n, m, |i, j| Complex::new(re[(i, j)], -im[(i, j)]));
             back += self.transposed_resolvent(point, &d).map(|entry| entry.re) * share;
         }
         of_v -= structure.inverse.tr_mul(&back) * structure.input.transpose();
-        Smooth { value: largest + total.ln() / MEAN, of_v, of_g }
+        SmoothFigure { value: largest + total.ln() / EXPONENT, of_v, of_g }
     }
 
     /// (s I - M')^-1 N: the rows of a pair change their roles.
@@ -215,27 +221,28 @@ impl<'a> FeedbackLoop<'a> {
 }
 
 impl Eigenstructure {
-    /// d V^-1 = -V^-1 dV V^-1.
-    fn condition(&self) -> Smooth {
+    /// The smooth condition number; d V^-1 = -V^-1 dV V^-1.
+    fn condition(&self) -> SmoothFigure {
         let (size, mut of_v) = schatten(&self.v);
         let (of_inverse, gradient) = schatten(&self.inverse);
         of_v -= self.inverse.tr_mul(&gradient) * self.inverse.transpose();
         let of_g = DMatrix::zeros(self.g.nrows(), self.g.ncols());
-        Smooth { value: size + of_inverse, of_v, of_g }
+        SmoothFigure { value: size + of_inverse, of_v, of_g }
     }
 
-    /// dK = dG V^-1 - K dV V^-1.
-    fn gain(&self) -> Smooth {
+    /// The smooth norm of K; dK = dG V^-1 - K dV V^-1.
+    fn gain(&self) -> SmoothFigure {
         let k = &self.g * &self.inverse;
         let (value, gradient) = schatten(&k);
         let of_g = gradient * self.inverse.transpose();
         let of_v = -k.tr_mul(&of_g);
-        Smooth { value, of_v, of_g }
+        SmoothFigure { value, of_v, of_g }
     }
 }
 
 /// The logarithm of the Schatten norm of order 16, (trace (M M*)^8)^(1/16), and its gradient
-/// (M M*)^7 M / trace (M M*)^8. The norm is between the 2-norm and k^(1/16) times it, k the rank.
+/// (M M*)^7 M / trace (M M*)^8. The norm is between the 2-norm and k^(1/16) times it, k the rank. For
+/// M = 0 it counts as the smallest positive number, with the gradient 0.
 fn schatten<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> (f64, DMatrix<T>) {
     if m.nrows() > m.ncols() {
         let (value, gradient) = schatten(&m.adjoint());
@@ -254,7 +261,8 @@ fn schatten<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> (f64, DMatrix<T
     (unit.ln() + total.ln() / 16.0, gradient)
 }
 
-/// Points of the imaginary axis, or of the unit circle, for stable eigenvalues.
+/// The points of the imaginary axis, or of the unit circle, at which S is evaluated; none if an eigenvalue is not
+/// stable.
 fn points(poles: &[Complex<f64>], sampled: bool) -> Vec<Complex<f64>> {
     let stable = |pole: &Complex<f64>| if sampled { pole.norm() < 1.0 } else { pole.re < 0.0 };
     if !poles.iter().all(stable) {

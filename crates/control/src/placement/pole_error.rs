@@ -5,28 +5,36 @@ use crate::Error;
 use crate::eigen::eigenvalues;
 use nalgebra::{Complex, DMatrix};
 
-/// Largest distance of an eigenvalue from the requested one, relative to the distance of the latter from 0, for
-/// `x[k+1] = A x[k]` from 1: there 1 - z is about -s times the sample time for slow eigenvalues. Rounding errors of
-/// A + B K move a cluster of k eigenvalues near zero by about their k-th root.
+/// Largest relative error of an eigenvalue that is allowed.
+///
+/// It is relative to the distance of the requested eigenvalue from the origin: 0, in sampled time 1, because 1 - z is
+/// about -s times the sample time for slow eigenvalues. Rounding errors of A + B K move a cluster of k eigenvalues near
+/// zero by about their k-th root.
 const ALLOWED: f64 = 1e-2;
 
 impl PlacementProblem<'_> {
     /// The largest relative error, with requested and assigned eigenvalues paired, nearest first.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::PolesMissed`] if it is above 1e-2; [`Error::NotConverged`].
     pub(super) fn pole_error(&self, gain: &DMatrix<f64>) -> Result<f64, Error> {
-        let mut reached = eigenvalues(&(self.a + self.b * gain))?;
-        let mut open: Vec<_> = self.poles.iter().copied().zip(self.references()).collect();
+        let mut assigned = eigenvalues(&(self.a + self.b * gain))?;
+        let mut requested: Vec<_> = self.poles.iter().copied().zip(self.references()).collect();
         let mut worst = 0.0_f64;
-        while !open.is_empty() {
-            let pairs = (0..open.len()).flat_map(|i| (0..reached.len()).map(move |j| (i, j)));
+        while !requested.is_empty() {
+            let count = requested.len();
+            let pairs = (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
             let relative = |(i, j): (usize, usize)| {
-                let far = distance(reached[j], open[i].0);
-                if far > 0.0 { far / open[i].1 } else { 0.0 }
+                let (pole, reference) = requested[i];
+                let error = distance(assigned[j], pole);
+                if error > 0.0 { error / reference } else { 0.0 }
             };
             let nearest = pairs.min_by(|&x, &y| relative(x).total_cmp(&relative(y)));
             let Some((i, j)) = nearest else { break };
             worst = worst.max(relative((i, j)));
-            open.swap_remove(i);
-            reached.swap_remove(j);
+            requested.swap_remove(i);
+            assigned.swap_remove(j);
         }
         if worst > ALLOWED {
             return Err(Error::PolesMissed { relative: worst, allowed: ALLOWED });
@@ -34,19 +42,20 @@ impl PlacementProblem<'_> {
         Ok(worst)
     }
 
-    /// For each requested eigenvalue its distance from the origin; for an eigenvalue at the origin
-    /// the largest of these distances, or the norm of A if all are there.
+    /// For each requested eigenvalue its distance from the origin, 0 or in sampled time 1; for an eigenvalue
+    /// at the origin the largest of these distances, or if all are there the norm of A, in sampled time of A - I.
     fn references(&self) -> Vec<f64> {
         let (a, origin) = (self.a, if self.sampled { 1.0 } else { 0.0 });
-        let far: Vec<f64> = self.poles.iter().map(|&pole| distance(pole, origin.into())).collect();
-        let largest = far.iter().copied().fold(0.0, f64::max);
-        let moved = || a - DMatrix::from_diagonal_element(a.nrows(), a.ncols(), origin);
-        let least = if largest > 0.0 { largest } else { moved().norm() };
-        far.into_iter().map(|far| if far > 0.0 { far } else { least }).collect()
+        let distances: Vec<f64> =
+            self.poles.iter().map(|&pole| distance(pole, origin.into())).collect();
+        let largest = distances.iter().copied().fold(0.0, f64::max);
+        let shifted = || a - DMatrix::from_diagonal_element(a.nrows(), a.ncols(), origin);
+        let substitute = if largest > 0.0 { largest } else { shifted().norm() };
+        distances.into_iter().map(|far| if far > 0.0 { far } else { substitute }).collect()
     }
 }
 
-/// |x - y|, of numbers whose squares may leave the range.
+/// |x - y|, without overflow of the squares.
 pub(crate) fn distance(x: Complex<f64>, y: Complex<f64>) -> f64 {
     (x.re - y.re).hypot(x.im - y.im)
 }

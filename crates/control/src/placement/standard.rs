@@ -19,13 +19,18 @@ const EIGEN_ITERATIONS: usize = 1000;
 
 /// The directions of method 0 of Kautsky, Nichols and Van Dooren, and of the method of Tits and Yang.
 ///
-/// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues. Neither is computed
-/// above 24 states or with one input. With as many inputs as states both have the unit vectors.
+/// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues, otherwise it is None.
+/// Neither is computed above 24 states or with one input. With as many inputs as states both have the unit
+/// vectors. A result that is not finite is None.
 ///
-/// Both enlarge the determinant of the eigenvectors of length one, the first by one of them at a time,
-/// the second by two. They end at a local optimum, or before it, which depends on their start; it is
-/// the one of scipy: for each eigenvalue the sum of the basis of its subspace that Householder
-/// reflections give. So their figures are those that scipy reaches, up to rounding.
+/// Both methods enlarge the determinant of the eigenvectors of length one; the first changes one of them at a
+/// time, the second two. The result depends on the start, which is that of scipy: for each eigenvalue the sum
+/// of the basis of its subspace that Householder reflections give. So the figures are those that scipy reaches,
+/// up to rounding.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`].
 ///
 /// Sources: see [`super::place`]; the start: scipy 1.17, `scipy.signal.place_poles`.
 pub(crate) fn standard_directions(
@@ -54,7 +59,7 @@ pub(crate) fn standard_directions(
     Ok([knv.filter(is_finite), Some(yt).filter(is_finite)])
 }
 
-/// The eigenvectors while they are improved.
+/// The eigenvectors and their subspaces in the iteration of both methods.
 #[derive(Clone)]
 struct Iteration {
     /// One column for each real eigenvalue, in ascending order; then real and imaginary part for each
@@ -70,7 +75,7 @@ struct Iteration {
 
 impl Iteration {
     /// The start of scipy: for each eigenvalue p the sum of the basis of the x with N' (A - p I) x = 0, the columns of
-    /// N normal to those of B.
+    /// N normal to those of B; for r = n the unit vectors.
     fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, problem: &AssignableSubspaces) -> Self {
         let (n, r) = b.shape();
         let count = |number: &usize| problem.spaces[*number].poles.count();
@@ -99,7 +104,7 @@ impl Iteration {
         start
     }
 
-    /// Sweeps over pairs of columns in the given order; the same column twice is one alone.
+    /// Improves pairs of columns in the given order, in at most 30 sweeps; the same column twice is a column alone.
     fn run(mut self, order: &[(usize, usize)]) -> Result<Self, Error> {
         let floor = f64::EPSILON.sqrt();
         for _ in 0..SWEEPS {
@@ -125,11 +130,12 @@ impl Iteration {
         Reflections::new(others).last_columns(columns.len())
     }
 
+    /// The basis of the subspace of a real eigenvalue.
     fn kernel(&self, column: usize) -> DMatrix<f64> {
         self.kernels[column].map(|entry| entry.re)
     }
 
-    /// The projection of the normal of the plane that the others span.
+    /// Replaces column j by the projection, onto its subspace, of the normal of the plane that the others span.
     fn improve_one(&mut self, j: usize) {
         let kernel = self.kernel(j);
         let projection = &kernel * kernel.tr_mul(&self.normals(&[j]));
@@ -138,7 +144,7 @@ impl Iteration {
         }
     }
 
-    /// The two vectors x, y of largest x' (u v' - v u') y with u and v normal to the others.
+    /// Replaces columns i and j by the x and y of the largest x' (u v' - v u') y, u and v normal to the others.
     fn improve_two(&mut self, i: usize, j: usize) -> Result<(), Error> {
         let n = self.vectors.nrows();
         let normals = self.normals(&[i.min(j), i.max(j)]);
@@ -164,8 +170,8 @@ impl Iteration {
         Ok(())
     }
 
-    /// The eigenvector of the pair in columns i and i + 1 whose real and imaginary part span the
-    /// largest area beside the others.
+    /// Replaces columns i and i + 1 by the real and the imaginary part of the eigenvector that spans the largest
+    /// volume with the others.
     fn improve_pair(&mut self, i: usize) -> Result<(), Error> {
         let normals = self.normals(&[i, i + 1]);
         let kernel = &self.kernels[i];
@@ -198,6 +204,7 @@ impl Iteration {
         Ok(())
     }
 
+    /// The directions of the eigenvectors, in the order of the spaces of the problem.
     fn directions(&self, problem: &AssignableSubspaces) -> Directions {
         let mut ordered: Vec<Vec<DVector<f64>>> = vec![vec![]; self.order.len()];
         let mut column = 0;

@@ -23,7 +23,7 @@ pub(crate) struct AssignableSubspaces {
     pub(crate) spaces: Vec<AssignableSubspace>,
     /// Units of the states that give eigenvectors entries of similar size; powers of two.
     pub(crate) scale: DVector<f64>,
-    /// Units of the responses G.
+    /// Units of the responses G; powers of two.
     pub(crate) response_scale: DVector<f64>,
 }
 
@@ -38,7 +38,11 @@ pub(crate) struct AssignableSubspace {
 }
 
 impl AssignableSubspaces {
-    /// `a`: n x n, `b`: n x r of rank r, the pair controllable.
+    /// Computes the subspaces for `a`, n x n, and `b`, n x r of rank r, a controllable pair.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`].
     pub(crate) fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
@@ -73,7 +77,7 @@ impl AssignableSubspaces {
         Ok(Self { spaces, scale, response_scale: units.rows(n, r).into() })
     }
 
-    /// Number of free parameters w per eigenvector.
+    /// r, the number of free parameters in w for each eigenvector.
     pub(crate) fn inputs(&self) -> usize {
         self.response_scale.len()
     }
@@ -109,8 +113,8 @@ impl AssignableSubspaces {
         side_by_side(units.len(), columns)
     }
 
-    /// The directions of given eigenvectors: one column for a real eigenvalue, two for a pair, of
-    /// length one.
+    /// The directions, of length one, nearest to given eigenvectors: one column for a real eigenvalue, two for a
+    /// pair.
     pub(crate) fn directions_of(&self, eigenvectors: &DMatrix<f64>) -> Vec<DVector<f64>> {
         let mut column = 0;
         let direction = |space: &AssignableSubspace| {
@@ -128,13 +132,13 @@ impl AssignableSubspaces {
     }
 }
 
-/// Stacked columns of that many rows, laid out side by side.
+/// Splits stacked columns into columns of `rows` entries and places them side by side.
 fn side_by_side(rows: usize, stacked: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
     let entries: Vec<f64> = stacked.flat_map(|column| column.data.as_vec().clone()).collect();
     DMatrix::from_vec(rows, entries.len() / rows, entries)
 }
 
-/// Length of the columns of V together for eigenvectors of length one.
+/// The Frobenius norm of the real V of `count` eigenvectors of length one.
 fn root(count: usize) -> f64 {
     if count == 2 { std::f64::consts::SQRT_2 } else { 1.0 }
 }
@@ -165,7 +169,7 @@ pub(crate) fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) ->
     beside(&shifted, &one.kronecker(b))
 }
 
-/// Orthonormal basis of the null space of independent rows, small entries included.
+/// An orthonormal basis of the null space of a matrix with independent rows; its small entries are precise, too.
 pub(crate) fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let (rank, all) = equations.shape();
     Ok(Svd::new(equations)?.right.columns(rank, all - rank).into())
@@ -186,8 +190,8 @@ fn row_sizes(solutions: &[DMatrix<f64>], blocks: &[PoleBlock], n: usize) -> DVec
         let count = poles.count();
         for (row, entries) in solution.row_iter().enumerate() {
             let states = count * n;
-            let of = if row < states { row % n } else { n + (row - states) % (rows - n) };
-            sizes[of] += entries.norm_squared();
+            let signal = if row < states { row % n } else { n + (row - states) % (rows - n) };
+            sizes[signal] += entries.norm_squared();
         }
     }
     let total = sizes.sum();

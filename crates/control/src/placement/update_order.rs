@@ -3,8 +3,8 @@
 /// Pairs of columns, from 0, for one sweep over `n` columns, the first `reals` of which belong to real
 /// eigenvalues in ascending order and the others to conjugate pairs.
 ///
-/// Each real eigenvalue is paired with all others, each pair is repeated after each group of these. A
-/// single real eigenvalue has the same column twice.
+/// Each real eigenvalue is combined with all other real ones; the conjugate pairs are repeated after each group of
+/// these combinations. A single real eigenvalue has the same column twice.
 ///
 /// Source: A. L. Tits and Y. Yang (see [`super::place`]), page 1442, as scipy reads it.
 pub(crate) fn update_order(reals: usize, n: usize) -> Vec<(usize, usize)> {
