@@ -15,8 +15,8 @@
 //!   and no filter of any order is.
 //! * [`noiseless_norm_lower_bound`], [`disc_norm_lower_bound`]: the same for measurements without noise, and for
 //!   gains whose eigenvalues are in a disc.
-//! * [`certify_common`], [`common_feedback`]: the same for a family of systems, with one P and one
-//!   gain for all of them.
+//! * [`certify_common`], [`common_feedback`]: prove that the eigenvalues of all members of a family are in a
+//!   region, with one P, and compute one gain for all of them.
 //! * [`certify_schedule`]: proves that a loop that depends on a scheduling variable is stable while
 //!   this variable changes at a bounded rate, with a P that depends on it, too.
 //! * [`constant_gain`]: the static gain whose worst error over a family of systems is least.
@@ -73,8 +73,8 @@ use nalgebra::{DMatrix, DVector};
 pub enum Outcome<T, C = &'static str> {
     /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
-    /// According to the solver no solution exists: these requirements contradict each other, and
-    /// every one of them is necessary for the contradiction.
+    /// No solution exists, according to eigenvalues or to the solver: these requirements are violated or
+    /// contradict each other; every one of them is necessary for the contradiction.
     Infeasible {
         /// Their names, in the order in which they were stated; for a family the indices of its
         /// members.

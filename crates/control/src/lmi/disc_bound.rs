@@ -1,6 +1,6 @@
 //! A lower bound of the H-infinity norm for gains whose eigenvalues are in a disc.
 
-use super::noiseless::{ROUNDING, checked};
+use super::noiseless::{ROUNDING, check_observer};
 use super::{Disc, Performance};
 use crate::Error;
 use crate::check::as_number;
@@ -8,7 +8,8 @@ use crate::svd::Svd;
 use crate::zeros::{Zeros, zeros};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// The points s > 0 at which det H is considered: up to so many on each side of R, so many in a decade.
+/// The points s > 0 at which det H is considered: `POINTS` on each side of 1 / (least Re(-1 / s) of the region),
+/// `PER_DECADE` in a decade.
 const POINTS: i32 = 60;
 const PER_DECADE: f64 = 20.0;
 /// Bisections for the sum of the inverse eigenvalues.
@@ -29,26 +30,28 @@ const BISECTIONS: usize = 30;
 /// mirrored into the left half plane, det T is nowhere on s > 0 larger than its maximum on the imaginary axis;
 /// s = (n - q) R / q is the best point.
 ///
-/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I, and det H(s) / det H(0) is the
-/// product of (1 - s / `z_j`) over the invariant zeros of (A, B, C) by the product of (1 + s `v_i`), `v_i` = -1 / `s_i` of the
-/// eigenvalues: L acts on both conditions
+/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. det H(s) / det H(0) is the product of
+/// (1 - s / `z_j`) over the invariant zeros of (A, B, C), divided by the product of (1 + s `v_i`) with `v_i` = -1 / `s_i`
+/// for the eigenvalues `s_i`. This gives two bounds, on which L acts by its eigenvalues only:
 ///
 /// ```text
 /// gamma >= |sum of v_i - zeta| / sum of 1 / sigma_i(E B),     zeta = sum of -1 / z_j           (the trace at s = 0)
 /// gamma >= sigma_min(E B) (1 - |det H(s)|^(1/q)) / s                                           at each s > 0
 /// ```
 ///
-/// by its eigenvalues only. The larger their sum of Re `v_i`, the larger the second one, whose least value for a sum
-/// has as many `v_i` at the ends of their range as possible. So min(first at a sum, second at this sum) is a bound for
-/// each sum below zeta; the best one is searched.
+/// The larger the sum of Re `v_i`, the larger the second bound, whose least value for a sum has as many `v_i` at the ends
+/// of their range as possible. So min(first at a sum, second at this sum) is a bound for each sum below zeta; the best
+/// sum is searched.
 ///
-/// The largest of these bounds, less 1e-6 for rounding errors; None if none is above 0. For a plant with slow zeros
-/// beside the disc they may be far below the least norm. All are our own.
+/// Returns the largest of these bounds, less 1e-6 for rounding errors; None if none is above 0, if E B has no inverse, or
+/// if D is not 0. For a plant with slow zeros beside the disc the bounds may be far below the least norm. Source: the
+/// derivation above, which is our own.
 ///
 /// # Errors
 ///
-/// Same as [`super::noiseless_norm_lower_bound`]; [`Error::OutOfRange`] for a disc that does not reach the left half
-/// plane.
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bound of
+/// `performance` that is not above 0, or a disc that does not reach the left half plane; [`Error::NotConverged`];
+/// [`Error::Overflow`].
 pub fn disc_norm_lower_bound(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
@@ -56,7 +59,7 @@ pub fn disc_norm_lower_bound(
     disc: Disc,
     decay: f64,
 ) -> Result<Option<f64>, Error> {
-    let (n, k, r) = checked(a, c, performance)?;
+    let (n, k, r) = check_observer(a, c, performance)?;
     let Performance { disturbance: b, output: e, feedthrough, .. } = performance;
     let Disc { center, radius } = disc;
     let reach = radius - center;
@@ -79,7 +82,7 @@ pub fn disc_norm_lower_bound(
     let constant = (e * a).norm() <= f64::EPSILON * e.norm() * a.norm();
     if c.nrows() == k && constant {
         let Zeros { finite, rank } = zeros(a, b, c)?;
-        let eigenvalues = Inverses {
+        let eigenvalues = InverseRange {
             count: order,
             least: slowest_rate(disc, decay),
             largest: 1.0 / (-center - radius).max(decay).max(0.0),
@@ -92,31 +95,31 @@ pub fn disc_norm_lower_bound(
     Ok((bound > 0.0).then_some(bound))
 }
 
-/// The range of Re(-1 / s) of the eigenvalues s; the upper end may be infinite.
-struct Inverses {
+/// The number of the eigenvalues s and the range of their Re(-1 / s); the upper end may be infinite.
+struct InverseRange {
     count: f64,
     least: f64,
     largest: f64,
 }
 
-impl Inverses {
+impl InverseRange {
     /// The logarithm of the largest product of 1 / (1 + a v) over all v with this sum.
     fn largest_log(&self, sum: f64, a: f64) -> f64 {
         let free = (sum - self.count * self.least).max(0.0);
         let width = self.largest - self.least;
-        let of = |v: f64| -(a * v).ln_1p();
+        let factor = |v: f64| -(a * v).ln_1p();
         let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
         if at_end >= self.count {
-            return self.count * of(self.largest);
+            return self.count * factor(self.largest);
         }
-        let ends = if at_end > 0.0 { at_end * of(self.largest) } else { 0.0 };
-        let left = if at_end > 0.0 { free - at_end * width } else { free };
-        ends + of(self.least + left) + (self.count - at_end - 1.0) * of(self.least)
+        let ends = if at_end > 0.0 { at_end * factor(self.largest) } else { 0.0 };
+        let remainder = if at_end > 0.0 { free - at_end * width } else { free };
+        ends + factor(self.least + remainder) + (self.count - at_end - 1.0) * factor(self.least)
     }
 }
 
 /// The bound by the trace at 0 and det H at points s > 0; `sizes`: the q singular values of E B.
-fn by_zeros(eigenvalues: &Inverses, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
+fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
     let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
     let inputs = as_number(sizes.len());
     let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();

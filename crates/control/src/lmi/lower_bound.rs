@@ -3,7 +3,7 @@
 use super::affine::Affine;
 use super::coordinates::{time_unit, unit_near};
 use super::definite::margin;
-use super::noiseless::checked;
+use super::noiseless::check_observer;
 use super::region::MARGIN;
 use super::weighted::grid;
 use super::{Performance, Problem};
@@ -23,15 +23,16 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// ```
 ///
 /// Such an H is the covariance of growing disturbances that the measurement does not show: every
-/// filter estimates z = 0. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C, so that the
-/// error after the last sample counts, which the next measurement may show. So no filter from y to an estimate of z, of any order, has an error with a
-/// smaller norm; for error dynamics A - L C the traces of H with the inequality of the norm (see
-/// [`super::certify_gain`]) give the bound, whatever L is. The largest bound is computed; it equals the
-/// least norm of any filter (strong duality), which gains in general only approach.
+/// filter estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a smaller norm.
+/// For error dynamics A - L C the traces of H with the inequality of the norm (see [`super::certify_gain`]) give the
+/// bound for every L. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C: the error one sample
+/// after the last measurement counts. The largest bound is computed; it equals the least norm of any filter (strong
+/// duality), which gains in general only approach.
 ///
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm
 /// and bound are not used. None if D has not full row rank (a measurement without noise), if no filter
-/// exists, or if the inequalities could not be verified in double precision.
+/// exists, if no such disturbance reaches a state or E = 0, or if the inequalities could not be verified in double
+/// precision.
 ///
 /// Method: w = -D' (D D')^-1 C x + N d with the null space N of D meets [C, D] H = 0. The
 /// semidefinite program for the covariance of (x, d) is solved for the part of the states that d
@@ -66,14 +67,15 @@ use nalgebra::{DMatrix, SymmetricEigen};
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`].
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bound of
+/// `performance` that is not above 0; [`Error::NotConverged`].
 pub fn observer_norm_lower_bound(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     performance: &Performance,
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
-    checked(a, c, performance)?;
+    check_observer(a, c, performance)?;
     let Some(hidden) = HiddenDisturbance::new(a, c, performance, domain)? else { return Ok(None) };
     hidden.largest_ratio()
 }
@@ -81,8 +83,8 @@ pub fn observer_norm_lower_bound(
 /// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of
 /// [`observer_norm_lower_bound`] for the transposed system.
 ///
-/// `a`, `b`, `performance`: as for [`super::state_feedback`]. None as there; D is the transposed
-/// `feedthrough`, so every command must have a weight.
+/// `a`, `b`, `performance`: as for [`super::state_feedback`]. None in the cases of [`observer_norm_lower_bound`], whose D
+/// is the transposed `feedthrough`: every command must have a weight.
 ///
 /// # Errors
 ///
@@ -96,11 +98,14 @@ pub fn feedback_norm_lower_bound(
     observer_norm_lower_bound(&a.transpose(), &b.transpose(), &performance.transposed(), domain)
 }
 
-/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x.
+/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x, for the states that d
+/// reaches.
 struct HiddenDisturbance {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
+    /// W.
     energy: DMatrix<f64>,
+    /// E.
     output: DMatrix<f64>,
     /// Lower triangular R: x = R x~ in coordinates of about one.
     scale: DMatrix<f64>,
@@ -108,7 +113,8 @@ struct HiddenDisturbance {
 }
 
 impl HiddenDisturbance {
-    /// None if D has not full row rank or there is no Kalman filter.
+    /// None if D has not full row rank, d reaches no state, or there is no Kalman filter with a positive definite
+    /// covariance.
     fn new(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
@@ -144,7 +150,8 @@ impl HiddenDisturbance {
         }))
     }
 
-    /// The root of the largest ratio of the energies of z and w.
+    /// The root of the largest ratio of the energies of z and w; None if z has none, or the ratio could not be computed
+    /// or verified.
     fn largest_ratio(&self) -> Result<Option<f64>, Error> {
         let (order, free) = self.b.shape();
         let scale = &self.scale;
@@ -175,7 +182,8 @@ impl HiddenDisturbance {
         self.verified(&symmetric_part(&(&to * covariance.evaluate(&unknowns) * to.transpose())))
     }
 
-    /// The ratio of a covariance of (x, d), if its inequalities hold by more than rounding.
+    /// The root of the ratio of the energies of z and w for a covariance of (x, d); None if its inequalities do not hold
+    /// by more than rounding errors.
     fn verified(&self, covariance: &DMatrix<f64>) -> Result<Option<f64>, Error> {
         let growth = self.growth(&Affine::constant(covariance)).constant;
         if margin(covariance)? <= 0.0 || margin(&growth)? <= 0.0 {
@@ -221,7 +229,7 @@ impl HiddenDisturbance {
     }
 }
 
-/// tr(M X).
+/// tr(M X) for a symmetric M.
 pub(super) fn product_trace(x: &Affine, m: &DMatrix<f64>) -> Affine {
     let terms = x.terms.iter().map(|(at, unit)| (*at, DMatrix::from_element(1, 1, m.dot(unit))));
     Affine { constant: DMatrix::from_element(1, 1, m.dot(&x.constant)), terms: terms.collect() }

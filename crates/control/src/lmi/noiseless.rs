@@ -9,7 +9,7 @@ use crate::zeros::{Nulling, output_nulling};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Relative distance of a zero from the stability limit below which nothing is said.
+/// Relative distance of a zero from the stability limit below which no bound is stated.
 const ON_THE_LIMIT: f64 = 1e-7;
 /// Relative remainder of the unstable part of the zeros that is accepted.
 const REMAINDER: f64 = 1e-9;
@@ -39,8 +39,8 @@ const SETTLED: f64 = 1e-13;
 ///
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and
 /// bound are not used. None if some w has no effect on y (with noise see
-/// [`super::observer_norm_lower_bound`]), if a zero is on the stability limit, or in sampled time an eigenvalue
-/// of A is -1. The bound is lowered by 1e-6 for rounding errors; the remainder of the equation for X and S is at
+/// [`super::observer_norm_lower_bound`]), if a zero is on the stability limit, if in sampled time an eigenvalue
+/// of A is -1, or if rounding errors hide the unstable zeros. The bound is lowered by 1e-6 for rounding errors; the remainder of the equation for X and S is at
 /// most 1e-9, relative.
 ///
 /// Source: the interpolation problem of Nevanlinna and Pick, as in B. A. Francis, A course in H-infinity control
@@ -70,15 +70,16 @@ const SETTLED: f64 = 1e-13;
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`];
-/// [`Error::Overflow`]; those of [`lyapunov`].
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bound of
+/// `performance` that is not above 0; [`Error::NotConverged`], [`Error::Overflow`], [`Error::ResidualTooLarge`],
+/// [`Error::NotHurwitz`] when rounding prevents a solution.
 pub fn noiseless_norm_lower_bound(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     performance: &Performance,
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
-    let (n, k, r) = checked(a, c, performance)?;
+    let (n, k, r) = check_observer(a, c, performance)?;
     let Performance { disturbance: b, output: e, feedthrough: d, .. } = performance;
     let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d: d.clone(), domain };
     let (system, e, g) = match domain {
@@ -102,15 +103,15 @@ pub fn noiseless_norm_lower_bound(
         }
     };
     let Some(nulling) = output_nulling(&system, &e, &g)? else { return Ok(None) };
-    let Some((basis, growing)) = unstable_part(&nulling.dynamics)? else { return Ok(None) };
-    if growing.is_empty() {
+    let Some(unstable) = unstable_part(&nulling.dynamics)? else { return Ok(None) };
+    if unstable.dynamics.is_empty() {
         return Ok(Some(0.0));
     }
-    largest_ratio(&nulling, &basis, &growing)
+    largest_ratio(&nulling, &unstable)
 }
 
-/// Checks the matrices of an observer; returns the numbers of states, of w and of z.
-pub(super) fn checked(
+/// Checks the matrices of an observer and the bound of `performance`; returns the numbers of states, of w and of z.
+pub(super) fn check_observer(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     performance: &Performance,
@@ -122,15 +123,13 @@ pub(super) fn checked(
     Ok((n, k, r))
 }
 
-/// The root of the largest ratio of the energies of z and w over all e^(S t) v.
-fn largest_ratio(
-    nulling: &Nulling,
-    basis: &DMatrix<f64>,
-    growing: &DMatrix<f64>,
-) -> Result<Option<f64>, Error> {
-    let energy = |of: &DMatrix<f64>| {
-        let of = of * basis;
-        lyapunov(&-growing, &symmetric_part(&of.tr_mul(&of))).map(|solution| solution.p)
+/// The root of the largest ratio of the energies of z and w over all e^(S t) v; None if the energy of w is not positive
+/// definite within rounding errors.
+fn largest_ratio(nulling: &Nulling, unstable: &InvariantSubspace) -> Result<Option<f64>, Error> {
+    let energy = |signal: &DMatrix<f64>| {
+        let signal = signal * &unstable.basis;
+        let square = symmetric_part(&signal.tr_mul(&signal));
+        lyapunov(&-&unstable.dynamics, &square).map(|solution| solution.p)
     };
     let (of_z, of_w) = (energy(&nulling.output)?, energy(&nulling.input)?);
     let Some(factor) = of_w.cholesky() else { return Ok(None) };
@@ -143,16 +142,24 @@ fn largest_ratio(
     Ok(Some(largest.sqrt() * (1.0 - ROUNDING)))
 }
 
-/// An orthonormal basis U of the invariant subspace of the eigenvalues with positive real parts, and S with
-/// A U = U S; both empty if there are none, None if an eigenvalue is on the imaginary axis or U is not accurate.
+/// An invariant subspace of A: A U = U S.
+struct InvariantSubspace {
+    /// U, orthonormal columns.
+    basis: DMatrix<f64>,
+    /// S.
+    dynamics: DMatrix<f64>,
+}
+
+/// The invariant subspace of the eigenvalues with positive real parts, without columns if there are none; None if an
+/// eigenvalue is on the imaginary axis or the subspace is not accurate.
 ///
 /// Method: the sign of A by Newton's iteration with norm scaling (N. J. Higham, Functions of Matrices (2008),
 /// section 5.5); U is the range of I + sign A.
-#[expect(clippy::type_complexity, reason = "a pair that is there or not")]
-fn unstable_part(a: &DMatrix<f64>) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)>, Error> {
+fn unstable_part(a: &DMatrix<f64>) -> Result<Option<InvariantSubspace>, Error> {
     let n = a.nrows();
+    let empty = InvariantSubspace { basis: DMatrix::zeros(n, 0), dynamics: DMatrix::zeros(0, 0) };
     if n == 0 {
-        return Ok(Some((a.clone(), a.clone())));
+        return Ok(Some(empty));
     }
     let all = eigenvalues(a)?;
     if all.iter().any(|value| value.re.abs() <= ON_THE_LIMIT * value.norm().max(f64::MIN_POSITIVE))
@@ -161,7 +168,7 @@ fn unstable_part(a: &DMatrix<f64>) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)
     }
     let count = all.iter().filter(|value| value.re > 0.0).count();
     if count == 0 {
-        return Ok(Some((DMatrix::zeros(n, 0), DMatrix::zeros(0, 0))));
+        return Ok(Some(empty));
     }
     let mut sign = a.clone();
     for step in 0.. {
@@ -179,10 +186,11 @@ fn unstable_part(a: &DMatrix<f64>) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)
     }
     let range = Svd::new(&(sign + DMatrix::identity(n, n)))?;
     let basis = range.left.columns(0, count).into_owned();
-    let growing = basis.tr_mul(&(a * &basis));
-    let remainder = (a * &basis - &basis * &growing).norm();
-    let stable = eigenvalues(&growing)?.iter().any(|value| value.re <= 0.0);
-    Ok((remainder <= REMAINDER * a.norm() && !stable).then_some((basis, growing)))
+    let dynamics = basis.tr_mul(&(a * &basis));
+    let remainder = (a * &basis - &basis * &dynamics).norm();
+    let is_unstable = eigenvalues(&dynamics)?.iter().all(|value| value.re > 0.0);
+    let is_accurate = remainder <= REMAINDER * a.norm() && is_unstable;
+    Ok(is_accurate.then_some(InvariantSubspace { basis, dynamics }))
 }
 
 #[cfg(test)]

@@ -52,12 +52,16 @@ pub struct RegionCertificate {
 
 /// A part of a region.
 enum Shape {
+    /// Re s < -decay, with the decay rate.
     HalfPlane(f64),
     Disc(Disc),
+    /// |Im s| < tan(angle) (-Re s), with the half angle in rad.
     Sector(f64),
 }
 
 impl Region {
+    /// Checks that decay rate and radius are above zero, the centre is finite, and the sector is in its range, and in
+    /// continuous time; otherwise [`Error::OutOfRange`].
     pub(super) fn check(&self, domain: Domain) -> Result<(), Error> {
         if let Some(decay) = self.decay {
             check::positive("decay", decay)?;
@@ -159,6 +163,7 @@ impl Shape {
         }
     }
 
+    /// The matrix that must be positive definite for P and the product P A.
     fn inequality(&self, p: &Affine, product: &Affine) -> Affine {
         let sum = product.plus_transpose();
         match self {
