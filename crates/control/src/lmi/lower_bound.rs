@@ -10,7 +10,7 @@ use super::{Performance, Problem};
 use crate::blocks::symmetric_part;
 use crate::rank::controllable_part;
 use crate::riccati::kalman;
-use crate::{Domain, Error};
+use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// A lower bound of the H-infinity norm of the estimation error of every linear filter, with proof.
@@ -95,6 +95,8 @@ pub fn feedback_norm_lower_bound(
     performance: &Performance,
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
+    let n = check::with_inputs(a, b)?;
+    performance.check(n, (performance.output.nrows(), b.ncols()))?;
     observer_norm_lower_bound(&a.transpose(), &b.transpose(), &performance.transposed(), domain)
 }
 

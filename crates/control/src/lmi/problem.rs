@@ -63,11 +63,12 @@ struct Requirement {
 }
 
 impl Requirement {
-    /// (S(x) - m I) / (largest entry of S) - slack I.
+    /// (S(x) - m I) / size - slack I, with a power of two near the largest entry of S as the size; 1 for S = 0.
     fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
         let size = power_of_two(self.matrix.largest_entry());
+        let size = if size.is_normal() { size } else { 1.0 };
         let order = self.matrix.shape().0;
-        let scaled = &self.matrix * (1.0 / if size.is_normal() { size } else { 1.0 });
+        let scaled = &self.matrix * (1.0 / size);
         let margin = Affine::identity(order, self.margin / size);
         let matrix = &scaled - &margin;
         match slack {

@@ -238,17 +238,11 @@ pub fn common_feedback(
     region: &Region,
     domain: Domain,
 ) -> Result<Outcome<CommonFeedback, usize>, Error> {
-    let n = order(plants.first().map(|plant| &plant.a))?;
-    let m = plants[0].b.ncols();
-    for Vertex { a, b } in plants {
-        check::square("A", a)?;
-        check::shape("A", a, (n, n))?;
-        check::shape("B", b, (n, m))?;
-    }
+    check_plants(plants)?;
     region.check(domain)?;
     let (a, c) = (plants[0].a.transpose(), plants[0].b.transpose());
     let mut coordinates = Coordinates::of_observation(&a, &c, region, domain)?;
-    let search = Synthesis { plants, region, domain };
+    let search = CommonSearch { plants, region, domain };
     let all: Vec<_> = (0..plants.len()).collect();
     let mut proposed = false;
     for refinement in 0..=REFINEMENTS {
@@ -287,6 +281,7 @@ pub fn largest_scaling(
     region: &Region,
     domain: Domain,
 ) -> Result<Option<f64>, Error> {
+    check_plants(plants)?;
     let feasible = |s: f64| {
         let scaled = |to: &Vertex| {
             let from = &plants[0];
@@ -309,14 +304,26 @@ pub fn largest_scaling(
     Ok(Some(good))
 }
 
+/// Checks the members of a family: at least one, all with the same numbers of states and inputs.
+fn check_plants(plants: &[Vertex]) -> Result<(), Error> {
+    let n = order(plants.first().map(|plant| &plant.a))?;
+    let m = plants[0].b.ncols();
+    for Vertex { a, b } in plants {
+        check::square("A", a)?;
+        check::shape("A", a, (n, n))?;
+        check::shape("B", b, (n, m))?;
+    }
+    Ok(())
+}
+
 /// The search for a common gain, as an observer gain L = -K' of the transposed members.
-struct Synthesis<'a> {
+struct CommonSearch<'a> {
     plants: &'a [Vertex],
     region: &'a Region,
     domain: Domain,
 }
 
-impl Synthesis<'_> {
+impl CommonSearch<'_> {
     /// One P for the closed loops, first in the coordinates of the gain, then in others.
     fn proof(
         &self,

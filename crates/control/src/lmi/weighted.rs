@@ -182,6 +182,8 @@ impl ChannelWeights {
         performance: &Performance,
         domain: Domain,
     ) -> Result<Outcome<Synthesis>, Error> {
+        let n = check::with_inputs(a, b)?;
+        performance.check(n, (performance.output.nrows(), b.ncols()))?;
         let (a, c, dual) = (a.transpose(), b.transpose(), performance.transposed());
         let outcome = self.transposed().observer_gain(&a, &c, region, &dual, domain)?;
         outcome.then(|synthesis| {

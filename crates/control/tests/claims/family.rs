@@ -1,11 +1,11 @@
 use crate::matrix;
-use control::Domain;
 use control::eigen::eigenvalues;
 use control::lmi::{
     Interval, Outcome, Region, Vertex, bernstein, certify_common, certify_schedule,
     common_feedback, largest_change, largest_scaling,
 };
 use control::stability::instability;
+use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
 const SAMPLED: Domain = Domain::Sampled { period: 0.1 };
@@ -103,6 +103,13 @@ fn members_in_conflict_and_the_largest_scaling_are_found() {
     // b = 1 - 2 s is above 0 below s = 1/2.
     let scaling = largest_scaling(&plants, &region, Domain::Continuous).unwrap().unwrap();
     assert!(scaling < 0.5 && scaling > 0.48, "{scaling}");
+}
+
+#[test]
+fn members_of_different_orders_are_refused() {
+    let plants = [1, 2].map(|n| Vertex { a: DMatrix::zeros(n, n), b: DMatrix::zeros(n, 1) });
+    let refused = largest_scaling(&plants, &stable(), Domain::Continuous);
+    assert!(matches!(refused, Err(Error::Shape { matrix: "A", expected: (1, 1), .. })));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::recorded::{Case, cases};
 use control::eigen::eigenvalues;
 use control::lmi::{
     Affine, Disc, Norm, Outcome, Performance, Problem, Region, certify_gain, certify_region,
-    observer_gain, state_feedback,
+    feedback_norm_lower_bound, observer_gain, state_feedback,
 };
 use control::placement::real_poles;
 use control::{Domain, Error, StateSpace};
@@ -65,6 +65,13 @@ fn a_conflict_is_named_without_the_requirements_that_take_no_part() {
     problem.minimise(&x);
     let expected = ["x is small", "y is above two", "x exceeds y"];
     assert_eq!(conflict(problem.solve()), expected);
+}
+
+#[test]
+fn a_matrix_that_is_zero_does_not_meet_a_margin() {
+    let mut problem = Problem::new();
+    problem.require("zero", &Affine::zeros(1, 1), 1.0);
+    assert_eq!(conflict(problem.solve()), ["zero"]);
 }
 
 /// The smallest trace of X with [X, M; M', I] semidefinite belongs to X = M M'.
@@ -367,6 +374,8 @@ fn bad_arguments_are_refused_by_name() {
     };
     let refused = observer_gain(&a, &c, &region, Some(&required), Domain::Continuous);
     assert!(matches!(refused, Err(Error::Shape { matrix: "output", .. })));
+    let refused = feedback_norm_lower_bound(&a, &c, &required, Domain::Continuous);
+    assert!(matches!(refused, Err(Error::Shape { matrix: "B", expected: (2, 2), .. })));
     let system =
         StateSpace { a: a.clone(), b: c.transpose(), c, d: one(1.0), domain: Domain::Continuous };
     let refused = certify_gain(&system, Norm::EnergyToPeak);
