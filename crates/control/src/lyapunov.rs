@@ -29,9 +29,9 @@ pub struct Solution {
     /// |Q|; in sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|. Here
     /// `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
     pub residual: f64,
-    /// Norm of the left side plus Q relative to the norm of Q (Frobenius); for Q = 0 the norm itself. For a badly scaled A the
-    /// rounding of P alone keeps it far above the rounding error; below 1 / sqrt(n) with Q = I it
-    /// still proves A stable.
+    /// Norm of the left side plus Q relative to the norm of Q (Frobenius); for Q = 0 the norm itself. For a badly
+    /// scaled A the rounding of P alone keeps it far above the rounding error; below 1 / sqrt(n) with Q = I it still
+    /// proves A stable.
     pub defect: f64,
 }
 

@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// `M_0` + `x_1` `M_1` + `x_2` `M_2` + ... a matrix that is an affine function of unknown numbers
-/// x.
+/// A matrix that is an affine function of unknown numbers x: `M_0` + `x_1` `M_1` + `x_2` `M_2` + ...
 ///
 /// Unknowns come from [`super::Problem`]; constants from [`Affine::constant`]. Sums, differences
 /// and products with known matrices and numbers are written with operators on references. Like the
@@ -63,7 +62,7 @@ impl Affine {
     ///
     /// # Panics
     ///
-    /// When the blocks of a row differ in height or the rows differ in length.
+    /// When the blocks of a row differ in height or the rows differ in length, and without a block.
     #[must_use]
     pub fn blocks(rows: &[&[&Self]]) -> Self {
         let height = rows.iter().map(|row| row[0].shape().0).sum();
@@ -71,19 +70,19 @@ impl Affine {
         let mut whole = Self::zeros(height, width);
         let mut top = 0;
         for row in rows {
-            let (mut left, tall) = (0, row[0].shape().0);
+            let (mut left, row_height) = (0, row[0].shape().0);
             for block in *row {
-                let wide = block.shape().1;
-                whole.constant.view_mut((top, left), (tall, wide)).copy_from(&block.constant);
+                let size = (row_height, block.shape().1);
+                whole.constant.view_mut((top, left), size).copy_from(&block.constant);
                 for (unknown, m) in &block.terms {
                     let term = whole.terms.entry(*unknown);
                     let target = term.or_insert_with(|| DMatrix::zeros(height, width));
-                    target.view_mut((top, left), (tall, wide)).copy_from(m);
+                    target.view_mut((top, left), size).copy_from(m);
                 }
-                left += wide;
+                left += size.1;
             }
             assert_eq!(left, width, "the rows of blocks differ in length");
-            top += tall;
+            top += row_height;
         }
         whole
     }
@@ -99,6 +98,7 @@ impl Affine {
         self.terms.values().fold(self.constant.amax(), |size, m| size.max(m.amax()))
     }
 
+    /// Applies a linear function to all matrices.
     fn map(&self, rule: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         let terms = self.terms.iter().map(|(at, m)| (*at, rule(m))).collect();
         Self { constant: rule(&self.constant), terms }

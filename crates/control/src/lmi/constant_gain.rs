@@ -9,7 +9,7 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 const ROUNDS: usize = 60;
-/// Smallest relative width of a norm that is computed.
+/// Relative width of the norms that are computed.
 const NORM_WIDTH: f64 = 1e-6;
 
 /// A constant gain with the least worst error over a family of systems.
@@ -73,8 +73,8 @@ pub fn constant_gain(
         return Err(Error::Shape { matrix: "fixed", expected, actual });
     }
     let width = width.max(1e-5);
-    let ends = |system| [0.0, f64::INFINITY].map(|frequency| response(system, frequency));
-    let mut points = family.iter().flat_map(ends).collect::<Result<Vec<_>, _>>()?;
+    let at_ends = |system| [0.0, f64::INFINITY].map(|frequency| response(system, frequency));
+    let mut points = family.iter().flat_map(at_ends).collect::<Result<Vec<_>, _>>()?;
     let mut best: Option<ConstantGain> = None;
     for _ in 0..ROUNDS {
         let what = "the program for a constant gain";
@@ -103,7 +103,7 @@ pub fn constant_gain(
     Err(Error::NotConverged { what: "the exchange of frequencies", iterations: ROUNDS })
 }
 
-/// G at one frequency.
+/// G at one frequency; in sampled time infinity means half of the sample rate.
 fn response(system: &StateSpace, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
     let frequency = match system.domain {
         Domain::Continuous if frequency.is_infinite() => return Ok(to_complex(&system.d)),
@@ -113,7 +113,8 @@ fn response(system: &StateSpace, frequency: f64) -> Result<DMatrix<Complex<f64>>
     Ok(frequency_response(system, &[frequency])?.remove(0).gain)
 }
 
-/// The smallest gamma, and its Q, with [gamma I, X; X*, gamma I] >= 0 for X = Q G - M at all points.
+/// The smallest gamma, and its Q with r columns, for which [gamma I, X; X*, gamma I] >= 0 with X = Q G - M at all
+/// points G; None if the solver fails.
 fn minimum(
     points: &[DMatrix<Complex<f64>>],
     target: &DMatrix<f64>,

@@ -18,17 +18,24 @@ const DOUBLINGS: usize = 10;
 /// Largest factor by which weakly observable directions are stretched.
 const STRETCH: f64 = 1e11;
 
-/// x~ = T x and the time scale: x' = A x becomes x~' = unit A~ x~ with A~ of about one.
+/// Coordinates x~ = T x and a unit of frequency: x' = A x becomes x~' = unit A~ x~ with A~ of about one.
 pub(super) struct Coordinates {
+    /// T.
     to: DMatrix<f64>,
+    /// T^-1.
     from: DMatrix<f64>,
     pub(super) unit: f64,
 }
 
 impl Coordinates {
-    /// Coordinates in which the norm of A - c I is little more than its spectral radius: T'T = P
-    /// with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the eigenvalues, s 1.2 times
-    /// the largest distance from it. None if rounding errors hide that P > 0.
+    /// Coordinates in which the norm of A - c I is little more than its spectral radius: in balanced
+    /// coordinates T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
+    /// eigenvalues, s 1.2 times the largest distance from it, at least 0.1 |c|. The unit is near
+    /// |c| + s. None if rounding errors hide that P > 0.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`] when eigenvalues are not found.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::new(a);
@@ -44,13 +51,18 @@ impl Coordinates {
         let root = factor.l().transpose();
         let inverse = inverse_of_upper(&root);
         let unit = power_of_two(center.abs() + radius);
-        Ok(Some(Self::within(&scale, &root, &inverse, unit)))
+        Ok(Some(Self::from_scaled(&scale, &root, &inverse, unit)))
     }
 
     /// Coordinates in which all states are equally observable through C for an observer whose
     /// eigenvalues are at a distance [`speed`] from the eigenvalues of A: T'T is the sum of (C
     /// `M^k`)' (C `M^k`), k from 0 to n - 1, with M = (A - c I) / speed, c the mean of the
-    /// eigenvalues of A. The unit of frequency is the speed in continuous time, 1 in sampled time.
+    /// eigenvalues of A. Weakly observable directions are stretched by at most 1e11. The unit of frequency is the speed
+    /// in continuous time, 1 in sampled time.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`].
     pub(super) fn of_observation(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
@@ -74,7 +86,7 @@ impl Coordinates {
         let (directions, values) = (svd.left.columns(0, n), svd.values.rows(0, n).into_owned());
         let root = multiply_rows(&directions.transpose(), &values);
         let inverse = divide_columns(&directions.into_owned(), &values);
-        Ok(Self::within(&scale, &root, &inverse, time_unit(domain, speed)))
+        Ok(Self::from_scaled(&scale, &root, &inverse, time_unit(domain, speed)))
     }
 
     /// Coordinates in which the matrix P~ = `p` of these coordinates becomes the identity; None if
@@ -85,7 +97,8 @@ impl Coordinates {
         Some(Self { to: root * &self.to, from, unit: self.unit })
     }
 
-    /// Coordinates in which the most interior P~ = `p` of a program in these coordinates is the identity.
+    /// Coordinates in which the most interior P~ = `p` of a program in these coordinates is the identity; None if the
+    /// program has no such P~.
     pub(super) fn refined_by(&self, problem: &Problem, p: &Affine) -> Option<Self> {
         self.refined(&p.evaluate(&problem.most_interior()?))
     }
@@ -95,7 +108,7 @@ impl Coordinates {
         self.to.nrows()
     }
 
-    /// These coordinates with further states, each of the given size, behind.
+    /// These coordinates with further states of the given sizes after the others.
     pub(super) fn extended(&self, sizes: &DVector<f64>) -> Self {
         let (order, whole) = (self.order(), self.order() + sizes.len());
         let mut to = self.to.clone().resize(whole, whole, 0.0);
@@ -112,8 +125,8 @@ impl Coordinates {
         Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }
     }
 
-    /// x = S y with S diagonal, x~ = `root` y.
-    fn within(
+    /// The coordinates x~ = `root` y, `inverse` the inverse of `root`, with x = S y and the diagonal S = `scale`.
+    fn from_scaled(
         scale: &DVector<f64>,
         root: &DMatrix<f64>,
         inverse: &DMatrix<f64>,
@@ -177,8 +190,8 @@ fn spread(a: &DMatrix<f64>) -> Result<(f64, f64), Error> {
 
 /// The mean of the eigenvalues, and a power of two near the distance by which eigenvalues are moved.
 ///
-/// The distance is that from the mean eigenvalue of A to the target (the centre of the disc, else
-/// the limit of the decay rate), at least the largest distance of an eigenvalue of A from the mean.
+/// This is the distance from the mean eigenvalue of A to the target (the centre of the disc, else the limit of the
+/// decay rate, else the mean itself), at least the largest distance of an eigenvalue of A from the mean.
 fn speed(a: &DMatrix<f64>, region: &Region, domain: Domain) -> Result<(f64, f64), Error> {
     let (mean, spread) = spread(a)?;
     let limit = |alpha: f64| match domain {
@@ -190,6 +203,7 @@ fn speed(a: &DMatrix<f64>, region: &Region, domain: Domain) -> Result<(f64, f64)
     Ok((mean, unit_near(spread.max((target - mean).abs()))))
 }
 
+/// The inverse of an upper triangular matrix.
 fn inverse_of_upper(u: &DMatrix<f64>) -> DMatrix<f64> {
     let diagonal = u.diagonal();
     let unit = divide_rows(u, &diagonal);

@@ -34,8 +34,8 @@ pub(super) struct GainNorm<'a> {
 }
 
 impl GainNorm<'_> {
-    /// The norm and its derivative with respect to L; None outside of the region of the first states,
-    /// or without stability.
+    /// The norm and its derivative with respect to L, n x p; None if the eigenvalues of the first n states
+    /// leave the region, the loop is not stable, or the norm cannot be computed.
     ///
     /// ```text
     /// dnorm / dL = -Re(conj(h) g'),  h the first rows of R* E' u,  g = (C R B + D) v,  R = (lambda I - A)^-1,
@@ -65,7 +65,8 @@ impl GainNorm<'_> {
         Some((norm.upper, derivative))
     }
 
-    /// Lowers the norm from a gain that is stable and in the region.
+    /// Lowers the norm from a gain that is stable and in the region. Returns the best gain when the time of this thread
+    /// is over, and `start` if its norm cannot be computed.
     ///
     /// Method: BFGS with a line search for the weak Wolfe conditions, which on functions that are not
     /// smooth at their minimum converges in practice: A. S. Lewis and M. L. Overton, Nonsmooth optimization
@@ -123,11 +124,11 @@ impl GainNorm<'_> {
                 (inverse, fresh) = (&identity * first(&slope, &x), true);
                 continue;
             };
-            let (step, bend) = (&next - &x, &gradient - &slope);
-            let product = step.dot(&bend);
+            let (step, change) = (&next - &x, &gradient - &slope);
+            let product = step.dot(&change);
             (x, value, slope, fresh) = (next, other, gradient, false);
             if product > 0.0 {
-                let left = &identity - &step * bend.transpose() / product;
+                let left = &identity - &step * change.transpose() / product;
                 inverse = &left * inverse * left.transpose() + &step * step.transpose() / product;
             }
             history.push(value);

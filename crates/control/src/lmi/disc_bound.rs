@@ -30,22 +30,22 @@ const BISECTIONS: usize = 30;
 /// mirrored into the left half plane, det T is nowhere on s > 0 larger than its maximum on the imaginary axis;
 /// s = (n - q) R / q is the best point.
 ///
-/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. det H(s) / det H(0) is the product of
-/// (1 - s / `z_j`) over the invariant zeros of (A, B, C), divided by the product of (1 + s `v_i`) with `v_i` = -1 / `s_i`
-/// for the eigenvalues `s_i`. This gives two bounds, on which L acts by its eigenvalues only:
+/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. det H(s) / det H(0) is the product
+/// of (1 - s / `z_j`) over the invariant zeros of (A, B, C), divided by the product of (1 + s `v_i`) with `v_i` = -1
+/// / `s_i` for the eigenvalues `s_i`. This gives two bounds, on which L acts by its eigenvalues only:
 ///
 /// ```text
 /// gamma >= |sum of v_i - zeta| / sum of 1 / sigma_i(E B),     zeta = sum of -1 / z_j           (the trace at s = 0)
 /// gamma >= sigma_min(E B) (1 - |det H(s)|^(1/q)) / s                                           at each s > 0
 /// ```
 ///
-/// The larger the sum of Re `v_i`, the larger the second bound, whose least value for a sum has as many `v_i` at the ends
-/// of their range as possible. So min(first at a sum, second at this sum) is a bound for each sum below zeta; the best
-/// sum is searched.
+/// The larger the sum of Re `v_i`, the larger the second bound, whose least value for a sum has as many `v_i` at the
+/// ends of their range as possible. So min(first at a sum, second at this sum) is a bound for each sum below zeta;
+/// the best sum is searched.
 ///
-/// Returns the largest of these bounds, less 1e-6 for rounding errors; None if none is above 0, if E B has no inverse, or
-/// if D is not 0. For a plant with slow zeros beside the disc the bounds may be far below the least norm. Source: the
-/// derivation above, which is our own.
+/// Returns the largest of these bounds, less 1e-6 for rounding errors; None if none is above 0, if E B has no
+/// inverse, or if D is not 0. For a plant with slow zeros beside the disc the bounds may be far below the least norm.
+/// Source: the derivation above, which is our own.
 ///
 /// # Errors
 ///

@@ -67,39 +67,39 @@ impl GainInequality {
         let level = |order: usize| self.level.times(&DMatrix::identity(order, order));
         let one = |order: usize| Affine::identity(order, 1.0);
         let zero = |cols: usize| Affine::zeros(self.p.shape().0, cols);
-        let (turned, feedthrough) = (self.output.transpose(), self.feedthrough.transpose());
+        let (output, feedthrough) = (self.output.transpose(), self.feedthrough.transpose());
         let Self { p, dynamics, input, .. } = self;
         let decay = || -&dynamics.plus_transpose();
         match (norm, continuous) {
             (Norm::HInfinity, true) => vec![upper(&[
-                &[&decay(), &-input, &-&turned],
+                &[&decay(), &-input, &-&output],
                 &[&level(inputs), &-&feedthrough],
                 &[&level(outputs)],
             ])],
             (Norm::HInfinity, false) => vec![upper(&[
                 &[p, dynamics, input, &zero(outputs)],
-                &[p, &zero(inputs), &turned],
+                &[p, &zero(inputs), &output],
                 &[&level(inputs), &feedthrough],
                 &[&level(outputs)],
             ])],
             (Norm::EnergyToPeak, true) => vec![
                 upper(&[&[&decay(), &-input], &[&one(inputs)]]),
-                upper(&[&[p, &turned], &[&level(outputs)]]),
+                upper(&[&[p, &output], &[&level(outputs)]]),
             ],
             (Norm::EnergyToPeak, false) => vec![
                 upper(&[&[p, dynamics, input], &[p, &zero(inputs)], &[&one(inputs)]]),
                 upper(&[
-                    &[p, &zero(inputs), &turned],
+                    &[p, &zero(inputs), &output],
                     &[&one(inputs), &feedthrough],
                     &[&level(outputs)],
                 ]),
             ],
             (Norm::ImpulseToEnergy, true) => vec![
-                upper(&[&[&decay(), &turned], &[&one(outputs)]]),
+                upper(&[&[&decay(), &output], &[&one(outputs)]]),
                 upper(&[&[p, input], &[&level(inputs)]]),
             ],
             (Norm::ImpulseToEnergy, false) => vec![
-                upper(&[&[p, dynamics, &zero(outputs)], &[p, &turned], &[&one(outputs)]]),
+                upper(&[&[p, dynamics, &zero(outputs)], &[p, &output], &[&one(outputs)]]),
                 upper(&[
                     &[p, input, &zero(outputs)],
                     &[&level(inputs), &feedthrough],
@@ -110,7 +110,7 @@ impl GainInequality {
     }
 }
 
-/// The symmetric matrix with the given blocks on and above its diagonal, row by row.
+/// The symmetric matrix with the given blocks on and above its diagonal, row by row from the diagonal on.
 fn upper(rows: &[&[&Affine]]) -> Affine {
     let whole: Vec<Vec<Affine>> = (0..rows.len())
         .map(|row| {
@@ -118,8 +118,8 @@ fn upper(rows: &[&[&Affine]]) -> Affine {
             before.chain(rows[row].iter().map(|block| (*block).clone())).collect()
         })
         .collect();
-    let lent: Vec<Vec<&Affine>> = whole.iter().map(|row| row.iter().collect()).collect();
-    let rows: Vec<&[&Affine]> = lent.iter().map(Vec::as_slice).collect();
+    let references: Vec<Vec<&Affine>> = whole.iter().map(|row| row.iter().collect()).collect();
+    let rows: Vec<&[&Affine]> = references.iter().map(Vec::as_slice).collect();
     Affine::blocks(&rows)
 }
 
@@ -137,7 +137,7 @@ impl GainScaling {
         Self { norm, disturbance: unit_near(b.norm()), output: unit_near(c.norm()), unit }
     }
 
-    /// Unit of the bound gamma.
+    /// The unit of the bound gamma.
     fn gain(&self) -> f64 {
         let time = if self.norm == Norm::HInfinity { 1.0 } else { self.unit.sqrt() };
         self.disturbance * self.output * time
@@ -222,7 +222,7 @@ impl GainScaling {
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`]
-/// for a D other than zero where the norm is infinite; [`Error::NotConverged`].
+/// for a D other than zero where the norm is infinite, and for a bad period; [`Error::NotConverged`].
 pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound>, Error> {
     system.check()?;
     let value = system.d.amax();
@@ -302,7 +302,7 @@ impl<'a> BoundProblem<'a> {
         (problem, p)
     }
 
-    /// The bound at `level`, if P proves it in the units of the data.
+    /// The bound at `level`; None if P does not prove it in the units of the data.
     ///
     /// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms
     /// have cancelled. The constant blocks appear in the matrices of the low part too and are

@@ -10,18 +10,18 @@ thread_local! {
     static ENDING: RefCell<Option<Ending>> = const { RefCell::new(None) };
 }
 
-/// Restores the condition of before, also after a panic.
-struct Restored(Option<Ending>);
+/// Restores the former condition when it is dropped, also by a panic.
+struct RestoreGuard(Option<Ending>);
 
-impl Drop for Restored {
+impl Drop for RestoreGuard {
     fn drop(&mut self) {
         ENDING.set(self.0.take());
     }
 }
 
-/// Runs `compute`, within which the programs and descents of this thread end as soon as `ending` is true; never
-/// for None. What is not proven by then is [`super::Outcome::Inconclusive`]. A large program goes on in a thread of
-/// its own until its present iteration ends.
+/// Runs `compute` and ends the programs and descents of this thread within it as soon as `ending` is true; None never
+/// ends them. What is not proven by then is [`super::Outcome::Inconclusive`]. A program that is interrupted goes on in
+/// a thread of its own until its present iteration ends.
 ///
 /// ```
 /// use control::lmi::{Outcome, Region, certify_region, until};
@@ -34,11 +34,12 @@ impl Drop for Restored {
 /// # Ok::<(), control::Error>(())
 /// ```
 pub fn until<T>(ending: Option<Ending>, compute: impl FnOnce() -> T) -> T {
-    let _before = Restored(ENDING.replace(ending));
+    let _guard = RestoreGuard(ENDING.replace(ending));
     compute()
 }
 
-/// The condition of this thread, for a thread that shares its work.
+/// Returns the condition of this thread, to set it by [`until`] in a thread that shares its work; None if there is
+/// none.
 #[must_use]
 pub fn ending() -> Option<Ending> {
     ENDING.with_borrow(Clone::clone)

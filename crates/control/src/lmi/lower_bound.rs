@@ -83,8 +83,8 @@ pub fn observer_norm_lower_bound(
 /// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of
 /// [`observer_norm_lower_bound`] for the transposed system.
 ///
-/// `a`, `b`, `performance`: as for [`super::state_feedback`]. None in the cases of [`observer_norm_lower_bound`], whose D
-/// is the transposed `feedthrough`: every command must have a weight.
+/// `a`, `b`, `performance`: as for [`super::state_feedback`]. None in the cases of [`observer_norm_lower_bound`],
+/// whose D is the transposed `feedthrough`: every command must have a weight.
 ///
 /// # Errors
 ///
@@ -100,8 +100,8 @@ pub fn feedback_norm_lower_bound(
     observer_norm_lower_bound(&a.transpose(), &b.transpose(), &performance.transposed(), domain)
 }
 
-/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x, for the states that d
-/// reaches.
+/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x, for the states
+/// that d reaches.
 struct HiddenDisturbance {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -184,8 +184,8 @@ impl HiddenDisturbance {
         self.verified(&symmetric_part(&(&to * covariance.evaluate(&unknowns) * to.transpose())))
     }
 
-    /// The root of the ratio of the energies of z and w for a covariance of (x, d); None if its inequalities do not hold
-    /// by more than rounding errors.
+    /// The root of the ratio of the energies of z and w for a covariance of (x, d); None if its inequalities do not
+    /// hold by more than rounding errors.
     fn verified(&self, covariance: &DMatrix<f64>) -> Result<Option<f64>, Error> {
         let growth = self.growth(&Affine::constant(covariance)).constant;
         if margin(covariance)? <= 0.0 || margin(&growth)? <= 0.0 {

@@ -37,11 +37,11 @@ const SETTLED: f64 = 1e-13;
 /// circle, the infinite ones included: they are delays from w to y, within which no estimate knows w. They
 /// become finite by z = (1 + s) / (1 - s), which keeps the norm.
 ///
-/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and
-/// bound are not used. None if some w has no effect on y (with noise see
-/// [`super::observer_norm_lower_bound`]), if a zero is on the stability limit, if in sampled time an eigenvalue
-/// of A is -1, or if rounding errors hide the unstable zeros. The bound is lowered by 1e-6 for rounding errors; the remainder of the equation for X and S is at
-/// most 1e-9, relative.
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and bound are
+/// not used. None if some w has no effect on y (with noise see [`super::observer_norm_lower_bound`]), if a zero is on
+/// the stability limit, if in sampled time an eigenvalue of A is -1, or if rounding errors hide the unstable zeros.
+/// The bound is lowered by 1e-6 for rounding errors; the remainder of the equation for X and S is at most 1e-9,
+/// relative.
 ///
 /// Source: the interpolation problem of Nevanlinna and Pick, as in B. A. Francis, A course in H-infinity control
 /// theory (1987); the form with S and Lyapunov equations is our own.

@@ -62,20 +62,20 @@ pub(super) struct ObserverRequirements<'a> {
     pub(super) weighted: Option<WeightedDynamics<'a>>,
 }
 
-/// Error dynamics with m states of weights behind the n states of A; the gain acts on the n states. P of
+/// Error dynamics with m states of weights after the n states of A; the gain acts on the n states. P of
 /// the norm is block diagonal.
 #[derive(Clone, Copy)]
 pub(super) struct WeightedDynamics<'a> {
-    /// n + m x n + m.
+    /// (n + m) x (n + m).
     pub(super) a: &'a DMatrix<f64>,
-    /// p x n + m.
+    /// p x (n + m).
     pub(super) c: &'a DMatrix<f64>,
-    /// Number of states of weights of the disturbance, which come first.
-    pub(super) of_disturbance: usize,
+    /// Number of states of the weights of the disturbance, the first of the m states.
+    pub(super) disturbance_states: usize,
 }
 
 impl ObserverRequirements<'_> {
-    /// Searches for a gain that passes `proof`.
+    /// Searches for a gain that passes `proof`; returns the outcome of the last attempt if there is none.
     ///
     /// The program is solved in [`Coordinates::of_observation`] first, then up to three times in
     /// coordinates in which the most interior P of the program before becomes the identity.
@@ -96,16 +96,16 @@ impl ObserverRequirements<'_> {
                 let Program { problem, p, .. } = program.program(None);
                 program.coordinates.refined_by(&problem, &p)
             });
-            let Some(refined) = refined.flatten() else { return self.plausible(outcome) };
+            let Some(refined) = refined.flatten() else { return self.check_conflict(outcome) };
             coordinates = refined;
             refinements += 1;
         }
     }
 
-    /// The outcome, unless the solver reports a conflict between parts of the region although a
-    /// gain exists: when all states are observable and the parts have a real interval in common,
+    /// Returns the outcome; [`Outcome::Inconclusive`] in place of a conflict between parts of the region
+    /// that cannot be: when all states are observable and the parts have a real interval in common,
     /// all eigenvalues can be assigned there.
-    fn plausible(self, outcome: Outcome<Synthesis>) -> Result<Outcome<Synthesis>, Error> {
+    fn check_conflict(self, outcome: Outcome<Synthesis>) -> Result<Outcome<Synthesis>, Error> {
         if let Outcome::Infeasible { conflict } = &outcome
             && !conflict.contains(&"gain")
             && self.region.has_real_numbers(self.domain)
@@ -121,7 +121,7 @@ impl ObserverRequirements<'_> {
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,
     coordinates: Coordinates,
-    /// The same for the states with those of weights.
+    /// The coordinates of the states with those of the weights; None without weights.
     extended: Option<Coordinates>,
     /// Units of the measurements: powers of two near the lengths of the rows of C in the
     /// coordinates.
@@ -136,14 +136,14 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Requires a norm of Z of at most a level, or the least one.
+    /// Requires a norm of Z of at most a level; for None minimises it.
     pub(super) fn with_norm(mut self, level: Option<f64>) -> Self {
         let level = self.problem.level(level);
         self.problem.constrain(&norm_below(&self.z, &level), MARGIN);
         self
     }
 
-    /// L = P^-1 Z of the solution, in the coordinates of the data, from these coordinates with
+    /// Solves the program and returns L = P^-1 Z in the units of the data. The program is in `coordinates`, with
     /// measurements in `units`.
     pub(super) fn solve(
         &self,
@@ -166,27 +166,28 @@ impl<'a> ObserverProgram<'a> {
     fn new(requirements: ObserverRequirements<'a>, coordinates: Coordinates) -> Self {
         let units = row_units(&coordinates.output(requirements.c));
         let extended = requirements.weighted.zip(requirements.performance);
-        let extended = extended.map(|(WeightedDynamics { a, of_disturbance, .. }, performance)| {
+        let extended = extended.map(|(weighted, performance)| {
+            let WeightedDynamics { a, disturbance_states, .. } = weighted;
             let order = coordinates.order();
             let output = performance.output.columns(0, order).into_owned();
             let size = unit_near(coordinates.output(&output).norm());
             coordinates.extended(&DVector::from_fn(a.nrows() - order, |at, _| {
-                if at < of_disturbance { 1.0 } else { size }
+                if at < disturbance_states { 1.0 } else { size }
             }))
         });
         Self { requirements, coordinates, extended, units }
     }
 
     /// The coordinates of the states of the norm.
-    fn of_norm(&self) -> &Coordinates {
+    fn norm_coordinates(&self) -> &Coordinates {
         self.extended.as_ref().unwrap_or(&self.coordinates)
     }
 
-    /// Returns a gain that meets the given bound.
+    /// Computes a gain that meets the given bound.
     ///
-    /// Without a bound, the level is minimised. Then the gain with the largest margin of all
-    /// inequalities is computed at a slightly larger level; if that fails, the gain of the smallest
-    /// level is returned.
+    /// Without a bound, the level is minimised: that of the norm, without a performance that of the norm of Z. Then
+    /// the gain with the largest margin of all inequalities is computed at a larger level; if that fails, the gain of
+    /// the smallest level is returned.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
         let solve = |program: &Program| program.solve(&self.coordinates, &self.units);
@@ -232,7 +233,7 @@ impl<'a> ObserverProgram<'a> {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
             problem.constrain(&norm_below(&z, &Affine::identity(1, LARGEST)), MARGIN);
-            let (p, z) = self.of_weighted(&mut problem, &p, &z);
+            let (p, z) = self.with_weights(&mut problem, &p, &z);
             for matrix in self.gain_inequalities(performance, p, &z, level) {
                 problem.require("gain", &matrix, MARGIN);
             }
@@ -244,7 +245,7 @@ impl<'a> ObserverProgram<'a> {
     }
 
     /// P and Z of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
-    fn of_weighted(&self, problem: &mut Problem, p: &Affine, z: &Affine) -> (Affine, Affine) {
+    fn with_weights(&self, problem: &mut Problem, p: &Affine, z: &Affine) -> (Affine, Affine) {
         let Some(WeightedDynamics { a, .. }) = self.requirements.weighted else {
             return (p.clone(), z.clone());
         };
@@ -268,16 +269,16 @@ impl<'a> ObserverProgram<'a> {
     ) -> Vec<Affine> {
         let ObserverRequirements { a, c, weighted, domain, .. } = self.requirements;
         let (a, c) = weighted.map_or((a, c), |wide| (wide.a, wide.c));
-        let c = divide_rows(&self.of_norm().output(c), &self.units);
+        let c = divide_rows(&self.norm_coordinates().output(c), &self.units);
         let scaling = self.scaling(performance);
         let (b, e, _) = scaling.scale(
-            &self.of_norm().input(&performance.disturbance),
-            &self.of_norm().output(&performance.output),
+            &self.norm_coordinates().input(&performance.disturbance),
+            &self.norm_coordinates().output(&performance.output),
             &performance.feedthrough,
         );
         let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance;
         let inequality = GainInequality {
-            dynamics: &(&p * &self.of_norm().dynamics(a)) - &(z * &c),
+            dynamics: &(&p * &self.norm_coordinates().dynamics(a)) - &(z * &c),
             input: &(&p * &b) - &(z * &d_y),
             p,
             output: Affine::constant(&e),
@@ -287,9 +288,10 @@ impl<'a> ObserverProgram<'a> {
         inequality.matrices(performance.norm, domain)
     }
 
+    /// The units of disturbance and output.
     fn scaling(&self, performance: &Performance) -> GainScaling {
-        let b = self.of_norm().input(&performance.disturbance);
-        let e = self.of_norm().output(&performance.output);
+        let b = self.norm_coordinates().input(&performance.disturbance);
+        let e = self.norm_coordinates().output(&performance.output);
         GainScaling::new(performance.norm, &b, &e, self.coordinates.unit)
     }
 }

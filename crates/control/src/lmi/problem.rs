@@ -114,6 +114,7 @@ impl Problem {
         self.rectangular(1, 1)
     }
 
+    /// Adds an unknown number; returns its index.
     fn unknown(&mut self) -> usize {
         self.unknowns += 1;
         self.unknowns - 1
@@ -150,7 +151,7 @@ impl Problem {
         self.objective = Some(objective.clone());
     }
 
-    /// A known number, or without one an unknown that is minimised; of one row and column.
+    /// A known number; for None an unknown that is minimised. Of one row and column.
     pub(super) fn level(&mut self, value: Option<f64>) -> Affine {
         if let Some(value) = value {
             return Affine::identity(1, value);
@@ -161,7 +162,7 @@ impl Problem {
     }
 
     /// Solves the program; without an objective, computes an x as far inside of all requirements as
-    /// possible.
+    /// possible, by at most the largest entry of each.
     ///
     /// # Errors
     ///
@@ -192,7 +193,7 @@ impl Problem {
     }
 
     /// The smallest value of the objective and the unknowns there, as computed by the solver and
-    /// not verified.
+    /// not verified; None without an objective, or if the solver has no result.
     pub(crate) fn minimum(&self) -> Option<(f64, DVector<f64>)> {
         let objective = self.objective.as_ref()?;
         let mut costs = DVector::zeros(self.unknowns);
@@ -206,20 +207,19 @@ impl Problem {
     }
 
     /// The unknowns as far inside of all requirements as possible, or as little outside, not
-    /// verified.
+    /// verified; None if the solver fails.
     pub(super) fn most_interior(&self) -> Option<DVector<f64>> {
         Some(self.largest_slack(&self.requirements)?.1)
     }
 
-    /// The largest common slack, at most one, and the unknowns there.
+    /// The largest common slack, at most one, and the unknowns there; None if the solver fails.
     fn largest_slack<'a>(
         &self,
         requirements: impl IntoIterator<Item = &'a Requirement>,
     ) -> Option<(f64, DVector<f64>)> {
-        // The unknown after all others.
-        let mut beside = Self::new();
-        beside.unknowns = self.unknowns;
-        let slack = beside.scalar();
+        // The slack is the unknown after all others.
+        let mut extended = Self { unknowns: self.unknowns, ..Self::default() };
+        let slack = extended.scalar();
         let mut matrices: Vec<_> =
             requirements.into_iter().map(|each| each.semidefinite(Some(&slack))).collect();
         matrices.push(&Affine::identity(1, 1.0) - &slack);
@@ -230,6 +230,7 @@ impl Problem {
             .then(|| (unknowns[self.unknowns], unknowns.rows(0, self.unknowns).into_owned()))
     }
 
+    /// Names of requirements that contradict each other, each of them necessary for the contradiction.
     fn conflict(&self) -> Vec<&'static str> {
         let mut names: Vec<&'static str> = Vec::new();
         for name in self.requirements.iter().filter_map(|each| each.name) {
@@ -248,7 +249,7 @@ impl Problem {
         names
     }
 
-    /// The solution if each requirement keeps at least half of its margin.
+    /// The solution; None without unknowns, or if a requirement does not keep at least half of its margin.
     fn verified(&self, unknowns: Option<DVector<f64>>) -> Result<Option<Solution>, Error> {
         let Some(unknowns) = unknowns else { return Ok(None) };
         let mut margins = Vec::with_capacity(self.requirements.len());

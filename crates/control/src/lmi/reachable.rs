@@ -51,15 +51,20 @@ impl ReachableSet {
 /// `matrices`: the vertices `A_i`, n x n; `disturbance`: b, n entries; `outputs`: C, r x n; `rate`: lambda in
 /// 1/s, above zero and below twice a decay rate that [`super::certify_common`] proves, otherwise no Q exists.
 /// Of all Q the one with the smallest sum of c Q c' over the rows c of C is computed, each relative to the
-/// same number for the mean matrix. The Q that is returned is verified in the units of the data.
+/// same number for the mean matrix. The Q that is returned is verified in the units of the data; it is enlarged by up
+/// to 1e-3 of itself where rounding errors hide the inequalities.
+///
+/// If `rate` is too large for the mean matrix alone, the outcome is [`Outcome::Infeasible`] with the conflict "rate";
+/// if no common Q could be proven, [`Outcome::Inconclusive`].
 ///
 /// Source: Boyd et al. (1994), section 6.1.3; J. Abedor, K. Nagpal, K. Poolla, A linear matrix inequality
 /// approach to peak-to-peak gain minimization, Int. J. Robust Nonlinear Control 6 (1996).
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad or missing `matrices`; [`Error::Shape`] for a bad `disturbance` or bad `outputs`;
-/// [`Error::OutOfRange`] for a bad `rate`.
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad or missing `matrices`, a bad `disturbance` or bad
+/// `outputs`; [`Error::OutOfRange`] for a bad `rate` or period; [`Error::NotConverged`], [`Error::Overflow`] when
+/// rounding prevents the solution for the mean matrix.
 pub fn common_reachable_set(
     matrices: &[DMatrix<f64>],
     disturbance: &DVector<f64>,
@@ -117,7 +122,7 @@ struct Reachability {
 }
 
 impl Reachability {
-    /// The smallest Q for one matrix, where the inequality is an equation; None if there is none.
+    /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for it.
     fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
         let spread = &self.b * self.b.transpose();
         let (equation, shifted, part) = match self.domain {
@@ -141,6 +146,7 @@ impl Reachability {
         }
     }
 
+    /// The matrix of the inequality.
     fn matrix(&self, q: &Affine, a: &DMatrix<f64>) -> Affine {
         let product = a * q;
         let part = self.part();
@@ -154,7 +160,7 @@ impl Reachability {
         }
     }
 
-    /// The matrix for a given Q; in continuous time with the product in twice the precision.
+    /// The matrix of the inequality for a known Q; in continuous time with the product in twice the precision.
     fn value(&self, q: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
         if self.domain != Domain::Continuous {
             return self.matrix(&Affine::constant(q), a).constant;

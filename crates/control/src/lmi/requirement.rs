@@ -29,12 +29,13 @@ pub struct Synthesis {
     pub gain: DMatrix<f64>,
     /// The proof that the eigenvalues are in the region.
     pub region: RegionCertificate,
-    /// The bound of the norm, if a performance was required; not above the given bound.
+    /// The bound of the norm, if a performance was required, not above the given bound. For weights with states it
+    /// may be None, see [`super::ChannelWeights::observer_gain`].
     pub bound: Option<GainBound>,
 }
 
 impl Performance {
-    /// Checks the matrices for n states, with a feedthrough of the given shape, and the bound.
+    /// Checks the matrices for n states, with a feedthrough of the given shape, and that the bound is above zero.
     pub(super) fn check(&self, n: usize, feedthrough: (usize, usize)) -> Result<(), Error> {
         check::shape("disturbance", &self.disturbance, (n, self.disturbance.ncols()))?;
         check::shape("output", &self.output, (self.output.nrows(), n))?;

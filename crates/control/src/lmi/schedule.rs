@@ -54,7 +54,8 @@ pub struct ScheduleCertificate {
 ///
 /// # Errors
 ///
-/// [`Error::Empty`] without values; [`Error::Shape`] for values of different shapes.
+/// [`Error::Empty`] without values or entries; [`Error::Shape`] for values of different shapes;
+/// [`Error::NotFinite`]; [`Error::Overflow`] for a degree that double precision cannot handle.
 pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
     let Some(first) = values.first() else {
         return Err(Error::Empty { matrix: "values", actual: (0, 0) });
@@ -113,8 +114,9 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// of t in each interval; all their Bernstein coefficients are definite, so the proof holds
 /// between the grid points, too. It is sufficient, not necessary.
 ///
-/// Returns None if no P was found. The P of the solver is verified by the eigenvalues of all
-/// inequalities in the units of the data, with products in twice the precision. Cost: that of a
+/// Returns None if no P could be proven. The P of the solver is verified by the eigenvalues of all
+/// inequalities in the units of the data, with products that are computed in twice the precision, and in
+/// sampled time rounded then. Cost: that of a
 /// program with n (n + 1) / 2 unknowns for each grid point and, for each interval, 4 (d + 2)
 /// inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
 ///
@@ -135,7 +137,7 @@ pub fn certify_schedule(
     change: f64,
     domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
-    let shortest = check(intervals)?;
+    let shortest = check_intervals(intervals)?;
     domain.check()?;
     check::positive("change", change)?;
     if domain != Domain::Continuous && change > shortest {
@@ -146,7 +148,7 @@ pub fn certify_schedule(
         return Ok(None);
     };
     coordinates.unit = time_unit(domain, coordinates.unit);
-    let inside: Vec<_> = intervals
+    let scaled_intervals: Vec<_> = intervals
         .iter()
         .map(|Interval { length, coefficients }| Interval {
             length: *length,
@@ -161,10 +163,10 @@ pub fn certify_schedule(
         problem.constrain(&(&Affine::identity(n, 1.0) - p), MARGIN);
     }
     // In continuous time the unit of A~ is that of time, too.
-    let scaled = change / coordinates.unit;
+    let scaled_change = change / coordinates.unit;
     let claims = match domain {
-        Domain::Continuous => decays(&inside, &p, scaled),
-        Domain::Sampled { .. } => inequalities(&inside, &p, scaled, |p, a| p * a),
+        Domain::Continuous => decays(&scaled_intervals, &p, scaled_change),
+        Domain::Sampled { .. } => inequalities(&scaled_intervals, &p, scaled_change, |p, a| p * a),
     };
     for matrix in claims {
         problem.constrain(&matrix, MARGIN);
@@ -188,7 +190,7 @@ pub fn largest_change(
     intervals: &[Interval],
     domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
-    let mut limit = check(intervals)?;
+    let mut limit = check_intervals(intervals)?;
     if domain == Domain::Continuous {
         let mut fastest = f64::MIN_POSITIVE;
         for a in intervals.iter().flat_map(|interval| &interval.coefficients) {
@@ -212,8 +214,8 @@ pub fn largest_change(
     Ok(Some(best))
 }
 
-/// The length of the shortest interval of a consistent list.
-fn check(intervals: &[Interval]) -> Result<f64, Error> {
+/// Checks the intervals; returns the length of the shortest one.
+fn check_intervals(intervals: &[Interval]) -> Result<f64, Error> {
     let n = order(intervals.first().and_then(|interval| interval.coefficients.first()))?;
     let mut shortest = f64::INFINITY;
     for Interval { length, coefficients } in intervals {
@@ -244,8 +246,8 @@ fn inequalities(
         // The degree of P A is that of A and 1 more.
         let degree = a.len();
         for (interval, step) in moves {
-            let by = &slope(interval) * step;
-            let ends = [&p[i] + &by, &p[i + 1] + &by];
+            let difference = &slope(interval) * step;
+            let ends = [&p[i] + &difference, &p[i + 1] + &difference];
             for j in 0..=degree {
                 let t = as_number(j) / as_number(degree);
                 let between = |[from, to]: [&Affine; 2]| &(from * (1.0 - t)) + &(to * t);
@@ -277,7 +279,7 @@ fn product(
     product
 }
 
-/// The Bernstein coefficients of -(A' P + P A + D) in continuous time.
+/// The Bernstein coefficients of -(A' P + P A + D) in continuous time, for both D of each interval.
 fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
     let mut all = Vec::new();
     for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {
@@ -298,7 +300,7 @@ fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec
         let degree = a.len();
         let slope = (&p[i + 1] - &p[i]) * (rate / length * as_number(degree));
         for j in 0..=degree {
-            // (d + 1 - j) `P_i` `A_j` + j `P_{i+1}` `A_{j-1}` as one product: a sum of whole terms rounds nothing.
+            // (d + 1 - j) P_i A_j + j P_(i+1) A_(j-1) as one product: the copies of a term need no rounded factor.
             let pair = |k: usize| if k < degree - j { (i, j) } else { (i + 1, j - 1) };
             let left = DMatrix::from_fn(n, n * degree, |row, k| p[pair(k / n).0][(row, k % n)]);
             let right = DMatrix::from_fn(n * degree, n, |k, col| a[pair(k / n).1][(k % n, col)]);
@@ -309,7 +311,7 @@ fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec
     all
 }
 
-/// The certificate, if P proves the inequalities in the units of the data.
+/// The certificate; None if P does not prove the inequalities in the units of the data.
 fn verified(
     intervals: &[Interval],
     p: Vec<DMatrix<f64>>,

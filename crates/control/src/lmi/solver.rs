@@ -16,16 +16,17 @@ use std::time::Duration;
 /// How the solver ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
+    /// The tolerances of the solver were met, or almost.
     Solved,
-    /// It stopped before the tolerances were met.
+    /// The solver stopped before the tolerances were met.
     Stalled,
 }
 
 /// Minimises `objective`' x subject to every matrix being positive semidefinite. None if the
-/// problem is infeasible or the solver failed. The result is not verified.
+/// problem is infeasible or unbounded, the solver failed, or the time of this thread is over. The result is not
+/// verified.
 ///
-/// The cone of a matrix of order k is given its upper triangle column by column, off-diagonal
-/// entries times sqrt(2).
+/// The solver receives the upper triangle of each matrix column by column, off-diagonal entries times sqrt(2).
 pub(super) fn minimise(
     objective: &DVector<f64>,
     matrices: &[Affine],
@@ -75,20 +76,20 @@ struct Program {
     cones: Vec<Cone<f64>>,
 }
 
-/// Interval at which a caller looks whether to go on waiting.
-const LOOK: Duration = Duration::from_millis(20);
+/// Interval at which a waiting caller checks its condition.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 impl Program {
-    /// Solves in a thread of its own and waits for it until `ending`: one iteration of a large program takes
-    /// minutes. The thread ends after that iteration.
+    /// Solves in a thread of its own and waits for it until `ending` is true: one iteration of a large program takes
+    /// minutes. The thread ends after that iteration. None if `ending` was true first, or there is no solution.
     fn solve_until(self, ending: &Ending) -> Option<(DVector<f64>, End)> {
         let (sender, receiver) = channel();
-        let of_solver = Ending::clone(ending);
-        let solve = move || drop(sender.send(self.solve(Some(of_solver))));
+        let solver_ending = Ending::clone(ending);
+        let solve = move || drop(sender.send(self.solve(Some(solver_ending))));
         // Without a thread there is no answer, as for a program that the solver refuses.
         thread::Builder::new().name("inequalities".to_owned()).spawn(solve).ok()?;
         loop {
-            match receiver.recv_timeout(LOOK) {
+            match receiver.recv_timeout(POLL_INTERVAL) {
                 Ok(solution) => return solution,
                 Err(RecvTimeoutError::Timeout) if !ending() => {}
                 Err(_) => return None,
@@ -96,6 +97,7 @@ impl Program {
         }
     }
 
+    /// Solves in this thread, until `ending` is true after an iteration.
     fn solve(&self, ending: Option<Ending>) -> Option<(DVector<f64>, End)> {
         let Self { left, right, costs, cones } = self;
         let quadratic = CscMatrix::zeros((costs.len(), costs.len()));
@@ -126,6 +128,7 @@ fn settings() -> DefaultSettings<f64> {
     }
 }
 
+/// The upper triangle of the symmetric part, column by column, off-diagonal entries times sqrt(2).
 fn triangle(m: &DMatrix<f64>) -> Vec<f64> {
     let mut entries = Vec::with_capacity(m.nrows() * (m.nrows() + 1) / 2);
     for col in 0..m.ncols() {

@@ -23,11 +23,11 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// For the augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e;
 /// eps], or `-F_0` from the fault to [e; `f_hat`].
 ///
-/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval
-/// in common. P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside
-/// of all inequalities as possible. With a performance, one P for all inequalities is sufficient,
-/// not necessary. The smallest bound is computed; the gain is then designed for a bound 5 % larger,
-/// as far inside as possible, because gains often grow without limit towards the smallest bound.
+/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common. P >= I,
+/// and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as possible. With
+/// a performance, one P for all inequalities is sufficient, not necessary. For a given bound the gain is as far
+/// inside of the inequalities as possible. Without one, the smallest bound is computed, and the gain is designed for
+/// a bound 5 % larger, as far inside as possible, because gains often grow without limit towards the smallest bound.
 /// When w does not act on the measurement, faster is always better: give a disc to limit the gain.
 ///
 /// The program is solved in coordinates in which all states are equally observable at the speed
@@ -54,8 +54,8 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// let c_0 = DMatrix::from_row_slice(1, 3, &[1.0, 0.0, 0.0]);
 /// let disc = Some(Disc { center: -20.0, radius: 5.0 });
 /// let region = Region { disc, ..Region::default() };
-/// let found = observer_gain(&a_0, &c_0, &region, None, Domain::Continuous)?.optimal().unwrap();
-/// let error_dynamics = a_0 - found.gain * c_0;
+/// let observer = observer_gain(&a_0, &c_0, &region, None, Domain::Continuous)?.optimal().unwrap();
+/// let error_dynamics = a_0 - observer.gain * c_0;
 /// for value in control::eigen::eigenvalues(&error_dynamics)? {
 ///     assert!((value + 20.0).norm() < 5.0);
 /// }
@@ -142,7 +142,7 @@ pub fn state_feedback(
     })
 }
 
-/// A bound to prove: that of `performance` for a closed loop from `input` to `output`.
+/// A bound to prove: that of `performance` for the closed loop from `input`, n x k, to `output`, r x n.
 pub(super) struct Bound<'a> {
     performance: &'a Performance,
     input: DMatrix<f64>,

@@ -6,9 +6,9 @@ use crate::check::as_number;
 use crate::weight::Weight;
 use crate::{Error, check};
 
-/// Points between two frequencies of the table.
+/// Points from one frequency of the table to the next, the first frequency included.
 const BETWEEN: usize = 6;
-/// Relative width of the logarithm of the largest deviation at which the search ends.
+/// Width of the logarithm of the largest deviation at which the search ends, relative to that of a constant weight.
 const NARROW: f64 = 1e-3;
 /// Smallest coefficient of the squared magnitude: magnitudes at frequency 0 and infinity are neither 0
 /// nor infinite.
@@ -38,8 +38,9 @@ pub struct TableWeight {
 ///
 /// For a given alpha these are linear inequalities for the coefficients of N and D, and "N and D are
 /// positive with damping ratios of at least 0.2" is a linear matrix inequality; alpha is found by
-/// bisection to 0.1 % of its logarithm. So no other weight of this order with such damping is nearer.
-/// Poles and zeros are the roots in the left half plane (spectral factorisation).
+/// bisection, its logarithm to 0.1 % of that for a constant weight. So no other weight of this order with such
+/// damping is nearer by more. The inequalities hold at the frequencies of the table and five points between each
+/// two of them. Poles and zeros are the roots in the left half plane (spectral factorisation).
 ///
 /// Source: S. P. Wu, S. Boyd and L. Vandenberghe, FIR filter design via spectral factorization and convex
 /// optimization (1996), here for a quotient.
@@ -91,7 +92,7 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
     Ok(TableWeight { weight, deviation })
 }
 
-/// The table with further points between its own.
+/// The table with further points between its frequencies.
 fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let before_last = table.windows(2).flat_map(|pair| {
         let ((w, m), (w_next, m_next)) = (pair[0], pair[1]);
@@ -102,8 +103,8 @@ fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
     before_last.chain(table.last().copied()).collect()
 }
 
-/// Coefficients of numerator and denominator in p, the highest power first, whose squared magnitude is
-/// within a factor of that of the points (p^2, magnitude^2); None if there are none.
+/// Coefficients of numerator and denominator of a weight whose squared magnitude is within a factor of that of the
+/// points (w^2, magnitude^2); None if the solver finds none.
 fn coefficients(
     points: &[(f64, f64)],
     order: usize,
@@ -117,7 +118,7 @@ fn coefficients(
             problem.constrain(coefficient, SMALLEST);
         }
         if let [b_0, b_1, b_2] = polynomial.as_slice() {
-            // b_1 >= -(2 - 4 zeta^2) sqrt(b_0 b_2), with s >= 0: b_1 - s is the smallest value.
+            // b_1 >= -(2 - 4 zeta^2) sqrt(b_0 b_2): the matrix bounds b_1 - rest, which is at most b_1.
             let rest = problem.scalar();
             problem.constrain(&rest, 0.0);
             let side = &(b_1 - &rest) * (0.5 / (1.0 - 2.0 * DAMPING * DAMPING));

@@ -68,8 +68,8 @@ pub struct CommonFeedback {
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::from_row_slice(2, 2, &[-0.1, 1.0, -10.0, -0.1]);
 /// let other = DMatrix::from_row_slice(2, 2, &[-0.1, 10.0, -1.0, -0.1]);
-/// let found = certify_common(&[one, other], &Region::default(), Domain::Continuous)?;
-/// let Outcome::Infeasible { conflict } = found else { panic!() };
+/// let outcome = certify_common(&[one, other], &Region::default(), Domain::Continuous)?;
+/// let Outcome::Infeasible { conflict } = outcome else { panic!() };
 /// assert_eq!(conflict, [0, 1]);
 /// # Ok::<(), control::Error>(())
 /// ```
@@ -126,8 +126,8 @@ pub fn certify_common(
     contradiction(all, |members| decision(&coordinates, members).0)
 }
 
-/// The certificate of [`certify_common`] if one is found at once, in the coordinates of the mean of the
-/// vertices or of the first one; without its search for the contradiction.
+/// The certificate of [`certify_common`], searched in the coordinates of the mean of the vertices and of the first one
+/// only; None if there is none, without a search for the contradiction. There must be a vertex.
 ///
 /// # Errors
 ///
@@ -153,7 +153,7 @@ pub(crate) fn find_common(
     Ok(None)
 }
 
-/// The order of the first matrix of a family, which must be square.
+/// The order of the first matrix of a family, which must be square; [`Error::Empty`] if there is none.
 pub(super) fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     match first {
         Some(a) => check::square("A", a),
@@ -220,9 +220,9 @@ fn contradiction<T>(
 /// };
 /// let region = Region { decay: Some(1.0), ..Region::default() };
 /// let plants = [plant(1.0), plant(4.0)];
-/// let found = common_feedback(&plants, &region, Domain::Continuous)?.optimal().unwrap();
+/// let feedback = common_feedback(&plants, &region, Domain::Continuous)?.optimal().unwrap();
 /// for Vertex { a, b } in plants {
-///     for value in control::eigen::eigenvalues(&(a + b * &found.gain))? {
+///     for value in control::eigen::eigenvalues(&(a + b * &feedback.gain))? {
 ///         assert!(value.re < -1.0);
 ///     }
 /// }
@@ -244,11 +244,11 @@ pub fn common_feedback(
     let mut coordinates = Coordinates::of_observation(&a, &c, region, domain)?;
     let search = CommonSearch { plants, region, domain };
     let all: Vec<_> = (0..plants.len()).collect();
-    let mut proposed = false;
+    let mut has_candidate = false;
     for refinement in 0..=REFINEMENTS {
         let program = search.program(&coordinates, &all).with_norm(None);
         for Candidate { gain, coordinates } in search.candidates(&program, &coordinates, &all)? {
-            proposed = true;
+            has_candidate = true;
             if let Some(certificate) = search.proof(&gain, &coordinates)? {
                 return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
             }
@@ -258,7 +258,7 @@ pub fn common_feedback(
             _ => break,
         }
     }
-    if proposed {
+    if has_candidate {
         return Ok(Outcome::Inconclusive(NOT_PROVEN));
     }
     contradiction(all, |members| search.program(&coordinates, members).problem)
@@ -324,7 +324,8 @@ struct CommonSearch<'a> {
 }
 
 impl CommonSearch<'_> {
-    /// One P for the closed loops, first in the coordinates of the gain, then in others.
+    /// One P for the closed loops, first in the coordinates of the gain, then as by [`certify_common`]; None if there
+    /// is none.
     fn proof(
         &self,
         gain: &DMatrix<f64>,
@@ -361,7 +362,7 @@ impl CommonSearch<'_> {
         row_units(&coordinates.output(&self.plants[0].b.transpose()))
     }
 
-    /// X >= I and the inequalities of `members`.
+    /// The program for X >= I and Z with the inequalities of `members`.
     fn program(&self, coordinates: &Coordinates, members: &[usize]) -> Program {
         let units = self.units(coordinates);
         let (n, m) = self.plants[0].b.shape();

@@ -10,7 +10,7 @@ use crate::riccati::kalman;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// A bound of the norm that is larger than the norm by more than this factor is not stated.
+/// Largest factor between a proven bound and the norm at which the bound is stated.
 const LOOSE: f64 = 1.01;
 
 /// Of the gains with a norm up to this factor above the least one, the smallest gain is chosen.
@@ -29,6 +29,10 @@ pub struct ChannelWeights {
 
 impl ChannelWeights {
     /// The system with weights. States: those of `system`, of `input`, of `output`.
+    ///
+    /// # Panics
+    ///
+    /// If the numbers of signals do not fit.
     #[must_use]
     pub fn around(&self, system: &StateSpace) -> StateSpace {
         let Self { input, output } = self;
@@ -53,6 +57,10 @@ impl ChannelWeights {
     /// of the pair without weights is [L; 0] here.
     ///
     /// `a`: n x n; `c`: p x n; `performance`: as for [`super::observer_gain`].
+    ///
+    /// # Panics
+    ///
+    /// If the numbers of states or signals do not fit.
     #[must_use]
     pub fn extend(
         &self,
@@ -95,9 +103,9 @@ impl ChannelWeights {
     /// Kalman filter for disturbances of unit intensity, without its rows for the states of the weights. From
     /// each of them the norm itself is lowered within the region, by its derivatives with respect to the
     /// entries of L, as far as possible. Of the results with a norm up to 5 % above the least one, or below a
-    /// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum; how far it
-    /// is from the best gain of any observer, [`super::observer_norm_lower_bound`] for
-    /// [`Self::extend`] says.
+    /// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum;
+    /// [`super::observer_norm_lower_bound`] for [`Self::extend`] bounds the norm of the best observer.
+    /// [`Outcome::Inconclusive`] if no result keeps the given bound.
     ///
     /// The region is proven as in [`super::observer_gain`]. `bound` of the result is that of the weighted
     /// system, with P for the states of [`Self::around`], or None if it could not be proven to 1 %;
@@ -120,8 +128,8 @@ impl ChannelWeights {
         performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
         let free = Performance { gamma: None, ..performance.clone() };
         let (wide_a, wide_c, wide) = self.extend(a, c, &free);
-        let of_disturbance = self.input.a.nrows();
-        let weighted = Some(WeightedDynamics { a: &wide_a, c: &wide_c, of_disturbance });
+        let disturbance_states = self.input.a.nrows();
+        let weighted = Some(WeightedDynamics { a: &wide_a, c: &wide_c, disturbance_states });
         let requirements = ObserverRequirements {
             a,
             c,
@@ -210,7 +218,7 @@ pub(super) fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
     whole
 }
 
-/// The first n rows of the gain of the Kalman filter, if there is one.
+/// The first n rows of the gain of the Kalman filter; None if there is no such filter.
 ///
 /// The noises of states and measurements are correlated: S = B D', V = D D', L = `L_1` + S V^-1 with `L_1` of
 /// the filter for A - S V^-1 C and the intensity B B' - S V^-1 S'.

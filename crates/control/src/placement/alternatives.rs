@@ -21,10 +21,10 @@ pub struct Alternatives {
     /// Others, the lowest peak of S first, at most 21, above 24 states at most 2. Condition number
     /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
     pub others: Vec<Placement>,
-    /// The results of two standard methods, up to 24 states, None if there is none: of method 0 of Kautsky, Nichols and Van Dooren,
-    /// which needs real eigenvalues, and of the method of Tits and Yang, each with start and end as in
-    /// scipy's `place_poles`. They are references for a choice, with figures that may be above those of
-    /// the others. With one independent input both are the chosen one.
+    /// The results of two standard methods, up to 24 states, None if there is none: of method 0 of Kautsky, Nichols
+    /// and Van Dooren, which needs real eigenvalues, and of the method of Tits and Yang, each with start and end as
+    /// in scipy's `place_poles`. They are references for a choice, with figures that may be above those of the
+    /// others. With one independent input both are the chosen one.
     pub standard: [Option<Placement>; 2],
 }
 
@@ -62,8 +62,8 @@ impl Alternatives {
         }
     }
 
-    /// The pairs of the results of the same standard method for `self` and `other`; a method without a result for one of
-    /// them has no pair. See [`Self::standard`].
+    /// The pairs of the results of the same standard method for `self` and `other`; a method without a result for one
+    /// of them has no pair. See [`Self::standard`].
     pub fn standard_pairs<'a>(
         &'a self,
         other: &'a Self,
