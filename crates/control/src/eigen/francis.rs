@@ -112,12 +112,12 @@ impl Shift {
     /// in a cluster of eigenvalues their products would cancel.
     fn column(&self, h: &DMatrix<f64>, at: usize) -> [f64; 3] {
         let (here, next) = (h[(at, at)] - self.real, h[(at + 1, at + 1)] - self.real);
-        let (below, beside) = (h[(at + 1, at)], h[(at, at + 1)]);
+        let (below, right) = (h[(at + 1, at)], h[(at, at + 1)]);
         let size = here.abs() + self.imaginary + below.abs();
         let column = [
             here * (here / size)
                 + self.imaginary * (self.imaginary / size)
-                + beside * (below / size),
+                + right * (below / size),
             (here + next) * (below / size),
             h[(at + 2, at + 1)] * (below / size),
         ];

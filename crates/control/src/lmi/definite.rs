@@ -62,8 +62,8 @@ impl AccurateProduct {
                 for k in 0..a.ncols() {
                     let (x, y) = (a[(row, k)], b[(k, col)]);
                     let term = x * y;
-                    let (next, lost) = two_sum(sum, term);
-                    error += x.mul_add(y, -term) + lost;
+                    let (next, rounding) = two_sum(sum, term);
+                    error += x.mul_add(y, -term) + rounding;
                     sum = next;
                 }
                 (product.high[(row, col)], product.low[(row, col)]) = two_sum(sum, error);

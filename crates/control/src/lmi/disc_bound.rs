@@ -30,9 +30,9 @@ const BISECTIONS: usize = 30;
 /// mirrored into the left half plane, det T is nowhere on s > 0 larger than its maximum on the imaginary axis;
 /// s = (n - q) R / q is the best point.
 ///
-/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. det H(s) / det H(0) is the product
-/// of (1 - s / `z_j`) over the invariant zeros of (A, B, C), divided by the product of (1 + s `v_i`) with `v_i` = -1
-/// / `s_i` for the eigenvalues `s_i`. This gives two bounds, on which L acts by its eigenvalues only:
+/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. Each eigenvalue `s_i` of A - L C has
+/// an inverse `v_i` = -1 / `s_i`. det H(s) / det H(0) is the product of (1 - s / `z_j`) over the invariant zeros of
+/// (A, B, C), divided by the product of (1 + s `v_i`). This gives two bounds, which depend on L by the `v_i` only:
 ///
 /// ```text
 /// gamma >= |sum of v_i - zeta| / sum of 1 / sigma_i(E B),     zeta = sum of -1 / z_j           (the trace at s = 0)
@@ -107,14 +107,14 @@ impl InverseRange {
     fn largest_log(&self, sum: f64, a: f64) -> f64 {
         let free = (sum - self.count * self.least).max(0.0);
         let width = self.largest - self.least;
-        let factor = |v: f64| -(a * v).ln_1p();
+        let log = |v: f64| -(a * v).ln_1p();
         let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
         if at_end >= self.count {
-            return self.count * factor(self.largest);
+            return self.count * log(self.largest);
         }
-        let ends = if at_end > 0.0 { at_end * factor(self.largest) } else { 0.0 };
+        let ends = if at_end > 0.0 { at_end * log(self.largest) } else { 0.0 };
         let remainder = if at_end > 0.0 { free - at_end * width } else { free };
-        ends + factor(self.least + remainder) + (self.count - at_end - 1.0) * factor(self.least)
+        ends + log(self.least + remainder) + (self.count - at_end - 1.0) * log(self.least)
     }
 }
 

@@ -29,9 +29,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// after the last measurement counts. The largest bound is computed; it equals the least norm of any filter (strong
 /// duality), which gains in general only approach.
 ///
-/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm
-/// and bound are not used. None if D has not full row rank (a measurement without noise), if no filter
-/// exists, if no such disturbance reaches a state or E = 0, or if the inequalities could not be verified in double
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and
+/// bound are not used. None if D has not full row rank (a measurement without noise), if no filter exists, if
+/// no such disturbance reaches a state or E = 0, or if the inequalities could not be verified in double
 /// precision.
 ///
 /// Method: w = -D' (D D')^-1 C x + N d with the null space N of D meets [C, D] H = 0. The

@@ -107,18 +107,16 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// A(theta)' P(theta) + P(theta) A(theta) + D < 0  for D = change P_i', -change P_i'
 /// ```
 ///
-/// There V is continuous, and along every theta(t) its one-sided derivatives at a grid point are those of the
-/// intervals beside it, so that it decreases there, too.
+/// V is continuous at the grid points. Along every theta(t) its one-sided derivatives there are those of the
+/// neighbouring intervals, so V decreases there, too.
 ///
-/// The matrices are polynomials
-/// of t in each interval; all their Bernstein coefficients are definite, so the proof holds
-/// between the grid points, too. It is sufficient, not necessary.
+/// The matrices are polynomials of t in each interval; all their Bernstein coefficients are definite, so the
+/// proof holds between the grid points, too. It is sufficient, not necessary.
 ///
 /// Returns None if no P could be proven. The P of the solver is verified by the eigenvalues of all
 /// inequalities in the units of the data, with products that are computed in twice the precision, and in
-/// sampled time rounded then. Cost: that of a
-/// program with n (n + 1) / 2 unknowns for each grid point and, for each interval, 4 (d + 2)
-/// inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
+/// sampled time rounded then. Cost: that of a program with n (n + 1) / 2 unknowns for each grid point and,
+/// for each interval, 4 (d + 2) inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
 ///
 /// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear
 /// parameter-varying systems, Automatica 31 (1995); F. Wu, X. H. Yang, A. Packard, G. Becker,

@@ -23,12 +23,13 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// For the augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e;
 /// eps], or `-F_0` from the fault to [e; `f_hat`].
 ///
-/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common. P >= I,
-/// and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as possible. With
-/// a performance, one P for all inequalities is sufficient, not necessary. For a given bound the gain is as far
-/// inside of the inequalities as possible. Without one, the smallest bound is computed, and the gain is designed for
-/// a bound 5 % larger, as far inside as possible, because gains often grow without limit towards the smallest bound.
-/// When w does not act on the measurement, faster is always better: give a disc to limit the gain.
+/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common.
+/// P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as
+/// possible. With a performance, one P for all inequalities is sufficient, not necessary. For a given bound
+/// the gain is as far inside of the inequalities as possible. Without one, the smallest bound is computed,
+/// and the gain is designed for a bound 5 % larger, as far inside as possible, because gains often grow
+/// without limit towards the smallest bound. When w does not act on the measurement, faster is always better:
+/// give a disc to limit the gain.
 ///
 /// The program is solved in coordinates in which all states are equally observable at the speed
 /// that the region requires; if no gain is found, up to three times more in coordinates in which

@@ -36,11 +36,11 @@ pub struct TableWeight {
 /// |W(j w)|^2 = N(w^2) / D(w^2),  minimise alpha:  m^2 / alpha <= N / D <= alpha m^2
 /// ```
 ///
-/// For a given alpha these are linear inequalities for the coefficients of N and D, and "N and D are
-/// positive with damping ratios of at least 0.2" is a linear matrix inequality; alpha is found by
-/// bisection, its logarithm to 0.1 % of that for a constant weight. So no other weight of this order with such
-/// damping is nearer by more. The inequalities hold at the frequencies of the table and five points between each
-/// two of them. Poles and zeros are the roots in the left half plane (spectral factorisation).
+/// For a given alpha these are linear inequalities for the coefficients of N and D, and "N and D are positive
+/// with damping ratios of at least 0.2" is a linear matrix inequality; alpha is found by bisection, its
+/// logarithm to 0.1 % of that for a constant weight. So no other weight of this order with such damping is
+/// nearer by more. The inequalities hold at the frequencies of the table and five points between each two of
+/// them. Poles and zeros are the roots in the left half plane (spectral factorisation).
 ///
 /// Source: S. P. Wu, S. Boyd and L. Vandenberghe, FIR filter design via spectral factorization and convex
 /// optimization (1996), here for a quotient.
