@@ -161,11 +161,7 @@ impl<'a> Search<'a> {
     }
 
     /// Adds the end of a descent of an objective from `start`.
-    fn descend(
-        &mut self,
-        start: &Directions,
-        weighting: &Weighting,
-    ) -> Result<(), Error> {
+    fn descend(&mut self, start: &Directions, weighting: &Weighting) -> Result<(), Error> {
         let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weighting);
         let end = descend(self.feedback.problem, start.clone(), &slope, TOLERANCE)?;
         self.add(&[end])?;
