@@ -117,6 +117,9 @@ pub fn regulator(
     bandwidth: f64,
     domain: Domain,
 ) -> Result<ByBandwidth<Regulator>, Error> {
+    let n = check::with_inputs(a, b)?;
+    check::shape("Q", q, (n, n))?;
+    check::column("units", units.as_slice(), b.ncols())?;
     let scaled = b * DMatrix::from_diagonal(units);
     let (weight, loop_gain) = weight(a, &scaled, q, bandwidth, domain)?;
     let r = DMatrix::from_diagonal(&units.map(|unit| weight / (unit * unit)));
@@ -142,6 +145,9 @@ pub fn filter(
     bandwidth: f64,
     domain: Domain,
 ) -> Result<ByBandwidth<KalmanFilter>, Error> {
+    let n = check::with_outputs(a, c)?;
+    check::shape("W", w, (n, n))?;
+    check::column("units", units.as_slice(), c.nrows())?;
     let scaled = c.transpose() * DMatrix::from_diagonal(units);
     let (weight, loop_gain) = weight(&a.transpose(), &scaled, w, bandwidth, domain)?;
     let v = DMatrix::from_diagonal(&units.map(|unit| weight / (unit * unit)));

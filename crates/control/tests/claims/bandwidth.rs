@@ -93,6 +93,21 @@ fn natural_units_follow_the_units_of_outputs() {
 }
 
 #[test]
+fn weights_and_units_of_the_wrong_shape_are_refused_by_name() {
+    let StateSpace { a, b, c, .. } = carts();
+    let (domain, one, two) = (Domain::Continuous, DVector::repeat(1, 1.0), DVector::repeat(2, 1.0));
+    let (three, four) = (DMatrix::identity(3, 3), DMatrix::identity(4, 4));
+    let name = |error: Error| match error {
+        Error::Shape { matrix, .. } => matrix,
+        other => panic!("{other}"),
+    };
+    assert_eq!(name(regulator(&a, &b, &four, &two, 1.0, domain).unwrap_err()), "units");
+    assert_eq!(name(regulator(&a, &b, &three, &one, 1.0, domain).unwrap_err()), "Q");
+    assert_eq!(name(filter(&a, &c, &four, &one, 1.0, domain).unwrap_err()), "units");
+    assert_eq!(name(filter(&a, &c, &three, &two, 1.0, domain).unwrap_err()), "W");
+}
+
+#[test]
 fn a_sampled_loop_has_a_bandwidth_below_its_nyquist_frequency() {
     let one = DMatrix::from_element(1, 1, 1.0);
     let domain = Domain::Sampled { period: 0.1 };
