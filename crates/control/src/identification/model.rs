@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::Error;
 use crate::identification::Record;
+use crate::{Error, check};
 
 /// `x[k+1]` = A `x[k]` + B `u[k]` + K `e[k]` + b, `y[k]` = C `x[k]` + D `u[k]` + `e[k]` + d, see [`crate::identification`].
 #[derive(Debug, Clone, PartialEq)]
@@ -30,20 +30,23 @@ pub struct IdentifiedModel {
 }
 
 impl IdentifiedModel {
-    /// Predicts the outputs of the samples in `range`, p x its length, from the inputs and, at each `horizon`-th sample, the
-    /// s samples before it. With the length of the range as horizon it is a simulation.
+    /// Predicts the outputs of the samples in `range`, p x its length, from the inputs and, at the first and each
+    /// `horizon`-th sample after it, the s samples before it.
+    ///
+    /// With the length of the range as horizon it is a simulation; a horizon of 0 counts as 1.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad record; [`Error::TooFewSamples`] if the range has no
-    /// s samples before it, or ends after the record.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad record or one with other numbers of signals;
+    /// [`Error::TooFewSamples`] if there are fewer than s samples before the range, or if it ends after the record.
     pub fn predict(
         &self,
         record: &Record,
         range: Range<usize>,
         horizon: usize,
     ) -> Result<DMatrix<f64>, Error> {
-        record.check()?;
+        check::shape("u", &record.inputs, (self.b.ncols(), record.len()))?;
+        check::shape("y", &record.outputs, (self.c.nrows(), record.len()))?;
         let signals = self.b.ncols() + self.c.nrows();
         let past = self.past.ncols() / signals;
         if range.start < past || range.end > record.len() {

@@ -35,7 +35,7 @@ impl Record {
     }
 
     /// Checks that inputs and outputs are finite and have the same number of samples.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), Error> {
         check::finite("u", &self.inputs)?;
         check::shape("y", &self.outputs, (self.outputs.nrows(), self.len()))
     }
@@ -132,7 +132,7 @@ impl Windows {
     }
 
     /// The rank of the input sequences of s + 1 samples, m (s + 1) if they are persistently exciting of
-    /// this order.
+    /// this order; 0 for constant inputs and without windows.
     ///
     /// Singular values below `tolerance` of the largest count as zero; inputs in units of their deviations.
     ///
@@ -145,7 +145,10 @@ impl Windows {
         let is_input = |column: &usize| (column - 1) % signals < self.inputs;
         let columns: Vec<_> = (1..factor.ncols()).filter(is_input).collect();
         let sequences = factor.rows(1, factor.nrows() - 1).select_columns(&columns);
-        Ok(Svd::new(&sequences)?.rank(tolerance))
+        let svd = Svd::new(&sequences)?;
+        // An input that varies has a singular value of at least the square root; without one, all are rounding.
+        let largest = svd.values[0].max(as_number(self.count).sqrt());
+        Ok(svd.rank_above(tolerance * largest))
     }
 
     /// m + p.
@@ -158,11 +161,16 @@ impl Windows {
         1..1 + self.past * self.signals()
     }
 
-    /// The factor of signals divided by their units, and these units: their deviations, 1 for a constant signal.
+    /// The factor of signals divided by their units, and these units: their deviations; 1 for a constant signal, and
+    /// without windows.
+    ///
+    /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean for each
+    /// row.
     pub(super) fn scaled(&self) -> (DMatrix<f64>, Vec<f64>) {
+        let rounding = f64::EPSILON * as_number(self.count + self.factor.nrows());
         let mut units = self.deviations();
         for (unit, mean) in units.iter_mut().zip(self.means()) {
-            if *unit <= f64::EPSILON * mean.abs() {
+            if self.count == 0 || *unit <= rounding * mean.abs() {
                 *unit = 1.0;
             }
         }
@@ -178,4 +186,31 @@ impl Windows {
 fn stacked_factor(parts: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let all = parts[1..].iter().fold(parts[0].clone(), |all, part| stacked(&all, part));
     all.qr().r()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(value: f64) -> Record {
+        let outputs = DMatrix::from_fn(1, 500, |_, k| (0.3 * as_number(k)).sin());
+        Record { inputs: DMatrix::from_element(1, 500, value), outputs }
+    }
+
+    #[test]
+    fn a_constant_signal_has_the_unit_one_and_excites_nothing() {
+        for value in [20.0, 0.1, 0.0] {
+            let windows = Windows::new(&record(value), 4, 0..500).unwrap();
+            let (_, units) = windows.scaled();
+            assert_eq!(units[0].to_bits(), 1.0_f64.to_bits(), "{value}: {units:?}");
+            assert!((units[1] - 0.5_f64.sqrt()).abs() < 0.01, "{units:?}");
+            assert_eq!(windows.excitation(1e-6), Ok(0), "{value}");
+        }
+    }
+
+    #[test]
+    fn a_range_without_windows_excites_nothing() {
+        let windows = Windows::new(&record(20.0), 4, 0..3).unwrap();
+        assert_eq!((windows.count(), windows.excitation(1e-6)), (0, Ok(0)));
+    }
 }

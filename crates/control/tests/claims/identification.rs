@@ -222,6 +222,9 @@ fn records_without_a_plant_are_refused_with_the_reason() {
     assert_eq!(windows.excitation(1e-6).unwrap(), 14);
     let subspace = Subspace::new(&windows, false).unwrap();
     assert!(matches!(subspace.model(0), Err(Error::OutOfRange { name: "order", .. })));
+    let other = Record { inputs: record.inputs.rows(0, 1).into(), ..record.clone() };
+    let error = subspace.model(3).unwrap().predict(&other, 6..800, 1).unwrap_err();
+    assert_eq!(error, Error::Shape { matrix: "u", expected: (2, 800), actual: (1, 800) });
     record.outputs[(1, 7)] = f64::NAN;
     let error = Windows::new(&record, 6, 0..800).unwrap_err();
     assert!(matches!(error, Error::NotFinite { matrix: "y", row: 2, col: 8, .. }));
