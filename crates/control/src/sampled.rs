@@ -102,19 +102,21 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
 /// y_f[k+1]  = y_f[k] + (I - e^(-W T)) (y[k] - y_f[k])
 /// ```
 ///
-/// `extended`: in continuous time; one in sampled time is returned as it is; `period`: T in s, above zero. Exact for a held
-/// u and faults that follow their model, a ramp within the interval included; the measurement filter operates on
-/// samples. Method and precision: see [`FirstOrderHold`].
+/// `extended`: in continuous time; one that is sampled with this `period` is returned unchanged; `period`: T in s, above zero.
+/// Exact for a held u and faults that follow their model, a ramp within the interval included; the measurement filter
+/// operates on samples. Method and precision: see [`FirstOrderHold`].
 ///
 /// # Errors
 ///
 /// Same as [`FaultyPlant::check`] and [`FirstOrderHold::new`]; [`Error::Shape`] when the filter
-/// does not fit the plant.
+/// does not fit the plant; [`Error::OutOfRange`] for a plant that is sampled with another period.
 pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Error> {
     let ExtendedPlant { plant, filter, states, domain, .. } = extended;
     plant.check()?;
     check::positive("the sample time", period)?;
-    if *domain == (Domain::Sampled { period }) {
+    if *domain != Domain::Continuous {
+        let is_same = *domain == Domain::Sampled { period };
+        check::that(is_same, "the sample time", period, "that of the sampled plant")?;
         return Ok(plant.clone());
     }
     let (all, q) = plant.f_a.shape();

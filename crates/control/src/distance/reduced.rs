@@ -51,7 +51,13 @@ impl ReducedPencil {
         for i in 0..n {
             pencil[(i, self.inputs + i)] -= s;
         }
-        let t = triangular(pencil, self.inputs);
+        let mut t = triangular(pencil, self.inputs);
+        // A singular T is replaced by one that differs by rounding, whose inverse shows the left vector of zero.
+        for i in 0..n {
+            if t[(i, i)].norm() <= 0.0 {
+                t[(i, i)] = Complex::from(f64::EPSILON);
+            }
+        }
         let mut u =
             DVector::from_fn(n, |i, _| Complex::new(1.0, if i % 2 == 0 { 0.3 } else { -0.2 }));
         u.unscale_mut(u.norm());
@@ -124,5 +130,15 @@ mod tests {
                 assert!((1.0 - 1e-12..1.05).contains(&ratio), "{n} {m}: {ratio}");
             }
         }
+    }
+
+    #[test]
+    fn an_uncontrollable_state_that_nothing_moves_has_the_singular_value_zero() {
+        let mut a = DMatrix::from_fn(30, 30, |i, j| if i == j + 1 { 0.3 } else { 0.0 });
+        a.fill_row(29, 0.0);
+        a[(29, 29)] = 0.25;
+        let b = DMatrix::from_fn(30, 1, |i, _| f64::from(u8::from(i == 0)));
+        let (value, s) = ReducedPencil::new(&a, &b).at(Complex::from(0.25));
+        assert!(value < 1e-15 && (s - 0.25).norm() < 1e-15, "{value} {s}");
     }
 }

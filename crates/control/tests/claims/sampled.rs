@@ -64,6 +64,15 @@ fn a_ramp_moves_inside_of_the_interval_as_in_scipy() {
     assert!((joined(&sampled) - &expected).amax() < 1e-13 * expected.amax());
 }
 
+#[test]
+fn a_sampled_plant_is_refused_for_another_sample_time() {
+    let domain = Domain::Sampled { period: 0.1 };
+    let extended = ExtendedPlant { domain, ..ExtendedPlant::without_filter(plant()) };
+    assert_eq!(sample(&extended, 0.1).as_ref(), Ok(&extended.plant));
+    let refused = sample(&extended, 0.2);
+    assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
+}
+
 /// In closed form, for A = 0, w = 2, T = 1: `y_f` changes by 1 - e^-2 times y[k] - `y_f`[k].
 #[test]
 fn the_filter_runs_on_the_samples() {
