@@ -1,7 +1,8 @@
 //! Delays of the commands and of the measurements of a plant.
 //!
-//! A gain needs a plant with finitely many states, so that a delay is approximated; a frequency response does not. The
-//! loop is therefore designed with an approximation and compared with the delay itself, see [`Delays::exact`].
+//! The design of a gain needs a plant with finitely many states, and so an approximation of each delay; a frequency
+//! response does not. The loop is therefore designed with the approximation and compared with the delays themselves,
+//! see [`Delays::exact`].
 
 use crate::blocks::{ComplexMatrix, to_complex};
 use crate::check::as_number;
@@ -16,14 +17,15 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// A fraction of a sample below which a delay is a whole number of samples.
 const WHOLE: f64 = 1e-9;
 
-/// The Pade approximant of e^(-s) with numerator degree q - 1 and denominator degree q.
+/// Returns A and b of the Pade approximant of e^(-s) with numerator degree q - 1 and denominator degree q.
 ///
 /// ```text
 /// z' = A z + b u,  y = z_1,   A: q x q
 /// ```
 ///
-/// The approximant is strictly proper, so that a command that passes it does not jump, and has the delay's moments up to
-/// the order 2 q - 1. From the Legendre coefficients m of the last second of u,
+/// `order`: q. The delay is one unit of time; for a delay d divide A and b by d. The approximant is strictly proper,
+/// so that a command that passes it does not jump, and has the delay's moments up to the order 2 q - 1. From the
+/// Legendre coefficients m of the last second of u,
 ///
 /// ```text
 /// m_i' = (2 i + 1) ((-1)^i u - sum over j of g_ij m_j),  g_ij = 1 for i < j, (-1)^(i - j) otherwise,  y = sum of m_i
@@ -44,7 +46,7 @@ const WHOLE: f64 = 1e-9;
 /// ```
 #[must_use]
 pub fn pade(order: usize) -> (DMatrix<f64>, DVector<f64>) {
-    let sign = |even: usize| if even.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let sign = |exponent: usize| if exponent.is_multiple_of(2) { 1.0 } else { -1.0 };
     let scale = |i: usize| as_number(2 * i + 1);
     let g = |i: usize, j: usize| if i < j { 1.0 } else { sign(i - j) };
     let legendre = DMatrix::from_fn(order, order, |i, j| -scale(i) * g(i, j));
@@ -67,7 +69,7 @@ pub struct Delays {
     pub outputs: Vec<f64>,
 }
 
-/// A loop with its delays beside the same loop with their approximation.
+/// The result of [`Delays::exact`]: a loop with its delays beside the same loop with their approximation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ExactLoop {
@@ -75,7 +77,7 @@ pub struct ExactLoop {
     /// approximation `G_a`, the controller K, and S of the approximation. Below 1 the loop with the delays is stable,
     /// because that with the approximation is and no loop between the two has a pole on the stability limit.
     pub radius: f64,
-    /// Its frequency in rad/s.
+    /// The frequency of `radius` in rad/s.
     pub frequency: f64,
     /// The largest singular value of S over the frequencies, with the delays themselves: at the commands, at the
     /// measurements.
@@ -96,15 +98,15 @@ impl Delays {
         most(&self.inputs) + most(&self.outputs)
     }
 
-    /// Number of states that approximants of `order` add.
+    /// Number of states that the approximants of `order` add, one approximant for each delay above zero.
     #[must_use]
     pub fn states(&self, order: usize) -> usize {
         let delayed = self.inputs.iter().chain(&self.outputs).filter(|delay| **delay > 0.0);
         order * delayed.count()
     }
 
-    /// For each command, and each measurement, the first state of its delay, counted from the first one of all delays;
-    /// None without a delay.
+    /// For each command, and for each measurement, the first state of its delay, counted from the first state of all
+    /// delays; None without a delay.
     fn first_states(&self, order: usize) -> [Vec<Option<usize>>; 2] {
         let mut next = 0;
         let mut first = |delay: &f64| {
@@ -117,26 +119,37 @@ impl Delays {
         [inputs, self.outputs.iter().map(&mut first).collect()]
     }
 
-    /// The plant with its delays, each approximated by [`pade`] of `order`.
+    /// Checks the plant, and that each command and each measurement has a delay, finite and not below zero.
+    fn check(&self, plant: &StateSpace) -> Result<(), Error> {
+        plant.check()?;
+        check::length("the delays of the commands", &self.inputs, plant.b.ncols())?;
+        check::length("the delays of the measurements", &self.outputs, plant.c.nrows())?;
+        for &delay in self.inputs.iter().chain(&self.outputs) {
+            let holds = delay.is_finite() && delay >= 0.0;
+            check::that(holds, "a delay", delay, "finite and not below zero")?;
+        }
+        Ok(())
+    }
+
+    /// Builds the plant with its delays, each approximated by [`pade`] of `order`.
     ///
     /// ```text
     /// command:      z' = A_q / d z + b_q / d u,             z_1 takes the place of u
     /// measurement:  z' = A_q' / d z + e_1 (C x + D u),      y = b_q' / d z
     /// ```
     ///
-    /// `plant`: in continuous time, n states, m commands, p measurements. The states of the delays, in the order of the commands
-    /// and then of the measurements, follow those of the plant. Each entry of B, C and D of `plant` is one entry of the
-    /// result, see [`Delays::entry`].
+    /// `plant`: in continuous time, n states, m commands, p measurements; `order`: one or more. The states of the
+    /// delays, in the order of the commands and then of the measurements, follow those of the plant. Each entry of B,
+    /// C and D of `plant` is one entry of the result, see [`Delays::entry`].
     ///
     /// # Errors
     ///
-    /// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for a delay that is negative or not finite.
+    /// Same as [`StateSpace::check`]; [`Error::Shape`] unless each command and each measurement has a delay;
+    /// [`Error::OutOfRange`] for a delay that is negative or not finite, or for a bad `order`.
     pub fn approximated(&self, plant: &StateSpace, order: usize) -> Result<StateSpace, Error> {
-        plant.check()?;
-        for &delay in self.inputs.iter().chain(&self.outputs) {
-            let holds = delay.is_finite() && delay >= 0.0;
-            check::that(holds, "a delay", delay, "finite and not below zero")?;
-        }
+        self.check(plant)?;
+        let holds = order > 0 || !self.any();
+        check::that(holds, "the order of the approximation", as_number(order), "one or more")?;
         let (n, (p, m)) = (plant.a.nrows(), plant.d.shape());
         let all = n + self.states(order);
         let mut extended = StateSpace {
@@ -172,7 +185,7 @@ impl Delays {
         Ok(extended)
     }
 
-    /// Where [`Delays::approximated`] has an entry of a plant with n states.
+    /// The position, in the result of [`Delays::approximated`], of an entry of the plant, which has n states.
     #[must_use]
     pub fn entry(&self, n: usize, order: usize, entry: PlantEntry) -> PlantEntry {
         let PlantEntry { matrix, row, column } = entry;
@@ -195,21 +208,22 @@ impl Delays {
         }
     }
 
-    /// Of matrices A, B, C, D of the form of [`Delays::approximated`] the entries of the plant without delays: n states.
+    /// Extracts the entries of the plant without its delays, with n states, from matrices A, B, C, D of the form of
+    /// [`Delays::approximated`].
     #[must_use]
-    pub fn of_plant(&self, n: usize, order: usize, of: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
+    pub fn of_plant(&self, n: usize, order: usize, all: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
         let (p, m) = (self.outputs.len(), self.inputs.len());
         let part = |matrix: usize, rows: usize, columns: usize| {
             DMatrix::from_fn(rows, columns, |row, column| {
                 let PlantEntry { matrix, row, column } =
                     self.entry(n, order, PlantEntry { matrix, row, column });
-                of[matrix][(row, column)]
+                all[matrix][(row, column)]
             })
         };
         [part(0, n, n), part(1, n, m), part(2, p, n), part(3, p, m)]
     }
 
-    /// Compares a loop with the same loop with the delays themselves.
+    /// Compares a loop with an approximation of the delays with the same loop with the delays themselves.
     ///
     /// ```text
     /// continuous:            G_ij(j w) = (c_i (j w I - A)^-1 b_j + d_ij) e^(-j w d),   d = d_i + d_j
@@ -226,13 +240,16 @@ impl Delays {
     ///
     /// # Errors
     ///
-    /// Same as [`frequency_response`] and [`zero_order_hold`]; [`Error::Overflow`] for a loop with a pole at a frequency.
+    /// Same as [`Delays::approximated`], [`frequency_response`] and [`zero_order_hold`]; [`Error::Shape`] for a loop
+    /// with other signals than `plant`; [`Error::Overflow`] for a loop with a pole at a frequency.
     pub fn exact(
         &self,
         plant: &StateSpace,
         closed: &Loop,
         frequencies: &[f64],
     ) -> Result<ExactLoop, Error> {
+        self.check(plant)?;
+        check::shape("D", &plant.d, closed.plant().d.shape())?;
         let exact = self.responses(plant, closed.plant().domain, frequencies)?;
         let approximate = frequency_response(closed.plant(), frequencies)?;
         let controller = frequency_response(closed.controller(), frequencies)?;
@@ -255,7 +272,7 @@ impl Delays {
         Ok(result)
     }
 
-    /// G with the delays themselves at each of `frequencies`.
+    /// The response G, p x m, with the delays themselves at each of `frequencies`.
     fn responses(
         &self,
         plant: &StateSpace,
@@ -283,25 +300,26 @@ impl Delays {
     }
 }
 
-/// The samples of a path, and the whole number of samples, in s, by which they are late.
+/// Discretises the path from one command to one measurement; returns it without its lag, and its lag in s, a whole
+/// number of samples.
 fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpace, f64), Error> {
     check::positive("the sample time", period)?;
     let samples = (delay / period + WHOLE).floor();
-    // The time from a sample to the instant whose state the next one but `samples` measures.
-    let rest = period - (delay - samples * period).max(0.0);
+    // g of `Delays::exact`: sample n measures the state at the time g after sample n - k - 1, k = `samples`.
+    let g = period - (delay - samples * period).max(0.0);
     let (phi, gamma) = zero_order_hold(&path.a, &path.b, period)?;
-    let (advance, part) = zero_order_hold(&path.a, &path.b, rest)?;
+    let (phi_g, gamma_g) = zero_order_hold(&path.a, &path.b, g)?;
     let system = StateSpace {
         a: phi,
         b: gamma,
-        c: &path.c * advance,
-        d: &path.c * part + &path.d,
+        c: &path.c * phi_g,
+        d: &path.c * gamma_g + &path.d,
         domain: Domain::Sampled { period },
     };
     Ok((system, (samples + 1.0) * period))
 }
 
-/// (I - X Y)^-1.
+/// (I - X Y)^-1; [`Error::Overflow`] if it does not exist.
 fn sensitivity(x: &ComplexMatrix, y: &ComplexMatrix) -> Result<ComplexMatrix, Error> {
     let size = x.nrows();
     let difference = to_complex(&DMatrix::identity(size, size)) - x * y;

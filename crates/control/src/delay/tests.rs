@@ -198,3 +198,16 @@ fn a_long_sample_time_spoils_no_response() {
         }
     }
 }
+
+#[test]
+fn delays_that_do_not_fit_the_plant_are_refused() {
+    let plant = plant();
+    let refused = |inputs: &[f64], outputs: &[f64], order: usize| {
+        let delays = Delays { inputs: inputs.to_vec(), outputs: outputs.to_vec() };
+        delays.approximated(&plant, order).unwrap_err()
+    };
+    assert!(matches!(refused(&[0.1; 3], &[0.1; 2], 2), Error::Shape { .. }));
+    assert!(matches!(refused(&[0.1; 2], &[0.1], 2), Error::Shape { .. }));
+    assert!(matches!(refused(&[0.1; 2], &[0.0; 2], 0), Error::OutOfRange { .. }));
+    assert!(matches!(refused(&[-0.1; 2], &[0.0; 2], 2), Error::OutOfRange { .. }));
+}

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use crate::blocks::ComplexMatrix;
 use crate::check::as_number;
 use crate::response::frequency_response;
-use crate::{Error, StateSpace};
+use crate::{Error, StateSpace, check};
 
 /// Relative change of an entry in a difference quotient.
 const STEP: f64 = 1e-6;
@@ -13,7 +13,7 @@ const STEP: f64 = 1e-6;
 /// Where and in which units frequency responses are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseUnits {
-    /// In rad per unit of time.
+    /// The frequencies in rad per unit of time.
     pub frequencies: Vec<f64>,
     /// The size of each input.
     pub inputs: Vec<f64>,
@@ -31,18 +31,20 @@ pub struct ResponseUnits {
 /// d(G, H)^2 = sum over frequencies of |G - H|^2 / ((1 + |G|^2) (1 + |H|^2)),    | | the Frobenius norm,
 /// ```
 ///
-/// of responses in units of the signals, the estimate G has the variance (g - 1) / g times the sum of d(G, `G_i`)^2. Independent
-/// entries of A, B, C and D with relative deviation r give r^2 times the sum of the squared derivatives of d by the logarithm of
-/// each entry. Zeros and rows of C with a single 1 are exact. The result, 2 r, depends neither on units nor on the scales of
-/// the states. For one input and one output d is the chordal distance of the responses, which weighs the frequencies near a gain
-/// of one, where a feedback acts, most.
+/// of responses in units of the signals, the estimate G has the variance (g - 1) / g times the sum of d(G, `G_i`)^2.
+/// Independent entries of A, B, C and D with relative deviation r give r^2 times the sum of the squared derivatives
+/// of d by the logarithm of each entry. Zeros and rows of C with a single 1 are exact. The result, 2 r, depends
+/// neither on units nor on the scales of the states; it is not finite if no entry varies, and zero for fewer than two
+/// parts. For one input and one output d is the chordal distance of the responses, which weighs the frequencies near
+/// a gain of one, where a feedback acts, most.
 ///
 /// Source: B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), equation 3.6; G. Vinnicombe, Frequency
 /// domain uncertainty and the graph topology, IEEE Trans. Autom. Control 38 (1993).
 ///
 /// # Errors
 ///
-/// Those of [`frequency_response`] for `plant`, `estimate` and `parts`.
+/// Same as [`frequency_response`], for `plant`, `estimate` and `parts`; [`Error::Shape`] unless `units` has as many
+/// inputs and outputs as each of them.
 pub fn equivalent_tolerance(
     plant: &StateSpace,
     estimate: &StateSpace,
@@ -57,24 +59,24 @@ pub fn equivalent_tolerance(
     }
     let nominal = responses(plant, units)?;
     let mut sensitivity = 0.0;
-    for at in 0..4 {
-        for entry in varying(plant, at) {
+    for matrix in 0..4 {
+        for entry in varying(plant, matrix) {
             let mut changed = plant.clone();
             let StateSpace { a, b, c, d, .. } = &mut changed;
-            [a, b, c, d][at][entry] *= 1.0 + STEP;
+            [a, b, c, d][matrix][entry] *= 1.0 + STEP;
             sensitivity += distance_squared(&nominal, &responses(&changed, units)?) / (STEP * STEP);
         }
     }
     Ok(2.0 * (variance / sensitivity).sqrt())
 }
 
-/// The positions of the entries of a matrix, A, B, C or D, that vary.
-fn varying(model: &StateSpace, at: usize) -> Vec<(usize, usize)> {
-    let matrix = [&model.a, &model.b, &model.c, &model.d][at];
+/// The positions of the entries that vary in A, B, C or D, the matrix with this number from 0.
+fn varying(model: &StateSpace, number: usize) -> Vec<(usize, usize)> {
+    let matrix = [&model.a, &model.b, &model.c, &model.d][number];
     let is_zero = |value: f64| value.abs() <= 0.0;
     let is_state = |row: usize| {
-        let others = matrix.row(row).iter().filter(|entry| !is_zero(**entry)).count();
-        at == 2 && others == 1 && is_zero(matrix.row(row).sum() - 1.0)
+        let entries = matrix.row(row).iter().filter(|entry| !is_zero(**entry)).count();
+        number == 2 && entries == 1 && is_zero(matrix.row(row).sum() - 1.0)
     };
     let entries = (0..matrix.nrows()).flat_map(|row| (0..matrix.ncols()).map(move |c| (row, c)));
     entries.filter(|&(row, column)| !is_zero(matrix[(row, column)]) && !is_state(row)).collect()
@@ -83,6 +85,8 @@ fn varying(model: &StateSpace, at: usize) -> Vec<(usize, usize)> {
 /// The frequency responses in units of the signals.
 fn responses(system: &StateSpace, units: &ResponseUnits) -> Result<Vec<ComplexMatrix>, Error> {
     let points = frequency_response(system, &units.frequencies)?;
+    check::length("the units of the inputs", &units.inputs, system.b.ncols())?;
+    check::length("the units of the outputs", &units.outputs, system.c.nrows())?;
     let scaled = |gain: ComplexMatrix| {
         DMatrix::from_fn(gain.nrows(), gain.ncols(), |i, j| {
             gain[(i, j)] * (units.inputs[j] / units.outputs[i])
@@ -91,9 +95,10 @@ fn responses(system: &StateSpace, units: &ResponseUnits) -> Result<Vec<ComplexMa
     Ok(points.into_iter().map(|point| scaled(point.gain)).collect())
 }
 
+/// d(G, H)^2 of [`equivalent_tolerance`].
 fn distance_squared(one: &[ComplexMatrix], other: &[ComplexMatrix]) -> f64 {
-    let at_one = |(g, h): (&ComplexMatrix, &ComplexMatrix)| {
+    let at_frequency = |(g, h): (&ComplexMatrix, &ComplexMatrix)| {
         (g - h).norm_squared() / ((1.0 + g.norm_squared()) * (1.0 + h.norm_squared()))
     };
-    one.iter().zip(other).map(at_one).sum()
+    one.iter().zip(other).map(at_frequency).sum()
 }

@@ -231,6 +231,14 @@ fn records_without_a_plant_are_refused_with_the_reason() {
 }
 
 #[test]
+fn units_that_do_not_fit_the_plant_are_refused() {
+    let (exact, one) = (plant(), vec![1.0]);
+    let units = ResponseUnits { frequencies: one.clone(), inputs: one, outputs: vec![1.0; 2] };
+    let refused = equivalent_tolerance(&exact, &exact, &[], &units);
+    assert!(matches!(refused, Err(Error::Shape { expected: (2, 1), .. })), "{refused:?}");
+}
+
+#[test]
 fn a_sine_excites_two_directions() {
     let inputs = DMatrix::from_iterator(1, 400, (0..400).map(|k| (0.3 * f64::from(k)).sin()));
     let record = Record { outputs: inputs.clone(), inputs };
