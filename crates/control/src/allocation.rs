@@ -20,7 +20,7 @@ pub struct Actuators<'a> {
 }
 
 impl Actuators<'_> {
-    /// `B_r` D.
+    /// Checks the authority; returns `B_r` D of [`allocate`].
     fn remaining(&self) -> Result<DMatrix<f64>, Error> {
         let Self { b, gone, authority } = *self;
         check::column("authority", authority, b.ncols())?;
@@ -58,7 +58,7 @@ pub struct Allocation {
 ///
 /// # Example
 ///
-/// Two of three forces that act on a mass take over what the third one did, the stronger one more:
+/// Two of three forces that act on a mass take over what the first one did, the stronger one more:
 ///
 /// ```
 /// use control::allocation::{Actuators, allocate};
@@ -84,11 +84,11 @@ pub fn allocate(actuators: &Actuators<'_>) -> Result<Allocation, Error> {
     let rank = svd.rank(TOLERANCE);
     let mut matrix = svd.least_squares(b, rank);
     matrix += svd.least_squares(&(b - &scaled * &matrix), rank);
-    let left = norm_2(&(&scaled * &matrix - b))?;
+    let residual = norm_2(&(&scaled * &matrix - b))?;
     let size = norm_2(b)?;
     Ok(Allocation {
         matrix: DMatrix::from_fn(b.ncols(), b.ncols(), |i, j| authority[i] * matrix[(i, j)]),
-        residual: if size > 0.0 { left / size } else { 0.0 },
+        residual: if size > 0.0 { residual / size } else { 0.0 },
     })
 }
 
@@ -114,7 +114,7 @@ pub struct Equilibrium {
 ///
 /// `a`: n x n; `outputs`: C, r x n, rows in units in which they compare; `disturbance`: w, n entries, for
 /// example a column of B times the command at which an actuator is stuck. `B_r` has zero columns for the
-/// inputs that are gone. An equilibrium exists if [A, `B_r`] has rank n, which holds for a
+/// inputs that are gone. An equilibrium exists for every w if [A, `B_r`] has rank n, which holds for a
 /// stabilisable (A, `B_r`). C x = 0 is reached for every w with as many independent remaining inputs as
 /// outputs, without an invariant zero at 0.
 ///
@@ -124,7 +124,7 @@ pub struct Equilibrium {
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bad
-/// `authority`; [`Error::NotControllable`] if no equilibrium exists; [`Error::NotConverged`].
+/// `authority`; [`Error::NotControllable`] if the rank of [A, `B_r`] is below n; [`Error::NotConverged`].
 pub fn equilibrium(
     a: &DMatrix<f64>,
     actuators: &Actuators<'_>,
@@ -136,26 +136,27 @@ pub fn equilibrium(
     check::shape("outputs", outputs, (outputs.nrows(), n))?;
     let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
     check::shape("disturbance", &w, (n, 1))?;
-    let all = beside(a, &actuators.remaining()?);
-    let svd = Svd::new(&all)?;
+    let whole = beside(a, &actuators.remaining()?);
+    let svd = Svd::new(&whole)?;
     let rank = svd.rank(TOLERANCE);
     if rank < n {
         return Err(Error::NotControllable { rank, n });
     }
-    let mut rest = svd.least_squares(&-&w, rank);
-    rest -= svd.least_squares(&(&all * &rest + &w), rank);
+    // x and, in units of `authority`, u.
+    let mut solution = svd.least_squares(&-&w, rank);
+    solution -= svd.least_squares(&(&whole * &solution + &w), rank);
     let free = svd.right.columns(rank, n + m - rank);
     let free_outputs = outputs * free.rows(0, n);
     if !free_outputs.is_empty() {
         let svd = Svd::new(&free_outputs)?;
-        let correction = svd.least_squares(&-(outputs * rest.rows(0, n)), svd.rank(TOLERANCE));
-        rest += free * correction;
+        let correction = svd.least_squares(&-(outputs * solution.rows(0, n)), svd.rank(TOLERANCE));
+        solution += free * correction;
     }
-    let x: DVector<f64> = rest.column(0).rows(0, n).into();
+    let x: DVector<f64> = solution.column(0).rows(0, n).into();
     Ok(Equilibrium {
         left: (outputs * &x).norm(),
         u: DVector::from_fn(m, |j, _| {
-            if gone.contains(&j) { 0.0 } else { authority[j] * rest[(n + j, 0)] }
+            if gone.contains(&j) { 0.0 } else { authority[j] * solution[(n + j, 0)] }
         }),
         x,
     })

@@ -47,8 +47,9 @@ pub struct AsoDesign {
     /// The gains.
     pub gains: Gains,
     /// Frobenius norm of B `K_f` + `F_a` relative to the norm of `F_a`: the part of the effect of
-    /// the faults that the compensation cannot cancel. Zero when the columns of `F_a` are in the
-    /// range of B. States of a measurement filter do not count.
+    /// the faults that the compensation does not cancel. Zero up to rounding for the default `K_f`
+    /// when the columns of `F_a` are in the range of B. States of a measurement filter do not count;
+    /// if no fault acts on the other states, it is the norm of B `K_f`.
     pub cancellation_residual: f64,
     /// Quality of the assignment for A + B `K_x`.
     pub controller: Quality,
@@ -128,14 +129,15 @@ impl GainCandidates<'_> {
     }
 }
 
-/// The pairs of the first candidates, and those with at least one of the second ones.
+/// Returns all pairs of an item of `one` and an item of `other`: first those of both first lists, then
+/// those with at least one item of a second list.
 #[must_use]
 pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2] {
-    let of = |i: usize, j: usize| {
+    let product = |i: usize, j: usize| {
         let all = one[i].iter().flat_map(move |x| other[j].iter().map(move |y| (*x, *y)));
         all.collect::<Vec<_>>()
     };
-    [of(0, 0), [of(0, 1), of(1, 0), of(1, 1)].concat()]
+    [product(0, 0), [product(0, 1), product(1, 0), product(1, 1)].concat()]
 }
 
 /// Designs the controller: assigns the eigenvalues of A + B `K_x` and of `A_0` - L `C_0`.
@@ -172,8 +174,8 @@ pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2
 ///
 /// # Errors
 ///
-/// Same as [`alternatives`] and [`FaultyPlant::check_observer_exists`]; [`Error::Shape`],
-/// [`Error::NotFinite`] for a bad `k_f`.
+/// Same as [`alternatives`], [`FaultyPlant::check_observer_exists`] and
+/// [`FaultyPlant::compensation_gain`]; [`Error::Shape`], [`Error::NotFinite`] for a bad `k_f`.
 pub fn design(
     plant: &FaultyPlant,
     controller_poles: &[Complex<f64>],
@@ -225,10 +227,10 @@ impl ExtendedPlant {
     }
 }
 
-/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; zero if no
-/// fault acts there.
+/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; the norm itself if
+/// no fault acts there.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
-    let left = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();
-    if size > 0.0 { left / size } else { left }
+    let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();
+    if size > 0.0 { residual / size } else { residual }
 }

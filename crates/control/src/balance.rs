@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// Largest number of sweeps over the states.
 const SWEEPS: usize = 100;
 /// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
@@ -19,17 +20,17 @@ pub(crate) struct Balance {
 
 impl Balance {
     pub(crate) fn new(a: &DMatrix<f64>) -> Self {
-        let nothing = || DVector::zeros(a.nrows());
-        Self::with_signals(a, nothing(), nothing())
+        let zeros = || DVector::zeros(a.nrows());
+        Self::with_signals(a, zeros(), zeros())
     }
 
-    /// Leaves A as it is.
+    /// The balance that does not change A: S = I.
     pub(crate) fn none(a: &DMatrix<f64>) -> Self {
         Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) }
     }
 
-    /// Balances [A, B; C, 0]. Of a system whose states do not all act on each other, A alone would be scaled without end,
-    /// and B and C with it.
+    /// Balances A as a part of [A, B; C, 0]. If the states do not all act on each other, A alone would be scaled up
+    /// to the limit of sweeps, and B and C with it.
     ///
     /// Source: D. S. Watkins, A case where balancing is harmful, Electronic Trans. Numerical Analysis 23 (2006).
     pub(crate) fn of_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
@@ -38,20 +39,20 @@ impl Balance {
         Self::with_signals(a, entering, leaving)
     }
 
-    /// `entering`, `leaving`: what belongs to the row and to the column of each state besides A.
+    /// Balances A; `entering`, `leaving`: the 1-norms of each state's row of B and of its column of C.
     fn with_signals(
         a: &DMatrix<f64>,
         mut entering: DVector<f64>,
         mut leaving: DVector<f64>,
     ) -> Self {
         let mut balance = Self::none(a);
-        // Its columns are the rows of the matrix, so that their sums read neighbours in memory.
+        // The rows of the matrix as columns, whose entries are neighbours in memory.
         let mut transposed = a.transpose();
         for _ in 0..SWEEPS {
             let mut changed = false;
             for state in 0..a.nrows() {
-                let beside = [leaving[state], entering[state]];
-                if let Some(factor) = balance.level(&mut transposed, state, beside) {
+                let signals = [leaving[state], entering[state]];
+                if let Some(factor) = balance.level(&mut transposed, state, signals) {
                     leaving[state] *= factor;
                     entering[state] /= factor;
                     changed = true;
@@ -64,17 +65,18 @@ impl Balance {
         balance
     }
 
-    /// Scales a state; returns its factor. `beside`: what belongs to its column and to its row.
+    /// Scales a state and returns the factor; None if that reduces the norms by less than 5 %. `signals`: the norms
+    /// of its column of C and of its row of B.
     fn level(
         &mut self,
         transposed: &mut DMatrix<f64>,
         state: usize,
-        beside: [f64; 2],
+        signals: [f64; 2],
     ) -> Option<f64> {
         let diagonal = self.matrix[(state, state)].abs();
         let sum =
             |m: &DMatrix<f64>| m.column(state).iter().map(|x| x.abs()).sum::<f64>() - diagonal;
-        let [column, row] = [sum(&self.matrix) + beside[0], sum(transposed) + beside[1]];
+        let [column, row] = [sum(&self.matrix) + signals[0], sum(transposed) + signals[1]];
         let factor = power_of_two((row / column).sqrt());
         if !factor.is_normal() || column * factor + row / factor >= WORTHWHILE * (column + row) {
             return None;

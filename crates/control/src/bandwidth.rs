@@ -18,24 +18,28 @@ const STRIDE: f64 = 100.0;
 const STRIDES: usize = 6;
 /// Largest distance of the loop gain from one.
 const ACCURACY: f64 = 1e-6;
-/// A loop gain that falls less than by this factor in a stride is that of unstable modes.
+/// A loop gain above one of which a stride leaves more than this part is held there by unstable modes.
 const SATURATED: f64 = 0.7;
+/// Largest number of steps of the regula falsi.
 const STEPS: usize = 40;
-/// Part of the largest energy that an entry has at least.
-const LEAST: f64 = 1e-12;
-/// A bandwidth that is the frequency of an undamped mode is raised by this factor.
-const BESIDE: f64 = 1.01;
+/// The smallest energy, relative to the largest.
+const FLOOR: f64 = 1e-12;
+/// A bandwidth without a response, at the frequency of an undamped mode, is raised by this factor.
+const DETUNING: f64 = 1.01;
 
 /// Units of inputs and outputs: each output is measured by the strongest effect of an input on it, then each input by its
 /// strongest effect on an output.
 ///
 /// ```text
-/// h[j, i] = integral of e^(-2 s t) g[j, i](t)^2 over t,    s = rate + max(0, largest real part)
+/// h[j, i] = integral of e^(-2 s t) g[j, i](t)^2 over t,    s = rate + max(0, largest real part)       continuous
+/// h[j, i] = sum of a^(2 k) g[j, i][k]^2 over k from 0 on,  a = e^(-rate T) / max(1, spectral radius)  sampled
 /// outputs[j]^2 = 1 / max over i of h[j, i],    inputs[i]^2 = 1 / max over j of outputs[j]^2 h[j, i]
 /// ```
 ///
-/// g is the impulse response. The result does not depend on the units of states and outputs; on those of inputs only where
-/// outputs are moved by different inputs.
+/// g is the impulse response, without D: C e^(A t) B or C A^k B. Entries of h below 1e-12 of the largest are raised
+/// to it; if all are zero, all units are 1. The physical sizes of the units do not depend on the units of states and
+/// outputs; nor on those of inputs, up to a common factor, if the same input has the strongest effect on every
+/// output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalUnits {
     /// Size of a unit of each input.
@@ -62,7 +66,7 @@ impl NaturalUnits {
     }
 }
 
-/// h of [`NaturalUnits`], with a floor.
+/// Computes h of [`NaturalUnits`], p x m, from a Lyapunov equation for each input.
 fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
     let StateSpace { a, b, c, domain, .. } = system;
     let excess = instability(a, *domain)?.max(0.0);
@@ -73,16 +77,16 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
         }
         Domain::Sampled { period } => (&DISCRETE, a * ((-rate * period).exp() / (1.0 + excess))),
     };
-    let mut all = DMatrix::zeros(c.nrows(), b.ncols());
-    for (mut column, input) in all.column_iter_mut().zip(b.column_iter()) {
-        let reached = equation.solve(&damped.transpose(), &(input * input.transpose()))?;
+    let mut h = DMatrix::zeros(c.nrows(), b.ncols());
+    for (mut column, input) in h.column_iter_mut().zip(b.column_iter()) {
+        let gramian = equation.solve(&damped.transpose(), &(input * input.transpose()))?;
         for (entry, output) in column.iter_mut().zip(c.row_iter()) {
-            *entry = (output * &reached * output.transpose())[(0, 0)].max(0.0);
+            *entry = (output * &gramian * output.transpose())[(0, 0)].max(0.0);
         }
     }
-    let least = LEAST * all.amax();
-    let all = check::in_range("the energy of the outputs", all)?;
-    Ok(if least > 0.0 { all.map(|entry| entry.max(least)) } else { all.map(|_| 1.0) })
+    let least = FLOOR * h.amax();
+    let h = check::in_range("the energy of the outputs", h)?;
+    Ok(if least > 0.0 { h.map(|entry| entry.max(least)) } else { h.map(|_| 1.0) })
 }
 
 /// A regulator or a filter with its loop gain at the bandwidth.
@@ -90,25 +94,26 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
 pub struct ByBandwidth<T> {
     /// Gain, solution of the Riccati equation, eigenvalues.
     pub result: T,
-    /// The largest singular value of the loop at the bandwidth: one within 1e-6; above, if unstable modes need a larger
-    /// bandwidth; below, if no weight reaches it.
+    /// The largest singular value of the loop at the bandwidth: one within 1e-6; above it, if unstable modes need a
+    /// larger bandwidth; below it, if no weight of the search reaches it.
     pub loop_gain: f64,
-    /// The weight by which this is so: r of [`regulator`], v of [`filter`].
+    /// The weight with this loop gain: r of [`regulator`], v of [`filter`].
     pub weight: f64,
 }
 
-/// The regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u, where r is such that the largest singular value of
-/// K (s I - A)^-1 B, in units, is one at s = j `bandwidth`.
+/// Computes the regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u, where r is such that the largest
+/// singular value of K (s I - A)^-1 B, in units of the inputs, is one at s = j `bandwidth`; at z = e^(j `bandwidth`
+/// h) in sampled time.
 ///
-/// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin of 1/2 to
-/// infinity and a phase margin of 60 degrees in continuous time, whatever the weights (M. G. Safonov, M. Athans, IEEE
-/// Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale, some 10 equations of
+/// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin
+/// of 1/2 to infinity and a phase margin of 60 degrees in continuous time, for all weights (M. G. Safonov, M. Athans,
+/// IEEE Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale, some 10 equations of
 /// [`lqr`].
 ///
 /// # Errors
 ///
-/// Same as [`lqr`] and [`frequency_response`]; [`Error::OutOfRange`] for a bandwidth that is not positive, or in sampled time
-/// not below pi / h.
+/// Same as [`lqr`] and [`frequency_response`]; [`Error::Shape`] and [`Error::NotFinite`] for `units`;
+/// [`Error::OutOfRange`] for a bandwidth that is not positive, or in sampled time not below pi / h.
 pub fn regulator(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -127,12 +132,13 @@ pub fn regulator(
     Ok(ByBandwidth { result, loop_gain, weight })
 }
 
-/// The Kalman filter for the process noise W and the measurement noise v diag(`units`)^-2, where v is such that the largest
-/// singular value of C (s I - A)^-1 L, in units, is one at s = j `bandwidth`.
+/// Computes the Kalman filter for the process noise W and the measurement noise v diag(`units`)^-2, where v is such
+/// that the largest singular value of C (s I - A)^-1 L, in units of the outputs, is one at s = j `bandwidth`.
 ///
-/// The dual of [`regulator`]. `units`: inverse size of a unit of each output. With W = N N', the loop of regulator and filter
-/// tends to that of the regulator when the bandwidth grows, if N is the input matrix and the plant has no zero in the right half
-/// plane (J. C. Doyle, G. Stein, IEEE Trans. Autom. Control 26 (1981)).
+/// The dual of [`regulator`]. `a`: n x n; `c`: p x n; `w`: n x n; `units`: inverse size of a unit of each output.
+/// With W = N N', the loop of regulator and filter tends to that of the regulator when the bandwidth grows, if N is
+/// the input matrix and the plant has no zero in the right half plane (J. C. Doyle, G. Stein, IEEE Trans. Autom.
+/// Control 26 (1981)).
 ///
 /// # Errors
 ///
@@ -154,7 +160,7 @@ pub fn filter(
     Ok(ByBandwidth { result: kalman(a, c, w, &v, domain)?, loop_gain, weight })
 }
 
-/// The weight r of R = r I and the loop gain that it gives.
+/// Returns the weight r of R = r I and the loop gain that it gives.
 fn weight(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -174,7 +180,7 @@ fn weight(
         let d = DMatrix::zeros(c.nrows(), m);
         let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d, domain };
         frequency_response(&system, &[bandwidth])
-            .or_else(|_| frequency_response(&system, &[BESIDE * bandwidth]))
+            .or_else(|_| frequency_response(&system, &[DETUNING * bandwidth]))
             .map(|mut points| points.remove(0))
     };
     let loop_gain = |logarithm: f64| -> Result<f64, Error> {
@@ -189,7 +195,8 @@ fn weight(
     enclosed(start, loop_gain)
 }
 
-/// Returns e^x and f(x) for f(x) = 1, where f falls; beyond the last stride, the nearest to it.
+/// Searches from `start` for an x with f(x) = 1, where f falls; returns e^x and f(x). If no stride passes such an x,
+/// these are the values where the strides end.
 fn enclosed(start: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<(f64, f64), Error> {
     let (mut x, mut value) = (start, f(start)?);
     let direction = if value > 1.0 { 1.0 } else { -1.0 };

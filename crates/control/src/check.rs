@@ -13,7 +13,7 @@ pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error
     Err(Error::NotFinite { matrix, row, col, value: m[at] })
 }
 
-/// Checks that a matrix is finite and has the expected shape.
+/// Checks that a matrix has the expected shape, is not empty and is finite.
 pub(crate) fn shape(
     matrix: &'static str,
     m: &DMatrix<f64>,
@@ -25,7 +25,7 @@ pub(crate) fn shape(
     finite(matrix, m)
 }
 
-/// Checks that a matrix is finite and square; returns its order.
+/// Checks that a matrix is square, not empty and finite; returns its order.
 pub(crate) fn square(matrix: &'static str, m: &DMatrix<f64>) -> Result<usize, Error> {
     shape(matrix, m, (m.nrows(), m.nrows()))?;
     Ok(m.nrows())
@@ -45,7 +45,7 @@ pub(crate) fn with_outputs(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<usize, 
     Ok(n)
 }
 
-/// Checks that a column is finite and has this many rows.
+/// Checks that a column has this many rows, is not empty and is finite.
 pub(crate) fn column(name: &'static str, entries: &[f64], rows: usize) -> Result<(), Error> {
     shape(name, &DMatrix::from_column_slice(entries.len(), 1, entries), (rows, 1))
 }
@@ -78,7 +78,7 @@ pub(crate) fn in_range(what: &'static str, m: DMatrix<f64>) -> Result<DMatrix<f6
     if m.iter().all(|value| value.is_finite()) { Ok(m) } else { Err(Error::Overflow { what }) }
 }
 
-/// A number of rows, inputs or samples as a float.
+/// Converts a number of rows, inputs or samples.
 #[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
 pub(crate) fn as_number(count: usize) -> f64 {
     count as f64

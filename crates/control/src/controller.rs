@@ -27,8 +27,8 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// with the corrected z, and the same u enters the model of the plant in A and B.
-/// y is what the observer receives: filtered measurements where there is a filter. Integral action is left
-/// out; [`complete_controller`] has both.
+/// y is what the observer receives: the filtered measurements, if they are filtered. Neither the filter nor
+/// integral action is part of this system; [`complete_controller`] has both.
 ///
 /// # Errors
 ///
@@ -46,10 +46,10 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     let m_c = &m * &output;
     // What the direct term adds to D, and with it to B.
     let direct = gains.p_f.as_ref().map(|p_f| &gains.k_f * p_f);
-    let enters = direct.as_ref().map(|d| (&plant.b * d).resize_vertically(n + q, 0.0));
-    if let (Some(direct), Some(enters)) = (&direct, &enters) {
+    let direct_b = direct.as_ref().map(|d| (&plant.b * d).resize_vertically(n + q, 0.0));
+    if let (Some(direct), Some(direct_b)) = (&direct, &direct_b) {
         k -= direct * &output;
-        g -= enters * &output;
+        g -= direct_b * &output;
     }
     let plus = |m: DMatrix<f64>, part: Option<DMatrix<f64>>| match part {
         Some(part) => m + part,
@@ -58,17 +58,17 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     Ok(match gains.estimator {
         Estimator::Prediction => {
             let d = direct.unwrap_or_else(|| DMatrix::zeros(k.nrows(), m.ncols()));
-            StateSpace { a: g - m_c, b: plus(m, enters), c: k, d, domain }
+            StateSpace { a: g - m_c, b: plus(m, direct_b), c: k, d, domain }
         }
         Estimator::Current => {
             let w = DMatrix::identity(n + q, n + q) - m_c;
-            let (b, d) = (plus(&g * &m, enters), plus(&k * m, direct));
+            let (b, d) = (plus(&g * &m, direct_b), plus(&k * m, direct));
             StateSpace { a: g * &w, b, c: k * w, d, domain }
         }
     })
 }
 
-/// The estimates of the faults as outputs of [`controller`]: its A and B, and C and D of `f_hat`.
+/// The system from y to the estimates of the faults: A and B of [`controller`], and C and D of `f_hat`.
 ///
 /// ```text
 /// f_hat = ([0, I] - P_f [C_p, 0]) z + P_f y
@@ -119,12 +119,12 @@ pub struct CompleteController {
 /// x_i' = -H y + H F_s f_hat                       sampled: x_i[k+1] = x_i[k] + T (-H y[k] + H F_s f_hat)
 /// ```
 ///
-/// with A, B, C, D of [`controller`]; `filter`: the diagonal of W, p entries; without it `y_f` = y. `x_i'`
-/// contains y itself, not `y_f`.
+/// with A, B, C, D of [`controller`]; `filter`: the diagonal of W, p entries, in sampled time the gains of
+/// [`crate::sampled::filter`]; without it `y_f` = y. `x_i'` contains y itself, not `y_f`.
 ///
 /// # Errors
 ///
-/// Same as [`controller`]; [`Error::Shape`] when the filter does not fit.
+/// Same as [`controller`]; [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad filter.
 pub fn complete_controller(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -136,13 +136,13 @@ pub fn complete_controller(
     let mut estimates = filtered(&fault_estimates(plant, gains, domain)?, filter)?;
     if let Some(integral) = &gains.integral {
         let b = plant.b.clone().resize_vertically(system.a.nrows(), 0.0);
-        let first = commands.a.nrows() - system.a.nrows();
-        let into = b.insert_rows(0, first, 0.0) * &integral.gain;
+        let filters = commands.a.nrows() - system.a.nrows();
+        let integral_input = b.insert_rows(0, filters, 0.0) * &integral.gain;
         let (step, last) = integration(domain);
         let (k, t) = (commands.a.nrows(), gains.integrals());
         let identity = DMatrix::identity(t, t) * last;
-        let below = &integral.faults * &estimates.c * step;
-        let a = block_2x2([&commands.a, &into], [&below, &identity]);
+        let from_faults = &integral.faults * &estimates.c * step;
+        let a = block_2x2([&commands.a, &integral_input], [&from_faults, &identity]);
         let integrand = (&integral.faults * &estimates.d - &integral.h) * step;
         let b = stacked(&commands.b, &integrand);
         commands.c = beside(&commands.c, &integral.gain);
@@ -171,21 +171,22 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
     Ok(StateSpace { a, b, c, d, domain: controller.domain })
 }
 
-/// The controller of a plant with y = C x + D u, from `controller`, which is for the plant without D: it
-/// gets y - D u, u being its own commands.
+/// Converts `controller`, which is for the plant without D, into the controller of the plant with
+/// y = C x + D u: its input is y - D u, with its commands u.
 ///
 /// ```text
 /// continuous:  z' = (A - B D C) z + B y,            u = C z
 /// sampled:     z[k+1] = A z[k] + B (y[k] - D v[k]),  u[k] = C z[k],  v[k+1] = u[k]
 /// ```
 ///
-/// A sample `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is then
-/// [z; v]. `controller`: k states, p inputs, and C for any output beside u; its direct term is zero, as with a
-/// measurement filter; `feedthrough`: D, p x m; `commands`: C of u, m x k.
+/// In sampled time, `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is
+/// [z; v]. `controller`: k states, p inputs and any outputs, which the result has too; its direct term is zero, as
+/// with a measurement filter; `feedthrough`: D of the plant, p x m; `commands`: C of u, m x k.
 ///
 /// # Errors
 ///
-/// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a direct term of `controller`.
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for A or B of `controller` or for `commands`;
+/// [`Error::OutOfRange`] for a direct term of `controller`.
 pub fn with_feedthrough(
     controller: &StateSpace,
     commands: &DMatrix<f64>,
@@ -200,12 +201,12 @@ pub fn with_feedthrough(
         let name = "the controller's D";
         return Err(Error::OutOfRange { name, value: direct, rule: "zero" });
     }
-    let entered = &controller.b * feedthrough;
+    let b_d = &controller.b * feedthrough;
     if controller.domain == Domain::Continuous {
-        return Ok(StateSpace { a: &controller.a - entered * commands, ..controller.clone() });
+        return Ok(StateSpace { a: &controller.a - b_d * commands, ..controller.clone() });
     }
     Ok(StateSpace {
-        a: block_2x2([&controller.a, &-entered], [commands, &DMatrix::zeros(m, m)]),
+        a: block_2x2([&controller.a, &-b_d], [commands, &DMatrix::zeros(m, m)]),
         b: controller.b.clone().resize_vertically(k + m, 0.0),
         c: controller.c.clone().resize_horizontally(k + m, 0.0),
         ..controller.clone()

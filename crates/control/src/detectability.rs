@@ -80,17 +80,18 @@ impl Detectability {
 ///     DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
 ///     DMatrix::from_row_slice(2, 1, &[1.0, 0.0]),
 /// );
-/// let found = detectability(&plant, Domain::Continuous)?;
-/// assert!(found.visibility[0][0].visible);
-/// assert_eq!(found.hidden[0].faults(), [0]);
-/// assert_eq!(found.hidden[0].states(), [1]);
+/// let result = detectability(&plant, Domain::Continuous)?;
+/// assert!(result.visibility[0][0].visible);
+/// assert_eq!(result.hidden[0].faults(), [0]);
+/// assert_eq!(result.hidden[0].states(), [1]);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix of the plant;
-/// [`Error::NotConverged`] when an inner iteration does not end; [`Error::Overflow`].
+/// [`Error::OutOfRange`] for a bad period, if (A, C) has unobservable modes; [`Error::NotConverged`] when an
+/// inner iteration does not end; [`Error::Overflow`].
 pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectability, Error> {
     plant.check()?;
     let with_stability = |mode: Mode| {
@@ -126,7 +127,7 @@ impl FaultyPlant {
     /// # Errors
     ///
     /// [`Error::NotObservable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the
-    /// condition that fails; same as [`FaultyPlant::check`] otherwise.
+    /// condition that fails; same as [`FaultyPlant::check`] otherwise; [`Error::NotConverged`].
     pub fn check_observer_exists(&self) -> Result<(), Error> {
         self.check()?;
         require_observable(&self.a, &self.c)?;
@@ -135,15 +136,16 @@ impl FaultyPlant {
     }
 
     /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
-    /// Its fixed eigenvalues are those of the unobservable modes of (A, C), which are returned.
+    /// Returns the unobservable modes of (`A_0`, `C_0`), whose eigenvalues no observer moves.
     ///
-    /// The conditions of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place of
-    /// observable.
+    /// The conditions are those of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place
+    /// of observable.
     ///
     /// # Errors
     ///
     /// [`Error::NotDetectable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the condition
-    /// that fails; same as [`FaultyPlant::check`] otherwise.
+    /// that fails; same as [`FaultyPlant::check`] otherwise; [`Error::OutOfRange`] for a bad period, if
+    /// there are unobservable modes; [`Error::NotConverged`].
     pub fn check_detectable(&self, domain: Domain) -> Result<Vec<Mode>, Error> {
         self.check()?;
         require_shown(self)?;

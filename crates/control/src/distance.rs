@@ -20,6 +20,7 @@ const EVALUATIONS: usize = 1000;
 const ROUNDING: f64 = 1e-14;
 /// The search ends when the lower bound reaches this fraction of the upper bound.
 const CLOSE: f64 = 0.9;
+/// Largest number of steps of a descent.
 const DESCENT_STEPS: usize = 30;
 /// Number of states up to which the plane is searched for a lower bound.
 const LARGEST_SEARCH: usize = 24;
@@ -31,12 +32,13 @@ const WORTHWHILE: f64 = 1e-3;
 #[non_exhaustive]
 pub struct Distance {
     /// Lower bound, proven up to rounding by a search of the whole complex plane. Zero if the
-    /// search ended at its limit of evaluations before a larger bound was proven.
+    /// search ended at its limit of evaluations before a larger bound was proven, if the upper bound
+    /// is within rounding, and with more than 24 states, for which the plane is not searched.
     pub lower: f64,
     /// Upper bound, attained at `at`.
     pub upper: f64,
-    /// The point of the complex plane, in the unit of A: the eigenvalue that becomes uncontrollable
-    /// or unobservable first.
+    /// The point of the complex plane, in the unit of A and not below the real axis: the eigenvalue
+    /// that becomes uncontrollable or unobservable first.
     pub at: Complex<f64>,
 }
 
@@ -51,16 +53,15 @@ pub struct Distance {
 /// and time do not matter. The distance is the 2-norm of the smallest complex change of the scaled
 /// [A, B] that makes the pair uncontrollable: 1 is large, 1e-12 is within rounding.
 ///
-/// The upper bound is the smallest value found by descents s := u* A u, u the left singular vector,
-/// which start at each eigenvalue of A and at each better point of the search. The lower bound is a
-/// branch and bound: the singular value changes by at most the change of s, so that its value at
-/// the centre of a square less half the diagonal bounds it in the square; for |s| > 1 + upper it is
-/// larger than `upper`. The square with the lowest bound is divided until the bounds agree to 10 %,
-/// with at most 1000 evaluations of about 100 (n + m) n^2 multiplications each. For a small
-/// distance the lower bound may remain far below the upper one; below 1e-14 it is zero. With more
-/// than 24 states the lower bound is zero, and the singular values of the descents are computed by
-/// inverse iteration in coordinates in which [B, A] is zero below its diagonal, with about 8 (m + 4) n^2
-/// multiplications each.
+/// The upper bound is the smallest value found by descents s := u* A u, u the left singular vector, which start at
+/// each eigenvalue of A that is not below the real axis and at each better point of the search. The lower bound is a
+/// branch and bound: the singular value changes by at most the change of s, so that its value at the centre of a
+/// square less half the diagonal bounds it in the square; for |s| > 1 + upper it is larger than `upper`. The square
+/// with the lowest bound is divided until the bounds agree to 10 %, with at most 1000 evaluations of about 100 (n +
+/// m) n^2 multiplications each, those of the descents apart. For a small distance the lower bound may remain far
+/// below the upper one; below 1e-14 it is zero. With more than 24 states the lower bound is zero, and the singular
+/// values of the descents are computed by inverse iteration in coordinates in which [B, A] is zero below its
+/// diagonal, with about 8 (m + 4) n^2 multiplications each.
 ///
 /// Source: R. Eising, Between controllable and uncontrollable, Systems and Control Letters 4
 /// (1984); the lower bound follows from Weyl's inequality for singular values.
@@ -71,9 +72,9 @@ pub struct Distance {
 /// use nalgebra::DMatrix;
 /// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]);
 /// let b = DMatrix::from_row_slice(2, 1, &[0.0, 1.0]);
-/// let found = control::distance::from_uncontrollable(&a, &b)?;
-/// // [1, -s; 0, ...]: with s = 0 the rows (0, 1, 0) and (0, 0, 1) are orthonormal
-/// assert!(found.lower > 0.5 && found.upper <= 1.0);
+/// let distance = control::distance::from_uncontrollable(&a, &b)?;
+/// // [A, B] at s = 0 has the rows (0, 1, 0) and (0, 0, 1), which are orthonormal.
+/// assert!(distance.lower > 0.5 && distance.upper <= 1.0);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///
@@ -106,7 +107,7 @@ struct Pencil {
     b: DMatrix<f64>,
     /// The norm by which A was divided.
     unit: f64,
-    /// The pair in coordinates for many states.
+    /// The pair in coordinates for fast evaluations, with more than 24 states.
     reduced: Option<ReducedPencil>,
 }
 
@@ -136,7 +137,7 @@ impl Pencil {
         Ok((value, u.dotc(&image)))
     }
 
-    /// Descends from s: for a fixed u the smallest value is at s = u* A u.
+    /// Descends from s to a local minimum: for a fixed u the smallest value is at s = u* A u.
     fn descend(&self, s: Complex<f64>) -> Result<Minimum, Error> {
         let mut best = Minimum { value: f64::INFINITY, s };
         let mut s = s;
@@ -151,6 +152,7 @@ impl Pencil {
         Ok(best)
     }
 
+    /// Bounds the minimum over all s, see [`from_uncontrollable`].
     fn search(&self) -> Result<Distance, Error> {
         let mut best = Minimum { value: f64::INFINITY, s: Complex::new(0.0, 0.0) };
         for start in eigenvalues(&self.a)?.into_iter().filter(|start| start.im >= 0.0) {
@@ -198,16 +200,19 @@ struct Minimum {
 struct Square {
     bound: f64,
     centre: Complex<f64>,
+    /// Half of its side.
     half: f64,
 }
 
 impl Square {
+    /// The centres of its quarters.
     fn quarters(&self) -> [Complex<f64>; 4] {
         let h = 0.5 * self.half;
         [(-h, -h), (-h, h), (h, -h), (h, h)].map(|(x, y)| self.centre + Complex::new(x, y))
     }
 
-    /// The lowest bound first, then the centre farthest to the right, then the highest.
+    /// Orders squares by their bound, the lowest first, then by their centre, the one farthest to the
+    /// right first, then the highest one.
     fn order(&self, other: &Self) -> Ordering {
         let (here, there) = (self.centre, other.centre);
         let by_centre = there.re.total_cmp(&here.re).then(there.im.total_cmp(&here.im));

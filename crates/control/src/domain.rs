@@ -1,4 +1,4 @@
-//! Continuous or sampled time.
+//! The time domain of a system.
 
 use crate::{Error, check};
 use nalgebra::Complex;
@@ -52,7 +52,7 @@ impl Domain {
         }
     }
 
-    /// The eigenvalue of a constant: 0, in sampled time 1.
+    /// The eigenvalue of a constant signal: 0, in sampled time 1.
     pub(crate) fn constant(self) -> f64 {
         match self {
             Self::Continuous => 0.0,

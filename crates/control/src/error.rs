@@ -129,7 +129,7 @@ pub enum Error {
         zeros.iter().map(|zero| shown(*zero)).collect::<Vec<_>>().join(", ")
     )]
     UnstableZeros {
-        /// Those that are not stable.
+        /// The zeros that are not stable.
         zeros: Vec<Complex<f64>>,
     },
     /// No residual responds to a fault that is decoupled from the disturbances and the other faults.
@@ -265,6 +265,7 @@ pub enum Error {
     },
 }
 
+/// A complex number as text, without the imaginary part if it is zero.
 fn shown(value: Complex<f64>) -> String {
     if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
 }

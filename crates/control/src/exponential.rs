@@ -28,8 +28,8 @@ const REACH: f64 = 5.371_920_351_148_152;
 /// The matrix exponential e^A.
 ///
 /// `a`: n x n, finite, without a unit (a rate times a time). Method: diagonal balancing, then
-/// scaling and squaring with the Pade approximant of order 13; about (6 + s) 2 n^3 multiplications
-/// with s = log2(norm of A / 5.4). The approximant is exact to rounding; the squarings add errors
+/// scaling and squaring with the Pade approximant of order 13; about (7 + s) n^3 multiplications with
+/// s = log2(norm of A / 5.4), at least 0. The approximant is exact to rounding; the squarings add errors
 /// that are small relative to the largest of the powers squared, in balanced coordinates.
 ///
 /// Source: N. J. Higham, The scaling and squaring method for the matrix exponential revisited,
@@ -72,7 +72,7 @@ pub(crate) fn scaling_and_squaring(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Err
     check::in_range("e^A", power)
 }
 
-/// (V - U)^-1 (V + U), with U the odd and V the even part of the numerator.
+/// The Pade approximant (V - U)^-1 (V + U) of e^A, with U the odd and V the even part of the numerator.
 fn approximant(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let identity = DMatrix::identity(a.nrows(), a.ncols());
     let second = product(a, a);

@@ -5,19 +5,20 @@
 //! | constant | x' = A x + B u + `F_a` f | `F_a` | 0 |
 //! | ramp, f' = g, g' = 0 | the same | [`F_a`, 0] | [0, I; 0, 0] |
 //! | sensor | y = C x + `F_s` f | [0; W `F_s`] | by its kind |
-//! | both | both of these | [`F_a`; W `F_s`] | by its kind |
+//! | actuator and sensor | in both places | [`F_a`; W `F_s`] | by its kind |
 //! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
 //!
-//! What enters the measurements passes the usual filter of the measurements, which is part of the
-//! controller and becomes part of the plant that the observer sees:
+//! A fault of the measurements passes their filter, which is part of the controller and becomes part
+//! of the plant in the observer:
 //!
 //! ```text
 //! y_f' = W (y - y_f)
 //! A -> [A, 0; W C, -W],  B -> [B; 0],  C -> [0, I],  F_a -> [F_a, 0; 0, W F_s]
 //! ```
 //!
-//! A plant with y = C x + D u is one without D for a controller that filters y - D u, which it knows:
-//! [`crate::controller::with_feedthrough`]. A fault f of its input i enters both: columns i of B and D.
+//! A plant with y = C x + D u is one without D for a controller that filters y - D u, as it knows u:
+//! [`crate::controller::with_feedthrough`]. A fault of input i of such a plant has the columns i of B and D,
+//! [`FaultEntry::Both`].
 
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
@@ -39,11 +40,11 @@ pub enum FaultKind {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum FaultEntry {
-    /// x' = A x + B u + column f; n entries.
+    /// In the states, x' = A x + B u + column f; n entries.
     Actuator(DVector<f64>),
-    /// y = C x + column f; p entries.
+    /// In the measurements, y = C x + column f; p entries.
     Sensor(DVector<f64>),
-    /// x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
+    /// In both, x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
     Both {
         /// The column of `F_a`.
         states: DVector<f64>,
@@ -67,7 +68,7 @@ impl FaultEntry {
 pub struct Fault {
     /// Where it enters.
     pub entry: FaultEntry,
-    /// How it is taken to develop.
+    /// The model by which it develops.
     pub kind: FaultKind,
 }
 
@@ -81,15 +82,14 @@ pub struct FaultChannel {
     pub rate: Option<usize>,
 }
 
-/// A plant in the form that the observer needs, and the relation of its faults to those of the
-/// user.
+/// A plant in the form that the observer needs, and the places of the user's faults in `f_hat`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedPlant {
     /// The plant; the states of the measurement filter follow its own.
     pub plant: FaultyPlant,
     /// The time domain of the plant.
     pub domain: Domain,
-    /// Diagonal of W, in 1/s, p entries. None if y is not filtered.
+    /// Diagonal of W, in 1/s also in sampled time, p entries. None if y is not filtered.
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
     pub states: usize,
@@ -108,8 +108,9 @@ impl ExtendedPlant {
 
     /// Builds the continuous plant with the given faults.
     ///
-    /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one; `filter`: the diagonal of W, p
-    /// rates above zero in 1/s, or none, which is possible if no fault enters the measurements.
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one for an observer, which is not checked
+    /// here; `filter`: the diagonal of W, p rates above zero in 1/s, or empty, which is possible if no
+    /// fault enters the measurements.
     /// `f_hat` holds the estimates in the order of the faults, then the rates of the ramps.
     /// [`FaultyPlant::check_observer_exists`] and [`crate::detectability`] test whether an observer
     /// exists: a sensor fault, for example, needs other measurements that show the same state.
@@ -149,9 +150,9 @@ impl ExtendedPlant {
         Self::in_domain([a, b, c], faults, filter, Domain::Continuous)
     }
 
-    /// The same with A, B, C in continuous or sampled time.
+    /// Builds the plant as [`Self::new`] does, from A, B, C in continuous or sampled time.
     ///
-    /// In sampled time the plant is known at its samples only: a fault acts on x\[k+1\] through `F_a`, as it is at
+    /// In sampled time the plant is known at its samples only: a fault acts on x\[k+1\] through `F_a` by its value at
     /// sample k. A ramp has `A_f` = [I, T I; 0, I], and the filter has 1 - e^(-w T) in place of W.
     ///
     /// # Errors
@@ -229,7 +230,7 @@ fn columns(
     Ok((f_a, f_s))
 }
 
-/// `A_f`, and the indices of each fault and its rate.
+/// `A_f` in continuous time, and the indices of each fault and its rate.
 fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<FaultChannel>) {
     let mut next = faults.len();
     let mut channels = Vec::with_capacity(faults.len());

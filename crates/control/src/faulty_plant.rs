@@ -8,7 +8,8 @@ use nalgebra::DMatrix;
 /// Singular values of B below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
-/// The plant with faults (1) and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x.
+/// The plant with faults (1) and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x; in
+/// sampled time x[k+1], f[k+1] in place of x', f'.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaultyPlant {
     /// A, n x n.
@@ -19,7 +20,7 @@ pub struct FaultyPlant {
     pub c: DMatrix<f64>,
     /// `F_a`, n x q: how the faults act on the states. A force against the actuator has `F_a` = -B.
     pub f_a: DMatrix<f64>,
-    /// `A_f`, q x q: the fault model. Zero for constant faults; I in sampled time.
+    /// `A_f`, q x q: the fault model. 0 for constant faults; I for constant faults in sampled time.
     pub a_f: DMatrix<f64>,
 }
 

@@ -40,7 +40,7 @@ pub struct Gains {
     pub l_x: DMatrix<f64>,
     /// `L_f`, q x p.
     pub l_f: DMatrix<f64>,
-    /// `P_f`, q x p; none without a direct term.
+    /// `P_f`, q x p; None without a direct term.
     pub p_f: Option<DMatrix<f64>>,
     /// The integral action for references; None without.
     pub integral: Option<IntegralAction>,
@@ -117,7 +117,7 @@ impl Gains {
         check::shape("H F_s", faults, (t, q))
     }
 
-    /// `P_f` C, q x n: how the direct term reads the error e = x - `x_hat`.
+    /// `P_f` C, q x n: how the direct term reads the error e = x - `x_hat`; None without a direct term.
     pub(crate) fn direct(&self, plant: &FaultyPlant) -> Option<DMatrix<f64>> {
         self.p_f.as_ref().map(|p_f| p_f * &plant.c)
     }

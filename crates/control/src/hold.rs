@@ -1,4 +1,5 @@
-//! Exact discretisation of a linear system with an input that is constant or linear over the step.
+//! Exact discretisation of a linear system with an input that is constant or linear over the step,
+//! and its inverse.
 
 use crate::balance::{Balance, divide_columns, divide_rows, power_of_two};
 use crate::blocks::beside;
@@ -7,7 +8,8 @@ use crate::logarithm::logarithm_of_one_plus;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// x(h) = Phi x0 + `Gamma_0` w0 + `Gamma_1` w1, the exact solution of x' = A x + B (w0 + w1 t).
+/// The exact solution of x' = A x + B (w0 + w1 t) after a step h: x(h) = Phi x0 + `Gamma_0` w0 +
+/// `Gamma_1` w1.
 ///
 /// Phi = e^(A h), `Gamma_0` = integral of e^(A s) B, `Gamma_1` = integral of e^(A s) (h - s) B,
 /// both over s from 0 to h. With w1 = 0 the input is held constant; [`zero_order_hold`] computes
@@ -28,8 +30,9 @@ impl FirstOrderHold {
     /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Method: states
     /// balanced, inputs scaled, then one exponential of the block matrix [A h, B h, 0; 0, 0, I; 0,
     /// 0, 0] of order n + 2 m, whose first row of blocks is [Phi, `Gamma_0`, `Gamma_1` / h]; about
-    /// (6 + s) 2 (n + 2 m)^3 multiplications, s = log2(norm of A h). The error is the error of the
-    /// exponential, relative to the norm of each column in balanced coordinates.
+    /// (7 + s) (n + 2 m)^3 multiplications, s = log2(norm of the block matrix / 5.4), at least 0. The
+    /// error is the error of the exponential, relative to the norm of each column in balanced
+    /// coordinates.
     ///
     /// Source: C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
     /// Autom. Control 23 (1978), theorem 1.
@@ -57,7 +60,7 @@ impl FirstOrderHold {
         Ok(Self { phi, gamma_0, gamma_1 })
     }
 
-    /// out = Phi x + `Gamma_0` w0 + `Gamma_1` w1, without allocation.
+    /// Computes out = Phi x + `Gamma_0` w0 + `Gamma_1` w1, without allocation.
     ///
     /// `x`, `out`: n; `w0`, `w1`: m, the input at the start of the step and its slope. NaN and
     /// infinities propagate.
@@ -85,7 +88,7 @@ impl FirstOrderHold {
     }
 }
 
-/// x(h) = Phi x0 + Gamma w: the exact solution of x' = A x + B w with w constant over the step.
+/// Discretises x' = A x + B w with w constant over the step: x(h) = Phi x0 + Gamma w, exactly.
 ///
 /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Returns (Phi,
 /// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. This
@@ -118,9 +121,10 @@ pub fn zero_order_hold(
     Ok((phi, gamma))
 }
 
-/// The continuous plant x' = A x + B u with the given samples: the inverse of [`zero_order_hold`].
+/// Computes A and B of the continuous plant x' = A x + B u whose samples have Phi and Gamma: the inverse of
+/// [`zero_order_hold`].
 ///
-/// `phi`: n x n; `gamma`: n x m; `h`: the time of a sample, above 0. Of all such plants it is the one whose eigenvalues
+/// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants it is the one whose eigenvalues
 /// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: the
 /// logarithm of [phi, gamma; 0, I], see [`logarithm_of_one_plus`].
 ///
@@ -138,8 +142,8 @@ pub fn zero_order_hold(
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::OutOfRange`] for a bad argument;
-/// [`Error::NoContinuousPlant`].
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `phi`, called A, or `gamma`, called B;
+/// [`Error::OutOfRange`] for a bad `h`; [`Error::NoContinuousPlant`], also if rounding prevents the logarithm.
 pub fn continuous(
     phi: &DMatrix<f64>,
     gamma: &DMatrix<f64>,
@@ -152,7 +156,7 @@ pub fn continuous(
     Ok((all.view((0, 0), (n, n)).into(), all.view((0, n), (n, m)).into()))
 }
 
-/// Phi, `Gamma_0` and `Gamma_1` of the first `slopes` inputs.
+/// Computes Phi, `Gamma_0`, and `Gamma_1` of the first `slopes` inputs, n x `slopes`.
 fn integrals(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -181,7 +185,7 @@ fn integrals(
     ])
 }
 
-/// A power of two near the size of an input's column; one for an input without effect.
+/// The power of two nearest to the norm of an input's column; one for an input without effect.
 fn unit(norm: f64) -> f64 {
     let power = power_of_two(norm);
     if power.is_normal() { power } else { 1.0 }
@@ -206,6 +210,7 @@ fn add_product(m: &DMatrix<f64>, v: &[f64], out: &mut [f64]) {
     fixed_sizes!(m, v, out; 1 2 3 4 5 6 7 8);
 }
 
+/// out += M v for a matrix of N rows.
 fn add_columns<const N: usize>(columns: &[[f64; N]], v: &[f64], out: &mut [f64]) {
     let Some(out) = out.first_chunk_mut::<N>() else { return };
     let mut sums = *out;

@@ -32,10 +32,11 @@
 //!
 //! # Conventions
 //!
-//! Feedback is u = K x, so that the closed loop is A + B K; an observer has the error dynamics A - L C.
-//! ' is the transpose in formulas, [A, B; C, D] a matrix of blocks, eps the machine epsilon. Systems are
-//! [`StateSpace`]; [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Bad
-//! arguments and unsolvable problems are an [`Error`], never a panic; only [`blocks`] panics, for shapes that do not fit.
+//! Feedback is u = K x, so that the closed loop is A + B K; an observer has the error dynamics A - L C. ' is the
+//! transpose in formulas, [A, B; C, D] a matrix of blocks, eps the machine epsilon. Systems are [`StateSpace`];
+//! [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Functions return an [`Error`]
+//! for bad arguments and unsolvable problems. Those without a `Result`, such as those of [`blocks`], panic for shapes
+//! that do not fit.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(feature = "design"),

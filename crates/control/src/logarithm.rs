@@ -6,9 +6,9 @@ use nalgebra::DMatrix;
 const ITERATIONS: usize = 50;
 /// Maximum number of square roots.
 const ROOTS: usize = 60;
-/// The quadrature is exact to double precision up to this 1-norm of E.
+/// The quadrature of log(I + X) is exact to double precision up to this 1-norm of X.
 const REACH: f64 = 0.25;
-/// Residual allowed of e^L - (I + E), relative to the norm of I + E.
+/// Largest residual of the logarithm, e^L - (I + E), and of a square root, relative to the norm of the matrix.
 const RESIDUAL: f64 = 1e-10;
 /// Positive nodes and weights of the Gauss-Legendre rule of order 8 on [-1, 1].
 const NODES: [(f64, f64); 4] = [
@@ -21,13 +21,14 @@ const NODES: [(f64, f64); 4] = [
 /// Returns the principal logarithm L of I + E: e^L = I + E, where the eigenvalues of L have
 /// imaginary parts between -pi and pi.
 ///
-/// `e`: n x n, finite. The logarithm exists and is real if I + E has no eigenvalue on the closed
-/// negative real axis; otherwise the result is `None`.
+/// `e`: n x n. The logarithm exists and is real if I + E has no eigenvalue on the closed negative
+/// real axis. The result is `None` otherwise, for entries that are not finite, and if rounding prevents
+/// a result that passes the verification.
 ///
 /// Method: inverse scaling and squaring; square roots by the product form of the Denman-Beavers
 /// iteration; then log(I + X) = integral of X (I + t X)^-1 over t from 0 to 1 by the Gauss-Legendre
 /// rule of order 8, which is the [8/8] Pade approximant. About 2 n^3 multiplications per iteration
-/// of a root, then 8 inversions. A small E keeps its relative precision. The result is verified:
+/// of a root, then 8 matrix equations. A small E keeps its relative precision. The result is verified:
 /// e^L - (I + E) is within 1e-10 of the norm of I + E.
 ///
 /// Sources: S. H. Cheng, N. J. Higham, C. S. Kenney, A. J. Laub, Approximating the logarithm of a
@@ -56,12 +57,13 @@ pub fn logarithm_of_one_plus(e: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         }
     }
     let logarithm = sum * factor;
-    let goal = e + identity;
-    let residual = one_norm(&(logarithm.exp() - &goal)) / one_norm(&goal);
+    let one_plus_e = e + identity;
+    let residual = one_norm(&(logarithm.exp() - &one_plus_e)) / one_norm(&one_plus_e);
     (residual <= RESIDUAL).then_some(logarithm)
 }
 
-/// Returns the principal square root; `None` if the iteration does not converge.
+/// Returns the principal square root R of A; `None` if an iterate is singular or not finite, or if
+/// R^2 differs from A by more than [`RESIDUAL`].
 fn square_root(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     let identity = DMatrix::<f64>::identity(n, n);
@@ -82,7 +84,7 @@ fn square_root(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     (residual <= RESIDUAL * one_norm(a)).then_some(root)
 }
 
-/// Returns the largest column sum; infinite if an entry is NaN.
+/// Returns the 1-norm, the largest sum of magnitudes in a column; infinite if an entry is NaN.
 pub(crate) fn one_norm(a: &DMatrix<f64>) -> f64 {
     let sums = a.column_iter().map(|column| column.iter().map(|x| x.abs()).sum::<f64>());
     sums.fold(0.0, |largest, sum| if sum.is_nan() { f64::INFINITY } else { sum.max(largest) })

@@ -6,8 +6,8 @@
 //! z[k+1] = g(z[k]) + w[k],    y[k] = h(z[k]) + v[k]
 //! ```
 //!
-//! where faults are part of z, both filters have the mean z and the covariance P of the estimate. They differ in how these
-//! pass g and h:
+//! where faults are part of z, both filters keep the mean z and the covariance P of the estimate. They differ in how
+//! they transform these by g and h:
 //!
 //! * **extended**: g and h are replaced by their tangents at the mean, with the Jacobians G and H:
 //!   P becomes G P G' + W, the gain is P H' (H P H' + V)^-1 (A. H. Jazwinski, Stochastic Processes and Filtering Theory, 1970,
@@ -22,7 +22,7 @@
 use crate::check::as_number;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Part of its variance below which a pivot of a covariance is rounding, times the order.
+/// A pivot of a covariance below this part of its variance, times the order, is rounding.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A plant in sampled time, z having N states and faults and y having p measurements.
@@ -37,7 +37,7 @@ pub trait SampledPlant {
     /// The plant has no value there.
     fn advance(&mut self, z: &mut [f64]) -> Result<(), Self::Error>;
 
-    /// [`Self::advance`], with the Jacobian of g, N x N, at the former z.
+    /// Replaces z by g(z), and sets `g` to the Jacobian of g, N x N, at the former z.
     ///
     /// # Errors
     ///
@@ -51,7 +51,7 @@ pub trait SampledPlant {
     /// The plant has no value there.
     fn measure(&mut self, z: &[f64], y: &mut [f64]) -> Result<(), Self::Error>;
 
-    /// [`Self::measure`], with the Jacobian of h, p x N.
+    /// Sets y to h(z), and `h` to the Jacobian of h, p x N, at z.
     ///
     /// # Errors
     ///
@@ -64,7 +64,7 @@ pub trait SampledPlant {
     ) -> Result<(), Self::Error>;
 }
 
-/// How mean and covariance pass the equations of the plant.
+/// How mean and covariance are transformed by the equations of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transform {
     /// By tangents at the mean.
@@ -73,7 +73,7 @@ pub enum Transform {
     Unscented,
 }
 
-/// Why a filter cannot go on.
+/// Why a prediction or a correction failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError<E> {
@@ -85,40 +85,50 @@ pub enum FilterError<E> {
     NotDefinite,
 }
 
-/// The estimate of a nonlinear plant, and space for its equations: a sample allocates nothing.
+/// The estimate of a nonlinear plant, and the memory for its equations: a sample allocates nothing.
 #[derive(Clone, Debug)]
 pub struct NonlinearFilter {
     /// The mean z, N numbers.
     pub mean: DVector<f64>,
     /// The covariance P, N x N.
     pub covariance: DMatrix<f64>,
-    /// The innovation y - h(z) of the last correction, p numbers.
+    /// The innovation y - h(z) of the last correction, p numbers; 0 for measurements that were not due. The
+    /// unscented filter has the mean of h over its points in place of h(z).
     pub innovation: DVector<f64>,
+    /// W, N x N.
     w: DMatrix<f64>,
+    /// V, p x p.
     v: DMatrix<f64>,
-    /// The Jacobians G and H.
+    /// The Jacobian G.
     g: DMatrix<f64>,
+    /// The Jacobian H.
     h: DMatrix<f64>,
-    /// Space for products, N x N.
+    /// Memory for products, N x N.
     square: DMatrix<f64>,
+    /// Memory for products, N x N.
     product: DMatrix<f64>,
     /// A square root of P.
     root: DMatrix<f64>,
-    /// The 2 N points in z, and their values in y, as columns.
+    /// The 2 N points in z, as columns.
     points: DMatrix<f64>,
+    /// The measurements at `points`, as columns.
     measured: DMatrix<f64>,
-    /// S, the covariance of the innovation.
+    /// S, the covariance of the innovation; its factor after a correction.
     s: DMatrix<f64>,
-    /// The covariance of y and z, p x N.
+    /// The covariance of y and z, p x N; multiplied by an inverse after a correction.
     cross: DMatrix<f64>,
-    /// The gain K, and K V; before, `gain` has the transpose of H.
+    /// The transpose of H, then the gain K, N x p.
     gain: DMatrix<f64>,
+    /// K V, N x p.
     gain_v: DMatrix<f64>,
+    /// S^-1 times the innovation.
     solved: DVector<f64>,
 }
 
 impl NonlinearFilter {
-    /// A filter for N = `w` rows and p = `v` rows, with the mean and the covariance zero.
+    /// Creates a filter with mean and covariance zero.
+    ///
+    /// `w`: W, N x N; `v`: V, p x p. Neither is checked.
     #[must_use]
     pub fn new(w: DMatrix<f64>, v: DMatrix<f64>) -> Self {
         let (n, p) = (w.nrows(), v.nrows());
@@ -144,11 +154,11 @@ impl NonlinearFilter {
         }
     }
 
-    /// The estimate one sample later, before its measurement.
+    /// Predicts the estimate of the next sample, before its measurement.
     ///
     /// # Errors
     ///
-    /// [`FilterError::Plant`].
+    /// [`FilterError::Plant`]. The extended filter then has the mean that the plant left.
     pub fn predict<M: SampledPlant>(
         &mut self,
         plant: &mut M,
@@ -175,12 +185,14 @@ impl NonlinearFilter {
         Ok(())
     }
 
-    /// The estimate with the measurements `y` of which `is_due` is true; returns e' S^-1 e with the innovation e and its
-    /// covariance S, whose mean is their number if the filter is consistent.
+    /// Corrects the estimate by those of the measurements `y` for whose index `is_due` is true.
+    ///
+    /// `y`: p numbers. Returns e' S^-1 e with the innovation e and its covariance S; if the filter is consistent, its
+    /// mean is the number of measurements that are due.
     ///
     /// # Errors
     ///
-    /// [`FilterError`].
+    /// [`FilterError`]; mean and covariance are unchanged then.
     pub fn correct<M: SampledPlant>(
         &mut self,
         plant: &mut M,
@@ -236,7 +248,7 @@ impl NonlinearFilter {
         // The gain K = cross' S^-1.
         let mut solved = std::mem::replace(&mut self.cross, DMatrix::zeros(0, 0));
         if transform == Transform::Unscented {
-            // P - cross' S^-1 cross, the columns of R^-1 cross having this square, S = R R'.
+            // P - cross' S^-1 cross = P - X' X with X = R^-1 cross, where S = R R'.
             factor.l_dirty().solve_lower_triangular_mut(&mut solved);
             self.covariance.gemm_tr(-1.0, &solved, &solved, 1.0);
         } else {
@@ -272,7 +284,7 @@ impl NonlinearFilter {
     }
 }
 
-/// Takes the mean of the columns off them.
+/// Sets `mean` to the mean of the columns and subtracts it from each of them.
 fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
     mean.fill(0.0);
     for point in points.column_iter() {
@@ -301,8 +313,8 @@ fn symmetrise(matrix: &mut DMatrix<f64>) {
     }
 }
 
-/// Sets `root` to the lower triangular R with R R' = `covariance`, which may be singular: a variance that the columns before
-/// explain up to rounding adds none.
+/// Sets `root` to the lower triangular R with R R' = `covariance`, which may be singular: a column of R is zero if
+/// the columns before it explain its variance up to rounding.
 fn square_root(covariance: &DMatrix<f64>, root: &mut DMatrix<f64>) {
     root.fill(0.0);
     let n = covariance.nrows();

@@ -2,18 +2,19 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector};
 
-/// M = Q R with Q = H1 H2 ..., H = I - tau v v*.
+/// The Q of M = Q R, as the product of the reflections H = I - tau v v*.
 ///
-/// The reflections have the signs of LAPACK, so that also the columns of Q that are normal to M are
-/// those that LAPACK computes.
+/// The reflections have the signs of LAPACK, so that all columns of Q, also those that are normal to
+/// M, are those that LAPACK computes.
 pub(crate) struct Reflections<T> {
     rows: usize,
-    /// tau and v, whose first entry, of the number of the reflection, is one.
+    /// tau and v of each reflection; v of reflection k lacks its first k entries, which are zero, and
+    /// begins with 1. tau = 0 if column k is zero below its diagonal.
     all: Vec<(T, DVector<T>)>,
 }
 
 impl<T: ComplexField<RealField = f64>> Reflections<T> {
-    /// Decomposes `m`. Cost: 2 r c^2 multiplications for r x c, r > c.
+    /// Decomposes `m`. Cost: about r c^2 multiplications for r x c, r > c.
     pub(crate) fn new(mut m: DMatrix<T>) -> Self {
         let (rows, columns) = m.shape();
         let mut all = Vec::with_capacity(columns);

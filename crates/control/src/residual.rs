@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// Without faults, disturbances and noise r converges to 0 for all commands, so that r differs from 0 only
-/// if one of them acts on the plant. The fields are public and unchecked; every function that takes a
-/// generator checks it.
+/// if one of them acts on the plant. The fields are public and unchecked; functions that return a `Result`
+/// check them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualGenerator {
     /// A, n x n.
@@ -33,7 +33,8 @@ pub struct ResidualGenerator {
 }
 
 impl ResidualGenerator {
-    /// Checks shapes and finiteness of the matrices, and the period. n may be 0: a static generator.
+    /// Checks shapes and finiteness of the matrices, and the period. n may be 0, for a static generator, and m
+    /// may be 0.
     ///
     /// # Errors
     ///
@@ -62,6 +63,10 @@ impl ResidualGenerator {
     }
 
     /// Returns the generator as one system from [u; y] to r: B = [`B_u`, `B_y`], D = [`D_u`, `D_y`].
+    ///
+    /// # Panics
+    ///
+    /// If the shapes do not fit, see [`Self::check`].
     #[must_use]
     pub fn system(&self) -> StateSpace {
         StateSpace {

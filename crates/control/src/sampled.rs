@@ -30,7 +30,8 @@ pub struct SampledDesign {
     pub period: f64,
     /// The sampled plant.
     pub plant: FaultyPlant,
-    /// The gain 1 - e^(-w period) of each measurement filter, `y_f` := `y_f` + gain (y - `y_f`).
+    /// The gain 1 - e^(-w period) of each measurement filter, `y_f` := `y_f` + gain (y - `y_f`); None without
+    /// filters.
     pub filter: Option<Vec<f64>>,
     /// The gains. `L_x`, `L_f` correct the next estimate with a prediction estimator, the present
     /// estimate with a current estimator.
@@ -102,9 +103,9 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
 /// y_f[k+1]  = y_f[k] + (I - e^(-W T)) (y[k] - y_f[k])
 /// ```
 ///
-/// `extended`: in continuous time; one that is sampled with this `period` is returned unchanged; `period`: T in s, above zero.
-/// Exact for a held u and faults that follow their model, a ramp within the interval included; the measurement filter
-/// operates on samples. Method and precision: see [`FirstOrderHold`].
+/// `extended`: in continuous time; one that is sampled with this `period` is returned unchanged; `period`: T in s,
+/// above zero. Exact for a held u and faults that follow their model, a ramp within the interval included; the
+/// measurement filter operates on samples. Method and precision: see [`FirstOrderHold`].
 ///
 /// # Errors
 ///
@@ -159,16 +160,13 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
 /// current:     e[k+1] = (A_0 - M C_0 A_0) e[k],   e after the correction by y[k]
 /// ```
 ///
-/// `extended`: the plant in continuous time; `period`: T in s, above zero; `controller_poles`: one
-/// per state of the plant itself; `observer_poles`: one per state of the extended plant and entry
-/// of `f_hat`, both in the z plane, of modulus below one for a stable loop, see [`sampled_poles`];
-/// `k_f`: m x q, or None for the continuous [`FaultyPlant::compensation_gain`] times the mean of
-/// the modelled fault over the interval, so that the held u cancels a ramp on average. The design
-/// exists when the sampled plant is controllable and its augmented pair observable, for the current
-/// estimator with the output `C_0` `A_0`: `A_0` must not be singular, which very fast filters make
-/// it. Method, cost and tolerance: see [`crate::placement::place`]. Of the
-/// [`crate::placement::alternatives`] the pair of feedback and observer is chosen as in
-/// [`crate::aso::design`].
+/// `extended`: the plant as for [`sample`]; `period`: T in s, above zero; `controller_poles`: one per state of the
+/// plant itself; `observer_poles`: one per state of the extended plant and entry of `f_hat`, both in the z plane, of
+/// modulus below one for a stable loop, see [`sampled_poles`]; `k_f`: m x q, or None for [`compensation_gain`], with
+/// which the held u cancels a ramp of a continuous plant on average. The design exists when the sampled plant is
+/// controllable and its augmented pair observable, for the current estimator with the output `C_0` `A_0`: `A_0` must
+/// not be singular, which very fast filters make it. Method, cost and tolerance: see [`crate::placement::place`]. Of
+/// the [`crate::placement::alternatives`] the pair of feedback and observer is chosen as in [`crate::aso::design`].
 ///
 /// The estimator is placed in the coordinates of [`place_estimator`], so that the condition number
 /// depends neither on the sample time nor on units.
@@ -272,7 +270,8 @@ pub fn estimator_alternatives(
     place_dual(a_0, output, poles, Extent::Alternatives)
 }
 
-/// See [`place_estimator`] and [`estimator_alternatives`].
+/// Computes the gain of [`place_estimator`], and the alternatives of [`estimator_alternatives`] if `extent`
+/// says so.
 fn place_dual(
     a_0: &DMatrix<f64>,
     output: &DMatrix<f64>,
@@ -281,11 +280,11 @@ fn place_dual(
 ) -> Result<Alternatives, Error> {
     let n = check::square("A_0", a_0)?;
     check::shape("C_0", output, (output.nrows(), n))?;
-    let mut shown = output.clone();
+    let mut response = output.clone();
     let mut energy = DVector::zeros(a_0.nrows());
     for _ in 0..a_0.nrows() {
-        energy += DVector::from_fn(a_0.nrows(), |state, _| shown.column(state).norm_squared());
-        shown *= a_0;
+        energy += DVector::from_fn(a_0.nrows(), |state, _| response.column(state).norm_squared());
+        response *= a_0;
     }
     let scale = energy.map(|energy: f64| {
         let unit = power_of_two(1.0 / energy.sqrt());
@@ -298,15 +297,15 @@ fn place_dual(
     Ok(placed.map(|gain| -gain.transpose()))
 }
 
-/// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1
-/// - e^(-w T). None without a filter.
+/// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains
+/// 1 - e^(-w T). None without a filter.
 #[must_use]
 pub fn filter(extended: &ExtendedPlant, domain: Domain) -> Option<Vec<f64>> {
     extended.filter.as_ref().map(|rates| coefficients(rates, domain))
 }
 
-/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`], for a continuous plant in sampled time multiplied by the mean of
-/// the modelled fault over the interval.
+/// Computes `K_f` for a controller in `domain`: [`FaultyPlant::compensation_gain`], for a continuous plant with a
+/// sampled controller times the mean of the modelled fault over the interval.
 ///
 /// # Errors
 ///

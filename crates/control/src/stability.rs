@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-12;
 /// ```
 ///
 /// `a`: n x n, with eigenvalues lambda; the result has the unit of A in continuous time, none in
-/// sampled time. Method and precision: those of [`eigenvalues`].
+/// sampled time. Method and precision: see [`eigenvalues`].
 ///
 /// # Example
 ///
@@ -60,12 +60,12 @@ pub(crate) fn largest_excess(eigenvalues: &[Complex<f64>], domain: Domain) -> f6
     eigenvalues.iter().map(|&value| domain.excess(value)).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The eigenvalues of a stable matrix.
+/// Checks that A is stable; returns its eigenvalues.
 ///
 /// # Errors
 ///
-/// [`Error::NotHurwitz`] or [`Error::NotSchur`] with `name` for a matrix that is not stable; the
-/// errors of [`instability`].
+/// [`Error::NotHurwitz`] or [`Error::NotSchur`] with `name` for a matrix that is not stable; otherwise
+/// the same as [`instability`].
 pub(crate) fn require_stable(
     name: &'static str,
     a: &DMatrix<f64>,

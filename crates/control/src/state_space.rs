@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 /// x[k+1] = A x[k] + B w[k],  z[k] = C x[k] + D w[k]  sampled
 /// ```
 ///
-/// The fields are public and unchecked; every function of this crate that takes a system checks it.
+/// The fields are public and unchecked; functions of this crate that return a `Result` check what they use.
 ///
 /// # Example
 ///

@@ -1,5 +1,5 @@
-//! Weights over frequency: stable transfer functions of first and second order without zeros in the
-//! right half plane.
+//! Weights over frequency: constants, and stable transfer functions of first and second order without
+//! zeros in the right half plane.
 
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
@@ -25,7 +25,7 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// The same magnitude at every frequency.
+    /// A weight with the same magnitude, above zero, at every frequency. The sign is not checked.
     #[must_use]
     pub fn constant(magnitude: f64) -> Self {
         Self { numerator: vec![magnitude], denominator: vec![1.0], unit: 1.0 }
@@ -41,11 +41,11 @@ impl Weight {
     ///
     /// ```text
     /// order 1: W(s) = (high s + w sqrt(low high)) / (s + w sqrt(high / low)),  w = frequency
-    /// order 2: the square of that for sqrt(low), sqrt(high)
+    /// order 2: the square of the W of order 1 for sqrt(low), sqrt(high)
     /// ```
     ///
-    /// `frequency`, in rad/s: where the magnitude is sqrt(low high); in sampled time after
-    /// [`bilinear_frequency`].
+    /// `frequency`, in rad/s: where the magnitude is sqrt(low high); in sampled time the
+    /// [`bilinear_frequency`] of it.
     ///
     /// # Example
     ///
@@ -82,7 +82,7 @@ impl Weight {
         (self.denominator.len() == 1).then(|| self.numerator[0])
     }
 
-    /// |W(j w)|, w in rad/s; in sampled time after [`bilinear_frequency`].
+    /// |W(j w)|, `frequency`: w in rad/s; in sampled time the [`bilinear_frequency`] of the signal's.
     #[must_use]
     pub fn magnitude(&self, frequency: f64) -> f64 {
         let p = Complex::new(0.0, frequency / self.unit);
@@ -93,7 +93,7 @@ impl Weight {
     }
 
     /// The weight as a system with one input and one output, in sampled time by the bilinear
-    /// transformation.
+    /// transformation. A constant weight has no states.
     ///
     /// # Errors
     ///
@@ -126,7 +126,8 @@ impl Weight {
         })
     }
 
-    /// Numerator and denominator in s, in sampled time in z, the highest power first.
+    /// Numerator and denominator in s, in sampled time in z, the highest power first; the denominator
+    /// begins with 1.
     #[must_use]
     pub fn polynomials(&self, domain: Domain) -> (Vec<f64>, Vec<f64>) {
         let convert = |coefficients: &[f64]| match domain {
@@ -147,7 +148,7 @@ impl Weight {
     }
 }
 
-/// A system with one of the weights from each input to the output of the same index.
+/// The system whose output i is input i, filtered by weight i.
 ///
 /// # Errors
 ///
@@ -174,7 +175,7 @@ pub fn diagonal(weights: &[Weight], domain: Domain) -> Result<StateSpace, Error>
     Ok(whole)
 }
 
-/// The polynomial for p = `rate` (z - 1) / (z + 1), times (z + 1)^order.
+/// The coefficients in z of a polynomial in p = `rate` (z - 1) / (z + 1), times (z + 1)^order.
 fn powers_of_z(coefficients: &[f64], rate: f64) -> Vec<f64> {
     match *coefficients {
         [b, c] => vec![b * rate + c, c - b * rate],

@@ -27,7 +27,8 @@ use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A singular value below this, relative to the largest, counts as zero.
+/// A singular value below this counts as zero, relative to the largest one, or to |`A_f`| + |s| for
+/// `A_f` - s I.
 const RANK_TOLERANCE: f64 = 1e-12;
 /// Eigenvalues of the fault model nearer than this, relative to its norm, count as one.
 const CLUSTER_TOLERANCE: f64 = 1e-6;
@@ -48,7 +49,7 @@ pub struct HiddenFault {
     pub rank: usize,
     /// Number of columns of R(s). The fault is hidden because `rank` is lower.
     pub expected: usize,
-    /// The fault `f_0`, q entries, scaled so that the largest is one.
+    /// The fault `f_0`, q entries, one of which is 1: the largest one, if no other fault is hidden at s.
     pub fault: DVector<Complex<f64>>,
     /// The motion `x_0` of the states that cancels it in the measurements, n entries.
     pub state: DVector<Complex<f64>>,
@@ -77,8 +78,8 @@ fn support(v: &ComplexVector) -> Vec<usize> {
 /// All hidden faults of a plant, for each eigenvalue s of `A_f` a basis of the null space of R(s).
 ///
 /// The basis is reduced so that each of its vectors has a fault that the others lack. R(s) has rows
-/// and columns scaled to length one. For a complex s, of which only the one above the real axis is
-/// examined, at most one combination is returned.
+/// and columns scaled to length one. Of two conjugate s only the one above the real axis is examined;
+/// for a complex s at most one combination is returned.
 pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Error> {
     let n = plant.a.nrows();
     let mut hidden = Vec::new();
@@ -139,8 +140,8 @@ fn rosenbrock_matrix(
 /// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to
 /// length one, so that units do not decide the rank.
 ///
-/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in that
-/// of M.
+/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in the null
+/// space of M.
 fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();

@@ -18,9 +18,9 @@ pub struct Visibility {
     /// constant fault: whether the transfer function from its column of `F_a` to the measurement is
     /// not identically zero.
     pub visible: bool,
-    /// That transfer function at s = 0, or z = 1 in sampled time. None if it has a pole there: the
-    /// measurement then grows without bound. Zero for the rate of a ramp, which has no column in
-    /// `F_a`.
+    /// The transfer function from the column of `F_a` to the measurement at s = 0, or z = 1 in sampled
+    /// time. None if it has a pole there: the measurement then grows without bound. Zero for the rate
+    /// of a ramp, whose column of `F_a` is zero.
     pub dc_gain: Option<f64>,
 }
 
@@ -48,15 +48,16 @@ pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visib
 
 /// The states that a fault reaches.
 struct Reach {
-    /// Those of the augmented plant that the fault moves while it develops by its model.
+    /// The states of the augmented plant that the fault moves while it develops by its model.
     by_model: Staircase,
-    /// Those of the plant that `column` reaches.
+    /// The states of the plant that `column` reaches.
     controllable: Staircase,
     /// The column of `F_a`, n x 1.
     column: DMatrix<f64>,
 }
 
-/// The output c, n x 1, of the reached states; None if it is zero.
+/// The part of the output c, n x 1, that the reached states have, one row for each; None if it is zero up
+/// to rounding.
 fn reached_output(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (c, norm) = reached.reached_output(c);
     (c.norm() > TOLERANCE * norm).then_some(c)

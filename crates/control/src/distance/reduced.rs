@@ -3,7 +3,7 @@
 use crate::blocks::{ComplexMatrix, beside, to_complex};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Steps of the inverse iteration.
+/// Number of steps of the inverse iteration.
 const ITERATIONS: usize = 6;
 
 /// The pencil [B, A - s I] in coordinates in which [B, A] is zero below its diagonal.
@@ -44,7 +44,7 @@ impl ReducedPencil {
         Self { both: to_complex(&both), inputs }
     }
 
-    /// Smallest singular value, from above, and u* A u for its left vector u.
+    /// Returns an upper bound of the smallest singular value, close to it, and u* A u for its left vector u.
     pub(super) fn at(&self, s: Complex<f64>) -> (f64, Complex<f64>) {
         let n = self.both.nrows();
         let mut pencil = self.both.clone();
@@ -85,8 +85,8 @@ fn triangular(mut pencil: ComplexMatrix, inputs: usize) -> ComplexMatrix {
             continue;
         }
         let (mut v, last) = (entries.column(0).into_owned(), entries[inputs]);
-        let turn = if last.norm() > 0.0 { last.unscale(last.norm()) } else { Complex::from(1.0) };
-        v[inputs] += turn.scale(entries.norm());
+        let phase = if last.norm() > 0.0 { last.unscale(last.norm()) } else { Complex::from(1.0) };
+        v[inputs] += phase.scale(entries.norm());
         v.unscale_mut(v.norm());
         let mut columns = pencil.view_mut((0, row), (row + 1, inputs + 1));
         let products = &columns * &v;

@@ -1,4 +1,4 @@
-//! States that have a meaning.
+//! States that are measurements and their rates.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -22,11 +22,11 @@ pub struct MeasuredStates {
 }
 
 impl MeasuredStates {
-    /// Takes the measurements C x and, for further states, the rates that are least dependent on the states before: T = [C; C A]
-    /// for n = 2 p, such as positions and speeds.
+    /// Chooses the measurements C x as states and, if there are further states, the rates that depend least on the
+    /// states before them: T = [C; C A] for n = 2 p, such as positions and speeds.
     ///
-    /// `a`: n x n; `c`: p x n. Rows are compared by their directions, so the states should be balanced. None if n is less than
-    /// p or more than 2 p, or if the rows of T, at unit length, have a condition number above 1000.
+    /// `a`: n x n; `c`: p x n. Rows are compared by their directions, so the states should be balanced. None if n is
+    /// less than p or more than 2 p, or if the rows of T, at unit length, have a condition number of 1000 or more.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ impl MeasuredStates {
     }
 }
 
-/// The smallest singular value over the largest one of the rows at unit length.
+/// The smallest singular value over the largest one of the rows at unit length; 0 if a row is zero.
 fn inverse_condition(rows: &[RowDVector<f64>]) -> Result<f64, Error> {
     let columns: Vec<_> = rows.iter().map(RowDVector::transpose).collect();
     if columns.iter().any(|column| column.norm() <= 0.0) {

@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::identification::Record;
 use crate::{Error, check};
 
-/// `x[k+1]` = A `x[k]` + B `u[k]` + K `e[k]` + b, `y[k]` = C `x[k]` + D `u[k]` + `e[k]` + d, see [`crate::identification`].
+/// A model in innovation form, `x[k+1]` = A `x[k]` + B `u[k]` + K `e[k]` + b, `y[k]` = C `x[k]` + D `u[k]` + `e[k]` +
+/// d, see [`crate::identification`].
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct IdentifiedModel {
@@ -67,7 +68,7 @@ impl IdentifiedModel {
         Ok(predictions)
     }
 
-    /// The model of signals that are the present ones times `units`.
+    /// The model of the signals in other units: those of this model times `units`, [u; y].
     pub(super) fn in_units(mut self, units: &[f64]) -> Self {
         let inputs = self.b.ncols();
         for (input, unit) in units[..inputs].iter().enumerate() {
@@ -87,7 +88,7 @@ impl IdentifiedModel {
     }
 }
 
-/// [`z[first]`; ...; `z[last]`].
+/// The samples of `range` as one column, [`z[first]`; ...; `z[last]`].
 fn window(record: &Record, range: Range<usize>) -> DVector<f64> {
     let samples = range.flat_map(|k| {
         record.inputs.column(k).iter().chain(record.outputs.column(k)).copied().collect::<Vec<_>>()

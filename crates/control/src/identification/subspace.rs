@@ -106,10 +106,10 @@ impl Subspace {
         let no_inputs = inputs.columns(0, 0).into_owned();
         let direct = if self.feedthrough { &inputs } else { &no_inputs };
         let (of_outputs, innovations) = regression(&[&now, direct, &constant], &outputs)?;
-        let (of_states, rest) = regression(&[&now, &inputs, &constant], &next)?;
+        let (of_states, residuals) = regression(&[&now, &inputs, &constant], &next)?;
         let svd = Svd::new(&innovations)?;
         let rank = svd.rank_above(NO_INNOVATION * outputs.norm());
-        let gain = svd.least_squares(&rest, rank).transpose();
+        let gain = svd.least_squares(&residuals, rank).transpose();
 
         let mut d = DMatrix::zeros(p, m);
         d.columns_mut(0, direct.ncols()).copy_from(&of_outputs.columns(order, direct.ncols()));
@@ -127,23 +127,19 @@ impl Subspace {
     }
 }
 
-/// The Hankel matrix of the predictor's coefficients: block row j are those of `y[k+j]` by `z[k-s]` to `z[k-1]`, with zeros for
-/// samples that are more than s back; s p x s (m + p).
+/// The Hankel matrix of the predictor's coefficients, s p x s (m + p): block row j has the coefficients of `z[k-s]` to
+/// `z[k-1]` for `y[k+j]`, zero for samples that are more than s before it.
 fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
     let (past, signals, outputs) = (windows.past, windows.signals(), windows.outputs);
     DMatrix::from_fn(past * outputs, past * signals, |row, column| {
         let (ahead, output) = (row / outputs, row % outputs);
-        match column.checked_sub(ahead * signals) {
-            // The first row of the coefficients is the constant.
-            Some(_) if column / signals >= ahead => {
-                coefficients[(1 + column - ahead * signals, output)]
-            }
-            _ => 0.0,
-        }
+        let regressor = column.checked_sub(ahead * signals);
+        // The first row of the coefficients is the constant.
+        regressor.map_or(0.0, |regressor| coefficients[(1 + regressor, output)])
     })
 }
 
-/// The coefficients of least squares, one row for each column of `targets`, and what remains of the targets.
+/// The coefficients of least squares, one row for each column of `targets`, and the residuals of the targets.
 fn regression(
     parts: &[&DMatrix<f64>],
     targets: &DMatrix<f64>,
@@ -152,8 +148,8 @@ fn regression(
     let all = DMatrix::from_columns(&columns);
     let svd = Svd::new(&all)?;
     let coefficients = svd.least_squares(targets, svd.rank(ROUNDING));
-    let rest = targets - &all * &coefficients;
-    Ok((coefficients.transpose(), rest))
+    let residuals = targets - &all * &coefficients;
+    Ok((coefficients.transpose(), residuals))
 }
 
 fn last_column(matrix: &DMatrix<f64>) -> DVector<f64> {

@@ -40,13 +40,13 @@ impl Record {
         check::shape("y", &self.outputs, (self.outputs.nrows(), self.len()))
     }
 
-    /// The signal of this number among [u; y] at sample `at`.
-    fn signal(&self, number: usize, at: usize) -> f64 {
+    /// The signal of this number, from 0, of [u; y] in a sample.
+    fn signal(&self, number: usize, sample: usize) -> f64 {
         let inputs = self.inputs.nrows();
         if number < inputs {
-            self.inputs[(number, at)]
+            self.inputs[(number, sample)]
         } else {
-            self.outputs[(number - inputs, at)]
+            self.outputs[(number - inputs, sample)]
         }
     }
 }
@@ -57,18 +57,23 @@ impl Record {
 /// R' R has all sums of products that least squares need. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Windows {
+    /// s.
     pub(super) past: usize,
+    /// m.
     pub(super) inputs: usize,
+    /// p.
     pub(super) outputs: usize,
+    /// The number of windows.
     pub(super) count: usize,
+    /// R.
     pub(super) factor: DMatrix<f64>,
 }
 
 impl Windows {
     /// Factors the windows whose last sample is in `range`, by Householder reflections: 2 N c^2 multiplications.
     ///
-    /// `past`: s, one or more. Windows that would start before the record are left out; the factor of a range without
-    /// windows is zero.
+    /// `past`: s, one or more. Windows that would start before the record or end after it are left out; the factor of a
+    /// range without windows is zero.
     ///
     /// # Errors
     ///
@@ -93,11 +98,11 @@ impl Windows {
         Ok(Self { past, inputs, outputs, count: range.len(), factor })
     }
 
-    /// The windows of all parts together.
+    /// The windows of all parts together, which are of the same signals and the same s.
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`] without parts, [`Error::Shape`] for parts of different signals or lengths.
+    /// [`Error::Empty`] without parts, [`Error::Shape`] for parts whose factors differ in size.
     pub fn joined(parts: &[&Self]) -> Result<Self, Error> {
         let first = *parts.first().ok_or(Error::Empty { matrix: "parts", actual: (0, 0) })?;
         let mut all = first.clone();
@@ -115,14 +120,14 @@ impl Windows {
         self.count
     }
 
-    /// The mean of each signal, [u; y], at the last sample of the windows.
+    /// The mean of each signal, [u; y], at the last sample of the windows; NaN without windows.
     #[must_use]
     pub fn means(&self) -> Vec<f64> {
         let first = self.past_columns().end;
         (0..self.signals()).map(|at| self.factor[(0, first + at)] / self.factor[(0, 0)]).collect()
     }
 
-    /// The standard deviation of each signal, [u; y], at the last sample of the windows.
+    /// The standard deviation of each signal, [u; y], at the last sample of the windows; 0 without windows.
     #[must_use]
     pub fn deviations(&self) -> Vec<f64> {
         let first = self.past_columns().end;
@@ -164,8 +169,8 @@ impl Windows {
     /// The factor of signals divided by their units, and these units: their deviations; 1 for a constant signal, and
     /// without windows.
     ///
-    /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean for each
-    /// row.
+    /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean
+    /// for each row.
     pub(super) fn scaled(&self) -> (DMatrix<f64>, Vec<f64>) {
         let rounding = f64::EPSILON * as_number(self.count + self.factor.nrows());
         let mut units = self.deviations();
