@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Computes the lower triangular L with L L' = A, A given by its lower triangle.
 ///
-/// The error is the order, from 1, of the first leading minor that is not positive.
+/// The error is the order, from 1, of the first leading minor that is not positive, or NaN.
 pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     let n = a.nrows();
     let mut l = DMatrix::zeros(n, n);
@@ -52,13 +52,14 @@ pub(crate) fn backward(u: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 pub(crate) struct Elimination {
     /// L below the diagonal (its diagonal is one), U on and above the diagonal.
     pub(crate) factors: DMatrix<f64>,
-    /// For each step k the row that was swapped with row k.
+    /// For each step k the row, from 0, that was swapped with row k.
     pub(crate) swaps: Vec<usize>,
-    /// The first pivot that is zero, from 1.
+    /// The number, from 1, of the first pivot that is zero; None for a regular A.
     pub(crate) singular: Option<usize>,
 }
 
 impl Elimination {
+    /// Factors a square A, to the end also if a pivot is zero.
     pub(crate) fn new(a: &DMatrix<f64>) -> Self {
         let n = a.nrows();
         let mut lu = Self { factors: a.clone(), swaps: Vec::with_capacity(n), singular: None };
@@ -84,7 +85,7 @@ impl Elimination {
         lu
     }
 
-    /// Solves A X = B.
+    /// Solves A X = B for an A that is not singular.
     pub(crate) fn solve(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         let mut right = b.clone();
         for (step, &pivot) in self.swaps.iter().enumerate() {

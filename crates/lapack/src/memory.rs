@@ -5,8 +5,10 @@ use nalgebra::DMatrix;
 
 /// A number in single or double precision; all arithmetic is in double precision.
 pub(crate) trait Number: Copy + Into<f64> {
+    /// Rounds to this precision.
     fn narrow(value: f64) -> Self;
 
+    /// Converts to double precision.
     fn wide(self) -> f64 {
         self.into()
     }
@@ -43,6 +45,7 @@ impl Part {
         }
     }
 
+    /// Whether the entry belongs to this part.
     fn holds(self, row: usize, col: usize) -> bool {
         match self {
             Self::All => true,
@@ -52,7 +55,7 @@ impl Part {
     }
 }
 
-/// An array of `rows` x `cols` entries, column by column, `step` entries from one to the next.
+/// An array of `rows` x `cols` entries, column by column, `step` entries from one column to the next.
 #[derive(Clone, Copy)]
 pub(crate) struct Layout {
     pub(crate) rows: usize,
@@ -61,7 +64,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// None when a size is negative or the leading dimension is shorter than a column.
+    /// None when a size is negative, or when the leading dimension is below one or shorter than a column.
     pub(crate) fn new(rows: i32, cols: i32, leading: i32) -> Option<Self> {
         let (rows, cols) = (usize::try_from(rows).ok()?, usize::try_from(cols).ok()?);
         let step = usize::try_from(leading).ok()?;
@@ -115,6 +118,7 @@ impl Vector {
         (increment != 0).then_some(Self { length, increment })
     }
 
+    /// The distance of entry `at`, from 0, from the pointer of the vector, in entries.
     fn offset(self, at: usize) -> usize {
         let step = self.increment.unsigned_abs() as usize;
         if self.increment < 0 { (self.length - 1 - at) * step } else { at * step }

@@ -11,7 +11,9 @@ pub(crate) struct Operand<T> {
     pub(crate) data: *const T,
     pub(crate) leading: i32,
     pub(crate) transpose: u8,
+    /// Rows of op(A).
     pub(crate) rows: i32,
+    /// Columns of op(A).
     pub(crate) cols: i32,
 }
 
@@ -45,13 +47,15 @@ impl<T: Number> Operand<T> {
 pub(crate) struct Target<T> {
     pub(crate) data: *mut T,
     pub(crate) leading: i32,
+    /// None for an illegal UPLO.
     pub(crate) part: Option<Part>,
     pub(crate) alpha: T,
     pub(crate) beta: T,
 }
 
 impl<T: Number> Target<T> {
-    /// C := alpha `product` + beta C; with beta = 0 C is not read.
+    /// C := alpha `product` + beta C; with beta = 0 C is not read. None, with C unchanged, if an argument
+    /// is illegal.
     ///
     /// # Safety
     ///
@@ -83,7 +87,8 @@ pub(crate) unsafe fn general<T: Number>(
     }
 }
 
-/// A triangle of C := alpha op(A) op(A)' + beta C with C of n x n and op(A) of n x k.
+/// A triangle of C := alpha op(A) op(A)' + beta C with C of n x n and op(A) of n x k; None, with C unchanged,
+/// if an argument is illegal.
 pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<()> {
     // SAFETY: the caller guarantees it.
     unsafe {
@@ -92,7 +97,8 @@ pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<
     }
 }
 
-/// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C.
+/// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C; None, with C unchanged, if an argument is
+/// illegal.
 pub(crate) unsafe fn rank_2k<T: Number>(
     a: &Operand<T>,
     b: &Operand<T>,
@@ -128,7 +134,7 @@ pub(crate) struct VectorTarget<T> {
     pub(crate) beta: T,
 }
 
-/// y := alpha op(A) x + beta y.
+/// y := alpha op(A) x + beta y; None, with y unchanged, if an argument is illegal.
 pub(crate) unsafe fn matrix_vector<T: Number>(
     a: &Operand<T>,
     x: &VectorOperand<T>,
@@ -143,7 +149,8 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
     Some(())
 }
 
-/// y := alpha A x + beta y with A symmetric, n x n, of which one triangle is read.
+/// y := alpha A x + beta y with A symmetric, n x n, of which one triangle is read; None, with y unchanged, if
+/// an argument is illegal.
 pub(crate) unsafe fn symmetric_vector<T: Number>(
     a: &Symmetric<T>,
     x: &VectorOperand<T>,

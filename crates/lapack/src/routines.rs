@@ -1,7 +1,7 @@
-//! The routines of LAPACK on arrays. Each returns its error code INFO.
+//! The routines of LAPACK on arrays. Their error is the code INFO.
 //!
-//! -i: argument i, from 1, is illegal; above 0: see the routine. The pointers of all routines are valid for the
-//! sizes that the arguments state.
+//! -i: argument i, from 1, is illegal; above 0: see the routine. The callers guarantee that the pointers are valid for
+//! the sizes that the arguments state.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::factor::{Elimination, backward, cholesky, forward};
@@ -10,6 +10,7 @@ use crate::spectrum::symmetric_eigen;
 use crate::svd::Svd;
 use nalgebra::DMatrix;
 
+/// INFO of an iteration that does not converge.
 const NOT_CONVERGED: i32 = 1;
 
 /// An array and its leading dimension.
@@ -71,7 +72,7 @@ pub(crate) unsafe fn potrs<T: Number>(
     Ok(())
 }
 
-/// Replaces B by the solution X of A X = B and A by its factors L and U; INFO k: pivot k is zero.
+/// Replaces B by the solution X of A X = B and A by its factors L and U; INFO k: pivot k is zero, B is unchanged.
 pub(crate) unsafe fn gesv<T: Number>(
     n: i32,
     right_sides: i32,
@@ -102,9 +103,13 @@ pub(crate) unsafe fn gesv<T: Number>(
 
 /// The output arrays of [`syevr`].
 pub(crate) struct Spectrum<T> {
+    /// M, the number of eigenvalues.
     pub(crate) count: *mut i32,
+    /// W.
     pub(crate) values: *mut T,
+    /// Z.
     pub(crate) vectors: Array<T>,
+    /// ISUPPZ, the first and the last row of each eigenvector.
     pub(crate) support: *mut i32,
 }
 
@@ -148,7 +153,8 @@ pub(crate) unsafe fn syevr<T: Number>(
     Ok(())
 }
 
-/// The number of singular vectors to compute: none, the `thin` ones that have a singular value, or `all`.
+/// The number of singular vectors to compute: none, the `thin` ones that have a singular value, or `all`; INFO
+/// -`argument` for another option.
 fn vectors(letter: u8, argument: i32, thin: i32, all: i32) -> Result<i32, i32> {
     match letter.to_ascii_uppercase() {
         b'N' => Ok(0),
@@ -158,15 +164,24 @@ fn vectors(letter: u8, argument: i32, thin: i32, all: i32) -> Result<i32, i32> {
     }
 }
 
-/// The output arrays of [`singular_values`], with the options JOBU and JOBVT.
-pub(crate) struct Factors<T> {
-    pub(crate) values: *mut T,
-    pub(crate) left: (u8, Array<T>),
-    pub(crate) right: (u8, Array<T>),
+/// The output array of the singular vectors of one side, and its option JOBU or JOBVT.
+pub(crate) struct Vectors<T> {
+    pub(crate) option: u8,
+    pub(crate) array: Array<T>,
 }
 
-/// Computes the singular value decomposition; INFO 1: not converged. `first` is the number of the
-/// argument M, which follows the options.
+/// The output arrays of [`singular_values`].
+pub(crate) struct Factors<T> {
+    /// S.
+    pub(crate) values: *mut T,
+    /// U.
+    pub(crate) left: Vectors<T>,
+    /// VT.
+    pub(crate) right: Vectors<T>,
+}
+
+/// Computes the singular value decomposition; INFO 1: not converged, or A has an infinite entry. `first` is
+/// the number of the argument M, which follows the options.
 pub(crate) unsafe fn singular_values<T: Number>(
     m: i32,
     n: i32,
@@ -175,11 +190,11 @@ pub(crate) unsafe fn singular_values<T: Number>(
     first: i32,
 ) -> Result<(), i32> {
     let thin = m.min(n);
-    let left = vectors(to.left.0, 1, thin, m)?;
-    let right = vectors(to.right.0, first - 1, thin, n)?;
+    let left = vectors(to.left.option, 1, thin, m)?;
+    let right = vectors(to.right.option, first - 1, thin, n)?;
     let layout = a.layout(size(m, first)?, size(n, first + 1)?, first + 3)?;
-    let u_layout = to.left.1.layout(if left == 0 { 0 } else { m }, left, first + 6)?;
-    let vt_layout = to.right.1.layout(right, if right == 0 { 0 } else { n }, first + 8)?;
+    let u_layout = to.left.array.layout(if left == 0 { 0 } else { m }, left, first + 6)?;
+    let vt_layout = to.right.array.layout(right, if right == 0 { 0 } else { n }, first + 8)?;
     // SAFETY: the caller guarantees it.
     let matrix = unsafe { layout.read(a.at, Part::All) };
     if matrix.iter().any(|entry| entry.is_nan()) {
@@ -191,8 +206,8 @@ pub(crate) unsafe fn singular_values<T: Number>(
         for (at, &value) in svd.values.iter().enumerate() {
             to.values.add(at).write(T::narrow(value));
         }
-        u_layout.write(to.left.1.at, &corner(&svd.u, u_layout), Part::All);
-        vt_layout.write(to.right.1.at, &corner(&svd.v.transpose(), vt_layout), Part::All);
+        u_layout.write(to.left.array.at, &corner(&svd.u, u_layout), Part::All);
+        vt_layout.write(to.right.array.at, &corner(&svd.v.transpose(), vt_layout), Part::All);
     }
     Ok(())
 }

@@ -31,7 +31,8 @@ pub(crate) fn symmetric_eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix
     None
 }
 
-/// Rotates in the plane of p and q so that m[p, q] becomes zero; false if it is negligible already.
+/// Rotates in the plane of p and q so that m[p, q] becomes zero; false if it is negligible, and set to zero
+/// without a rotation.
 fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) -> bool {
     let coupling = m[(p, q)];
     let scale = m[(p, p)].abs() + m[(q, q)].abs();
@@ -53,6 +54,7 @@ fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) ->
     true
 }
 
+/// The diagonal of `m`, ascending, and the columns of `v` in the same order.
 fn ascending(m: &DMatrix<f64>, v: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let mut order: Vec<usize> = (0..m.nrows()).collect();
     order.sort_by(|&i, &j| m[(i, i)].total_cmp(&m[(j, j)]));

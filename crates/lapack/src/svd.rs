@@ -25,15 +25,16 @@ impl Svd {
         Some(Self { u: transposed.v, values: transposed.values, v: transposed.u })
     }
 
+    /// Decomposes a matrix with at least as many rows as columns.
     fn tall(a: &DMatrix<f64>) -> Option<Self> {
+        if a.iter().any(|entry| !entry.is_finite()) {
+            return None;
+        }
         let size = a.amax();
         if size == 0.0 || a.is_empty() {
             let (rows, cols) = a.shape();
             let (u, v) = (DMatrix::identity(rows, rows), DMatrix::identity(cols, cols));
             return Some(Self { u, values: DVector::zeros(cols), v });
-        }
-        if !size.is_finite() || a.iter().any(|entry| entry.is_nan()) {
-            return None;
         }
         let (images, v) = orthogonal_images(a / size)?;
         let norms: Vec<f64> = images.column_iter().map(|column| column.norm()).collect();
@@ -73,7 +74,8 @@ fn orthogonal_images(mut images: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<
     None
 }
 
-/// Cosine and sine of the rotation that makes columns p and q orthogonal; None if they are already.
+/// Cosine and sine of the rotation that makes columns p and q orthogonal; None if they are orthogonal already,
+/// or one of them is negligible.
 fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
     let (a, b) = (m.column(p), m.column(q));
     let (first, second) = (a.norm(), b.norm());
@@ -91,7 +93,7 @@ fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
     Some((c, c * tangent))
 }
 
-/// Replaces columns a and b by c a - s b and s a + c b.
+/// Replaces columns a = m[p] and b = m[q] by c a - s b and s a + c b.
 pub(crate) fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
     for row in 0..m.nrows() {
         let (a, b) = (m[(row, p)], m[(row, q)]);

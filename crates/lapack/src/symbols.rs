@@ -9,7 +9,9 @@ use crate::products::{
     Operand, Symmetric, Target, VectorOperand, VectorTarget, general, matrix_vector, rank_2k,
     rank_k, symmetric_vector,
 };
-use crate::routines::{Array, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr};
+use crate::routines::{
+    Array, Factors, Spectrum, Vectors, gesv, potrf, potrs, singular_values, syevr,
+};
 
 /// The INFO of a result.
 fn code(answer: Result<(), i32>) -> i32 {
@@ -285,8 +287,8 @@ macro_rules! symbols {
                 *info = 0;
                 return;
             }
-            let left = (*jobz, Array { at: u, leading: *ldu });
-            let right = (*jobz, Array { at: vt, leading: *ldvt });
+            let left = Vectors { option: *jobz, array: Array { at: u, leading: *ldu } };
+            let right = Vectors { option: *jobz, array: Array { at: vt, leading: *ldvt } };
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
@@ -321,8 +323,8 @@ macro_rules! symbols {
                 *info = 0;
                 return;
             }
-            let left = (*jobu, Array { at: u, leading: *ldu });
-            let right = (*jobvt, Array { at: vt, leading: *ldvt });
+            let left = Vectors { option: *jobu, array: Array { at: u, leading: *ldu } };
+            let right = Vectors { option: *jobvt, array: Array { at: vt, leading: *ldvt } };
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
