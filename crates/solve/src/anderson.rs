@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::secants::{Filters, Secants};
+use super::secants::{Evaluation, Filters, Secants};
 use super::{Convergence, Progress, Scale, Solver};
 
 /// Relative norm, after orthogonalisation, below which a difference is dropped as linearly dependent.
@@ -21,8 +21,7 @@ const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-10 };
 pub struct Anderson {
     convergence: Convergence,
     secants: Secants,
-    /// Residual and values of the last evaluation.
-    last: (Vec<f64>, Vec<f64>),
+    last: Evaluation,
 }
 
 impl Anderson {
@@ -32,11 +31,7 @@ impl Anderson {
     pub fn new(scale: Scale, limit: u32, depth: usize) -> Self {
         let n = scale.len();
         let secants = Secants::new(n, depth.clamp(1, n.max(1)));
-        Self {
-            convergence: Convergence::new(scale, limit),
-            secants,
-            last: (vec![0.0; n], vec![0.0; n]),
-        }
+        Self { convergence: Convergence::new(scale, limit), secants, last: Evaluation::new(n) }
     }
 }
 

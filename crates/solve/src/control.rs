@@ -22,6 +22,7 @@ pub struct SizeBounds {
 }
 
 impl SizeBounds {
+    /// The nearest size within the bounds; the smallest one if they are reversed.
     fn clamp(self, size: f64) -> f64 {
         size.min(self.largest).max(self.smallest)
     }
@@ -36,6 +37,7 @@ impl SizeBounds {
 /// Runge-Kutta methods"; exponents: Hairer and Wanner 1996, section IV.2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Law {
+    /// q.
     exponent: f64,
     /// `e_before / e_0`; 1 without a previous error.
     before: f64,
@@ -46,6 +48,7 @@ impl Law {
         Self { exponent, before: 1.0 }
     }
 
+    /// Returns `H_next / H`, from 0.2 to 5, and keeps the error for the next step.
     fn factor(&mut self, error: f64) -> f64 {
         let now = error.max(ERROR_FLOOR) / SAFETY.powf(self.exponent);
         let (proportional, integral) = (0.4 / self.exponent, 0.3 / self.exponent);
@@ -90,8 +93,9 @@ pub enum Verdict {
 pub struct ErrorControl {
     bounds: SizeBounds,
     law: Law,
-    /// The size asked for last.
+    /// The last size that the controller returned.
     requested: f64,
+    /// Whether the last step was rejected.
     rejected: bool,
 }
 
@@ -106,7 +110,8 @@ impl ErrorControl {
 
     /// Accepts or rejects a step of `size` s with this error; NaN counts as infinite.
     ///
-    /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
+    /// The step after a repeated one is not larger than it. A step that was shortened to end at an event or a stop
+    /// time does not shorten the following steps.
     pub fn judge(&mut self, size: f64, error: f64) -> Verdict {
         if error.is_nan() || error > 1.0 {
             return self.reject(size, error);
@@ -124,6 +129,7 @@ impl ErrorControl {
         Verdict::Accepted { next: self.requested }
     }
 
+    /// Rejects a step; [`Verdict::Stuck`] for the smallest one.
     fn reject(&mut self, size: f64, error: f64) -> Verdict {
         if size <= self.bounds.smallest {
             return Verdict::Stuck;
@@ -147,7 +153,7 @@ impl ErrorControl {
 pub struct ForwardControl {
     bounds: SizeBounds,
     law: Law,
-    /// The size asked for last.
+    /// The last size that the controller returned.
     requested: f64,
 }
 
@@ -218,7 +224,9 @@ impl Bond {
 pub struct EnergyControl {
     control: ForwardControl,
     relative: f64,
+    /// `absolute N_k`, above zero.
     floors: Vec<f64>,
+    /// The largest power `P_k` of each bond so far.
     largest: Vec<f64>,
 }
 
@@ -242,7 +250,8 @@ impl EnergyControl {
         }
     }
 
-    /// Returns the measure e of a step from the bonds at its end.
+    /// Returns the measure e of a step from the bonds at its end, as many as nominals; 0 without bonds. Updates the
+    /// largest powers.
     pub fn measure(&mut self, bonds: &[Bond]) -> f64 {
         if bonds.is_empty() {
             return 0.0;
@@ -262,7 +271,7 @@ impl EnergyControl {
         self.control.next(size, measure)
     }
 
-    /// Forgets the last measure, as after an event.
+    /// Clears the previous measure, for example after an event. The largest powers are kept.
     pub fn forget(&mut self) {
         self.control.forget();
     }

@@ -9,7 +9,9 @@ pub struct Factors {
     n: usize,
     /// L below the diagonal, U on and above it, column by column.
     entries: Vec<f64>,
+    /// For each column the row that was swapped with its diagonal.
     pivots: Vec<usize>,
+    /// Memory for a column of the inverse.
     unit: Vec<f64>,
 }
 
@@ -45,6 +47,7 @@ impl Factors {
         (0..self.n).all(|column| self.eliminate(column))
     }
 
+    /// Eliminates the entries below the diagonal of a column; returns false if its pivot is zero or not finite.
     fn eliminate(&mut self, column: usize) -> bool {
         let n = self.n;
         let size = |row: usize| self.entries[column * n + row].abs();

@@ -66,9 +66,9 @@ pub fn components(count: usize, edges: &[(usize, usize)]) -> Components {
         size[owner] += 1;
         lowest[owner] = lowest[owner].min(node);
     }
-    let mut looped: Vec<bool> = size.iter().map(|size| *size > 1).collect();
-    let selves = edges.iter().filter(|(from, to)| from == to && *from < count);
-    selves.for_each(|(node, _)| looped[component[*node]] = true);
+    let mut is_loop: Vec<bool> = size.iter().map(|size| *size > 1).collect();
+    let self_edges = edges.iter().filter(|(from, to)| from == to && *from < count);
+    self_edges.for_each(|(node, _)| is_loop[component[*node]] = true);
 
     let order =
         kahn(&AdjacencyLists::new(number, between.filter(|(from, to)| from != to)), &lowest);
@@ -83,16 +83,18 @@ pub fn components(count: usize, edges: &[(usize, usize)]) -> Components {
         nodes[fill[owner]] = node;
         fill[owner] += 1;
     }
-    Components { nodes, starts, loops: order.iter().map(|&owner| looped[owner]).collect() }
+    Components { nodes, starts, loops: order.iter().map(|&owner| is_loop[owner]).collect() }
 }
 
 /// Adjacency lists of a graph, stored consecutively.
 struct AdjacencyLists {
+    /// Start of the list of each node in `entries`, and the end of the last list.
     starts: Vec<usize>,
     entries: Vec<usize>,
 }
 
 impl AdjacencyLists {
+    /// Creates the lists of `count` nodes; edges with a node not below `count` are left out.
     fn new(count: usize, edges: impl Iterator<Item = (usize, usize)> + Clone) -> Self {
         let edges = edges.filter(|(from, to)| *from < count && *to < count);
         let mut starts = vec![0; count + 1];
@@ -118,7 +120,7 @@ impl AdjacencyLists {
     }
 }
 
-/// Returns the component of each node and the number of components (Tarjan 1972).
+/// Returns the component of each node, from 0, and the number of components (Tarjan 1972).
 fn tarjan(successors: &AdjacencyLists) -> (Vec<usize>, usize) {
     const NEW: usize = usize::MAX;
     let count = successors.len();
@@ -163,19 +165,19 @@ fn tarjan(successors: &AdjacencyLists) -> (Vec<usize>, usize) {
     (component, number)
 }
 
-/// Returns the nodes of an acyclic graph in topological order, by `rank` where several are possible
-/// (Kahn 1962).
+/// Returns the nodes of an acyclic graph in topological order; among several possible next nodes the one of
+/// the lowest `rank` comes first (Kahn 1962).
 fn kahn(successors: &AdjacencyLists, rank: &[usize]) -> Vec<usize> {
-    let mut waits = vec![0_usize; successors.len()];
-    successors.entries.iter().for_each(|&to| waits[to] += 1);
-    let free = (0..waits.len()).filter(|&node| waits[node] == 0);
-    let mut heap: BinaryHeap<_> = free.map(|node| Reverse((rank[node], node))).collect();
-    let mut order = Vec::with_capacity(waits.len());
+    let mut predecessors = vec![0_usize; successors.len()];
+    successors.entries.iter().for_each(|&to| predecessors[to] += 1);
+    let sources = (0..predecessors.len()).filter(|&node| predecessors[node] == 0);
+    let mut heap: BinaryHeap<_> = sources.map(|node| Reverse((rank[node], node))).collect();
+    let mut order = Vec::with_capacity(predecessors.len());
     while let Some(Reverse((_, node))) = heap.pop() {
         order.push(node);
         for &to in successors.neighbours(node) {
-            waits[to] -= 1;
-            if waits[to] == 0 {
+            predecessors[to] -= 1;
+            if predecessors[to] == 0 {
                 heap.push(Reverse((rank[to], to)));
             }
         }

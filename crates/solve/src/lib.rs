@@ -3,9 +3,9 @@
 //!
 //! The connected values u of a loop are a fixed point, `u = G(u)`: G sets the inputs u, steps the
 //! slaves or evaluates their outputs, and returns the resulting values of the connections. A
-//! [`Solver`] receives u and G(u) and returns the next u to evaluate. It never calls G, so that the
-//! caller keeps control of the slaves. Solvers of other libraries call G themselves; the solvers here also
-//! allocate nothing between steps and can be serialised into a checkpoint:
+//! [`Solver`] receives u and G(u) and returns the next u to evaluate. It never calls G, unlike solvers of
+//! other libraries, so that the caller keeps control of the slaves. The solvers allocate nothing while
+//! they iterate and can be serialised into a checkpoint:
 //!
 //! ```
 //! use solve::{Anderson, Progress, Scale, Solver};
@@ -50,8 +50,8 @@ use serde::{Deserialize, Serialize};
 
 /// Ratio of a residual to the first one above which the iteration counts as diverged.
 const DIVERGENCE: f64 = 1e12;
-/// Ratio of the last residual to the first one required for convergence. A residual that is only small
-/// relative to a growing u is no solution.
+/// Ratio of the last residual to the first one required for convergence, unless the residual is within
+/// the tolerances at the first u. A residual that is only small relative to a growing u is no solution.
 const REDUCTION: f64 = 0.1;
 
 /// The weights of a difference of values, component by component:
@@ -66,7 +66,7 @@ pub struct Scale {
 impl Scale {
     /// Creates a scale from a relative and an absolute tolerance and the nominal value of each component.
     ///
-    /// A tolerance that is not above zero is replaced by the machine epsilon. Nominals count by their
+    /// A tolerance that is NaN or not above zero is replaced by the machine epsilon. Nominals count by their
     /// absolute value; zero, NaN and infinity are replaced by 1.
     #[must_use]
     pub fn new(relative: f64, absolute: f64, nominals: Vec<f64>) -> Self {
@@ -97,14 +97,14 @@ impl Scale {
         &self.nominals
     }
 
-    /// Returns the weight `w_i` of component `index` for the values `a` and `b`.
+    /// Returns the weight `w_i` of component `index`, from 0, for the values `a` and `b`.
     #[must_use]
     pub fn weight(&self, index: usize, a: f64, b: f64) -> f64 {
         self.absolute * self.nominals[index] + self.relative * a.abs().max(b.abs())
     }
 
     /// Returns `max_i |a_i - b_i| / w_i`: at most 1 if a and b agree within the tolerances; infinite if
-    /// a value is not finite.
+    /// a value or the difference of two is not finite, 0 without components.
     #[must_use]
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut largest = 0.0_f64;
@@ -139,14 +139,15 @@ pub enum Progress {
         /// `max_i |G_i(u) - u_i| / w_i`, required to be at most 1.
         residual: f64,
     },
-    /// A value is not finite, or the residual exceeds 1e12 times the first one.
+    /// A value of u or G(u) or the next step is not finite, or the residual exceeds 1e12 times the first one.
     Diverged {
         /// Evaluations of G.
         iterations: u32,
     },
     /// `I - dG/du` is numerically singular: the loop has no solution or no unique one.
     Singular {
-        /// Condition number of the matrix, with the unknowns divided by their nominals.
+        /// Bound `(1 + |M|) |M^-1|` of the condition number of the matrix M in the 1-norm, with the unknowns
+        /// divided by their nominals; infinite if M has no inverse or is not finite.
         condition: f64,
     },
 }
@@ -156,12 +157,12 @@ pub trait Solver: Send {
     /// Starts a new solution.
     fn begin(&mut self);
 
-    /// Takes `g = G(u)` and computes the next u: `u_next`, if the result is [`Progress::Evaluate`].
-    /// All three slices have the length of the [`Scale`].
+    /// Takes `g = G(u)` and computes the next u. It is in `u_next` if the result is [`Progress::Evaluate`];
+    /// otherwise `u_next` may hold anything. All three slices have the length of the [`Scale`].
     fn next(&mut self, u: &[f64], g: &[f64], u_next: &mut [f64]) -> Progress;
 
     /// Sets column `column` of `dG/du`, the derivative of G with respect to this component of u.
-    /// Call it only after [`Progress::Matrix`].
+    /// Call it only after [`Progress::Matrix`]; a solver that never requests the matrix ignores it.
     fn set_column(&mut self, column: usize, values: &[f64]) {
         let _ = (column, values);
     }
@@ -186,7 +187,9 @@ pub trait Solver: Send {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Convergence {
     scale: Scale,
+    /// The largest number of evaluations of G.
     limit: u32,
+    /// The evaluations of G in this solution.
     iterations: u32,
     /// G(u) - u.
     residual: Vec<f64>,

@@ -7,7 +7,7 @@ use super::{Convergence, Progress, Scale, Solver};
 
 /// Ratio of two consecutive residuals above which the solver requests a new matrix.
 const SLOW_DECREASE: f64 = 0.3;
-/// The smallest damping factor.
+/// The smallest damping factor, after which the solver requests a new matrix.
 const SHORTEST: f64 = 1.0 / 64.0;
 /// Required decrease of the residual relative to the decrease that a linear model predicts (Armijo
 /// condition).
@@ -44,7 +44,8 @@ pub struct Newton {
     /// `I - dG/du`, column by column, for unknowns divided by their nominals.
     matrix: Vec<f64>,
     factors: Factors,
-    /// Whether `factors` are usable: not before the first regular matrix, nor after [`Solver::forget`].
+    /// Whether `factors` are usable: not before the first matrix, after a singular one or after
+    /// [`Solver::forget`].
     known: bool,
     /// The start u of the last step.
     base: Vec<f64>,
@@ -78,6 +79,7 @@ impl Newton {
         }
     }
 
+    /// Requests the matrix at the present u.
     fn request_matrix(&mut self) -> Progress {
         self.stage = Stage::MatrixRequested;
         Progress::Matrix
@@ -95,7 +97,7 @@ impl Newton {
         if self.known { Ok(()) } else { Err(Progress::Singular { condition }) }
     }
 
-    /// Computes a step with the last matrix; `None` if its direction is not finite.
+    /// Computes an undamped step from `u` with the last matrix; `None` if its direction is not finite.
     fn step(&mut self, u: &[f64], u_next: &mut [f64]) -> Option<Progress> {
         let nominals = self.convergence.scale.nominals();
         for ((entry, residual), nominal) in
@@ -116,7 +118,7 @@ impl Newton {
         Some(self.write_next(u_next))
     }
 
-    /// Does one step of iterative refinement (Golub and Van Loan 2013, section 3.5.3).
+    /// Refines the direction by one step of iterative refinement (Golub and Van Loan 2013, section 3.5.3).
     fn refine(&mut self) {
         let n = self.base.len();
         let nominals = self.convergence.scale.nominals();
@@ -144,7 +146,9 @@ impl Newton {
         Progress::Evaluate
     }
 
-    /// Corrects the last step if the residual did not decrease enough: damps it, or returns to its start.
+    /// Handles a last step that did not decrease the residual enough: with an old matrix it returns to the
+    /// start of the step, otherwise it halves the step; after the shortest step, or a slow decrease, it
+    /// requests the matrix. `None` if the decrease is fast enough.
     fn correct(&mut self, u_next: &mut [f64]) -> Option<Progress> {
         let merit = self.convergence.merit;
         if merit > self.before * (1.0 - DESCENT * self.part) {

@@ -2,23 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::secants::{Filters, Secants};
+use super::secants::{Evaluation, Filters, Secants};
 use super::{Convergence, Progress, Scale, Solver};
 
 /// Relative norms, after orthogonalisation, below which differences of this and of earlier solutions are
 /// dropped as linearly dependent.
 const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-3 };
-/// Relaxation factor of the first step of all.
+/// Relaxation factor of a step without differences.
 const RELAXATION: f64 = 0.1;
-/// Largest number of stored differences.
+/// Largest number of stored differences, if there are more unknowns.
 const MAX_DIFFERENCES: usize = 100;
 
 /// Interface quasi-Newton iteration with a least squares model of the inverse (IQN-ILS):
 /// `u_next = G(u) + W c`.
 ///
 /// c is the least squares solution of `V c = -r`, r the residual `G(u) - u`; the columns of V and W are
-/// differences of residuals and of values of G in this and in earlier solutions. The first step of all
-/// is relaxed, `u_next = u + 0.1 r`.
+/// differences of residuals and of values of G in this and in earlier solutions. A step without
+/// differences, the first of all or after [`Solver::forget`], is relaxed, `u_next = u + 0.1 r`.
 ///
 /// Degroote, Bathe and Vierendeels 2009, "Performance of a new partitioned procedure versus a
 /// monolithic procedure in fluid-structure interaction", section 4. Differences of earlier solutions are
@@ -28,8 +28,9 @@ const MAX_DIFFERENCES: usize = 100;
 pub struct QuasiNewton {
     convergence: Convergence,
     secants: Secants,
+    /// The number of solutions for which a difference is reused.
     reuse: u32,
-    last: (Vec<f64>, Vec<f64>),
+    last: Evaluation,
 }
 
 impl QuasiNewton {
@@ -39,12 +40,8 @@ impl QuasiNewton {
     pub fn new(scale: Scale, limit: u32, reuse: u32) -> Self {
         let n = scale.len();
         let secants = Secants::new(n, n.clamp(1, MAX_DIFFERENCES));
-        Self {
-            convergence: Convergence::new(scale, limit),
-            secants,
-            reuse,
-            last: (vec![0.0; n], vec![0.0; n]),
-        }
+        let last = Evaluation::new(n);
+        Self { convergence: Convergence::new(scale, limit), secants, reuse, last }
     }
 }
 

@@ -18,9 +18,12 @@ use serde::{Deserialize, Serialize};
 /// for each part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bracket {
+    /// Time and value of the left end.
     left: (f64, f64),
+    /// Time and value of the right end.
     right: (f64, f64),
     width: f64,
+    /// `kappa_1`.
     truncation: f64,
     /// Half the widest bracket that bisection can still narrow to `width` with the remaining values.
     radius: f64,
@@ -30,9 +33,9 @@ pub struct Bracket {
 
 impl Bracket {
     /// Creates a bracket from two points (time in s, value), to be narrowed to `width` s; `None` if the
-    /// signs are equal or a number is not finite.
+    /// signs are equal, a time or value is not finite, or `left` is not before `right`.
     ///
-    /// A width below the resolution of double precision is replaced by that resolution.
+    /// A width that is NaN or below the resolution of double precision is replaced by that resolution.
     #[must_use]
     pub fn new(left: (f64, f64), right: (f64, f64), width: f64) -> Option<Self> {
         let all = [left.0, left.1, right.0, right.1];
@@ -76,7 +79,7 @@ impl Bracket {
         Some(if inside { projected } else { middle })
     }
 
-    /// Narrows the bracket by the value at the time that [`ask`](Self::ask) returned.
+    /// Narrows the bracket by the value at the time that [`ask`](Self::ask) returned; a NaN widens the gap.
     pub fn tell(&mut self, time: f64, value: f64) {
         if value.is_nan() {
             let (first, last) = self.gap.unwrap_or((time, time));

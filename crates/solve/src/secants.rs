@@ -14,18 +14,41 @@ const ROUNDING: f64 = 1e-11;
 /// performance of the partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Secants {
+    /// The number of unknowns.
     n: usize,
+    /// The number of slots, each of which holds a pair.
     capacity: usize,
-    /// Slots in use, the newest first; then the age of each slot in solutions.
+    /// The slots in use, the newest pair first.
     order: Vec<usize>,
+    /// The age of the pair in each slot, in solutions.
     ages: Vec<u32>,
+    /// The slots that are not in use.
     free: Vec<usize>,
+    /// dR, n entries for each slot.
     residuals: Vec<f64>,
+    /// dG, n entries for each slot.
     values: Vec<f64>,
-    /// The factor Q; then the triangle R (column by column), and `Q' r`, overwritten by c.
+    /// The factor Q, column by column.
     orthonormal: Vec<f64>,
+    /// The triangle R, column by column, `capacity` entries for each.
     triangle: Vec<f64>,
+    /// `Q' r`, overwritten by c.
     coefficients: Vec<f64>,
+}
+
+/// An evaluation of G.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Evaluation {
+    /// G(u) - u.
+    residual: Vec<f64>,
+    /// G(u).
+    value: Vec<f64>,
+}
+
+impl Evaluation {
+    pub(super) fn new(n: usize) -> Self {
+        Self { residual: vec![0.0; n], value: vec![0.0; n] }
+    }
 }
 
 /// The ratios of norms below which pairs are dropped as linearly dependent.
@@ -53,6 +76,7 @@ impl Secants {
         }
     }
 
+    /// Drops all pairs.
     pub(super) fn clear(&mut self) {
         self.free.append(&mut self.order);
         self.free.sort_unstable_by(|a, b| b.cmp(a));
@@ -77,13 +101,13 @@ impl Secants {
         });
     }
 
-    /// Adds the differences of `residual` and `g` from those of the evaluation `before`; drops the oldest pair if no
+    /// Adds the differences of `residual` and `g` from those of the `last` evaluation; drops the oldest pair if no
     /// slot is free.
-    fn push(&mut self, residual: &[f64], g: &[f64], before: &(Vec<f64>, Vec<f64>)) {
+    fn push(&mut self, residual: &[f64], g: &[f64], last: &Evaluation) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
-        let place = slot * self.n..(slot + 1) * self.n;
-        subtract(&mut self.residuals[place.clone()], residual, &before.0);
-        subtract(&mut self.values[place], g, &before.1);
+        let entries = slot * self.n..(slot + 1) * self.n;
+        subtract(&mut self.residuals[entries.clone()], residual, &last.residual);
+        subtract(&mut self.values[entries], g, &last.value);
         self.ages[slot] = 0;
         self.order.insert(0, slot);
     }
@@ -92,7 +116,7 @@ impl Secants {
     /// `first`, and copies it to `last`.
     pub(super) fn learn(
         &mut self,
-        last: &mut (Vec<f64>, Vec<f64>),
+        last: &mut Evaluation,
         residual: &[f64],
         g: &[f64],
         first: bool,
@@ -100,11 +124,12 @@ impl Secants {
         if !first {
             self.push(residual, g, last);
         }
-        last.0.copy_from_slice(residual);
-        last.1.copy_from_slice(g);
+        last.residual.copy_from_slice(residual);
+        last.value.copy_from_slice(g);
     }
 
-    /// Computes `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
+    /// Computes `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`, and drops
+    /// linearly dependent pairs. Without pairs `u_next` is g.
     pub(super) fn apply(
         &mut self,
         residual: &[f64],
@@ -135,7 +160,7 @@ impl Secants {
     }
 
     /// Computes column `rank` of Q and R from `slot`; returns false if its norm falls below the ratio
-    /// `filter`.
+    /// `filter`, is rounding beside the change of the values, or is NaN.
     fn orthogonalise(&mut self, slot: usize, rank: usize, weights: &[f64], filter: f64) -> bool {
         let n = self.n;
         let (done, rest) = self.orthonormal.split_at_mut(rank * n);
@@ -156,21 +181,21 @@ impl Secants {
                 }
             }
         }
-        let left = length(column);
+        let remainder = length(column);
         let change = &self.values[slot * n..(slot + 1) * n];
         let change = change.iter().zip(weights).map(|(value, weight)| (value / weight).powi(2));
-        if left <= filter * whole || left <= ROUNDING * change.sum::<f64>().sqrt() || left.is_nan()
-        {
+        let negligible = ROUNDING * change.sum::<f64>().sqrt();
+        if remainder <= filter * whole || remainder <= negligible || remainder.is_nan() {
             return false;
         }
-        triangle[rank] = left;
+        triangle[rank] = remainder;
         for entry in column {
-            *entry /= left;
+            *entry /= remainder;
         }
         true
     }
 
-    /// Computes the coefficients c from `R c = Q' residual`.
+    /// Computes the first `rank` coefficients c from `R c = Q' residual`.
     fn project(&mut self, rank: usize, residual: &[f64], weights: &[f64]) {
         for (column, entry) in self.orthonormal.chunks_exact(self.n).zip(&mut self.coefficients) {
             let products = column.iter().zip(residual).zip(weights);
