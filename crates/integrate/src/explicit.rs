@@ -43,9 +43,11 @@ const BEND: [f64; 7] = [
 
 /// The last step and the memory for the next one.
 pub(crate) struct Explicit {
+    /// The states at the end of the step.
     pub(crate) end: Vec<f64>,
     /// The estimate of the local error.
     pub(crate) error: Vec<f64>,
+    /// The derivatives of the seven stages.
     slopes: [Vec<f64>; 7],
     /// The argument of stage 6.
     stage: Vec<f64>,
@@ -62,7 +64,7 @@ impl Explicit {
         }
     }
 
-    /// Attempts the step from `start` over `size`.
+    /// Attempts the step from `start` over `size`; sets the end and the error. An error of `derivative` ends it.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
@@ -85,7 +87,7 @@ impl Explicit {
     }
 
     /// Returns an estimate of `size |lambda|` for the dominant eigenvalue of the Jacobian, from the two
-    /// derivatives at the end of the step. `weight` scales the components.
+    /// derivatives at the end of the step; 0 if both are at the same states. Components are divided by `weight`.
     pub(crate) fn stiffness(&self, size: f64, weight: impl Fn(usize) -> f64) -> f64 {
         let (mut slopes, mut states) = (0.0, 0.0);
         for i in 0..self.end.len() {
@@ -109,7 +111,7 @@ impl Explicit {
     }
 }
 
-/// Computes `base + size * sum(weight * slope)`.
+/// Computes `base + size * sum(weight * slope)`; without `base`, it is zero.
 fn combine(
     result: &mut [f64],
     base: Option<&[f64]>,

@@ -14,14 +14,17 @@ pub(crate) struct Inputs {
     references: Vec<u32>,
     /// Their start values in the description, 0 if there is none.
     starts: Vec<f64>,
+    /// Their polynomials.
     pub(crate) tracks: Vec<Track>,
-    /// The inputs with a derivative other than zero, their value references and present values.
+    /// The indices of the inputs with a derivative other than zero.
     moving: Vec<usize>,
+    /// The value references of `moving`.
     moving_references: Vec<u32>,
+    /// Memory for the values of `moving`.
     moving_values: Vec<f64>,
 }
 
-/// The course of one input: `value + sum(derivatives[k] (t - origin)^(k + 1) / (k + 1)!)`.
+/// The polynomial of one input: `value + sum(derivatives[k] (t - origin)^(k + 1) / (k + 1)!)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Track {
     origin: f64,
@@ -30,6 +33,7 @@ pub(crate) struct Track {
 }
 
 impl Track {
+    /// The value at `time`.
     fn at(&self, time: f64) -> f64 {
         let distance = time - self.origin;
         let (mut value, mut factor) = (self.value, 1.0);
@@ -68,7 +72,8 @@ impl Inputs {
         }
     }
 
-    /// Reads the values at the start. An input that the FMU does not let read has its start value.
+    /// Reads the values at the start of the simulation; the derivatives are zero. An input whose value the FMU
+    /// refuses to return has its start value.
     pub(crate) fn read(
         &mut self,
         instance: &mut dyn ModelExchange,
@@ -87,6 +92,7 @@ impl Inputs {
         Ok(())
     }
 
+    /// The index of an input.
     fn find(&self, reference: u32) -> Option<usize> {
         self.references.binary_search(&reference).ok()
     }
@@ -96,7 +102,7 @@ impl Inputs {
         references.iter().all(|&reference| self.find(reference).is_some())
     }
 
-    /// Records values set at `time`; their derivatives become zero.
+    /// Records values set at `time`; their derivatives become zero. Ignores variables that are no continuous inputs.
     pub(crate) fn record(&mut self, time: f64, references: &[u32], values: &[f64]) {
         for (&reference, &value) in references.iter().zip(values) {
             if let Some(input) = self.find(reference) {
@@ -105,7 +111,12 @@ impl Inputs {
         }
     }
 
-    /// Records derivatives at `time`.
+    /// Records derivatives at `time`. If the polynomial has another origin, it moves to `time` and the other
+    /// derivatives become zero.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::InvalidAnswer`] for a variable that is no continuous input, or an order that is not 1 to 3.
     pub(crate) fn derive(
         &mut self,
         time: f64,
@@ -136,7 +147,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// Collects the inputs that change within the coming step.
+    /// Collects the inputs that change within the next communication step, for [`Inputs::apply`].
     pub(crate) fn prepare(&mut self) {
         self.moving.clear();
         self.moving_references.clear();
@@ -150,7 +161,7 @@ impl Inputs {
         }
     }
 
-    /// Sets the inputs to their values at `time`.
+    /// Sets the inputs that change to their values at `time`.
     pub(crate) fn apply(
         &mut self,
         instance: &mut dyn ModelExchange,

@@ -42,7 +42,7 @@ enum Mode {
     Continuous,
 }
 
-/// The present point, as far as numbers of a fixed count describe it.
+/// The present point, except for the arrays of states, indicators and inputs.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Point {
     /// The time in s.
@@ -56,6 +56,7 @@ struct Point {
     event: bool,
     /// Whether inputs may have changed since the event indicators were read.
     input_changed: bool,
+    /// The memory of the integrator, in a saved point only.
     memory: Memory,
 }
 
@@ -90,12 +91,12 @@ fn clocks_of(description: &ModelDescription) -> Vec<u32> {
 /// A model-exchange instance that is integrated from one communication point to the next.
 ///
 /// The description is that of the FMU, with an element `CoSimulation` that states what this slave offers:
-/// steps of any size, inputs with derivatives up to order 3, and FMU states if the FMU has them.
+/// steps of any size, inputs with derivatives up to order 3, event mode, and FMU states if the FMU has them.
 ///
-/// The relative tolerance is that of `setup_experiment`, otherwise 1e-6; the absolute tolerance of a
-/// state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets
-/// follow their derivatives within the step. Other variables that it changes after initialization cause
-/// an event, as the standard demands, if the value is a new one.
+/// The relative tolerance is that of `setup_experiment` if it is finite and above zero, otherwise 1e-6; the absolute
+/// tolerance of a state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets
+/// follow their derivatives within the step. Other variables that it changes after initialization cause an event, as
+/// the standard demands, if the value is a new one.
 ///
 /// Where an event coincides with the end of a step, it belongs to this step: the outputs are those after
 /// the event. A master that handles the events ([`Slave::hand_over_events`]) reads them after its iteration.
@@ -109,19 +110,25 @@ pub struct Integrated {
     inputs: Inputs,
     /// Value references of clocks.
     clocks: Vec<u32>,
-    /// Whether the master handles the events, and whether a step then ends at the first one.
+    /// Whether the master handles the events.
     hands_over: bool,
+    /// Whether a step then ends at the first event.
     stops: bool,
     /// Whether the present event has changed the nominal values of the states.
     nominals_changed: bool,
-    /// The continuous states, and the event indicators at the present point.
+    /// The continuous states at the present point.
     states: Vec<f64>,
+    /// The event indicators at the present point.
     indicators: Vec<f64>,
     /// States and event indicators within a step.
     search: step::Search,
+    /// The saved states of the integration, by slot.
     saved: Vec<Saved>,
+    /// Memory for the present values of Integers that the master sets.
     integers: Vec<i64>,
+    /// Memory for the present values of Booleans and clocks that the master sets.
     booleans: Vec<i32>,
+    /// Memory for the present values of Reals that the master sets.
     reals: Vec<f64>,
 }
 
@@ -153,9 +160,9 @@ impl Integrated {
         }
     }
 
-    /// Wraps a new instance as a slave, with the method called `method`; an unknown one is the default.
+    /// Wraps a new instance as a slave, with the method called `method`, or the default if there is none of this name.
     ///
-    /// The form in which a worker of `fmu-import` calls an integrator.
+    /// A worker of `fmu-import` calls integrators in this form.
     #[must_use]
     pub fn boxed(instance: Box<dyn ModelExchange>, method: &str) -> Box<dyn Slave> {
         let method = method.parse().unwrap_or_default();
@@ -166,6 +173,7 @@ impl Integrated {
     fn describe(&mut self) {
         self.description = description_of(self.instance.description());
         self.inputs = Inputs::new(&self.description);
+        self.clocks = clocks_of(&self.description);
     }
 
     /// Allocates what depends on the numbers of states and event indicators.
@@ -178,7 +186,7 @@ impl Integrated {
         Ok(())
     }
 
-    /// Returns the tolerances of the states. Nominal values that the FMU does not state are 1.
+    /// Returns the tolerances of the states. All nominal values are 1 if the FMU refuses to return them.
     fn scale(&mut self) -> Result<Scale, CallError> {
         let mut nominals = vec![1.0; self.states.len()];
         if !nominals.is_empty() {
@@ -191,7 +199,7 @@ impl Integrated {
         Ok(Scale::new(self.tolerance, ABSOLUTE * self.tolerance, nominals))
     }
 
-    /// Returns the name of a continuous state.
+    /// Returns words for a continuous state: with the name of its derivative, otherwise with its number, from 1.
     fn name_of_state(&self, index: usize) -> String {
         let variables = &self.description.variables;
         let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
@@ -203,7 +211,7 @@ impl Integrated {
         )
     }
 
-    /// Returns the error of a step that could not be made.
+    /// Returns the error of an integration that stopped with `error`.
     fn stopped(&self, error: StepError) -> CallError {
         let (size, state, is_finite, cause) = match error {
             StepError::Call(error) => return error,

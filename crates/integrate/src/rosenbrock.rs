@@ -9,6 +9,7 @@ use solve::Factors;
 
 use crate::start::StepStart;
 
+/// The coefficient of the Jacobian in every stage.
 const GAMMA: f64 = 0.25;
 
 /// Nodes of the stages 2 to 6.
@@ -67,14 +68,20 @@ const EXTENSION: [[f64; 5]; 2] = [
 
 /// The last step and the memory for the next one.
 pub(crate) struct Rosenbrock {
+    /// The states at the end of the step.
     pub(crate) end: Vec<f64>,
+    /// The increments of the six stages.
     increments: [Vec<f64>; 6],
+    /// The argument of a stage.
     argument: Vec<f64>,
+    /// The right-hand side of a stage, then its increment.
     slope: Vec<f64>,
     /// Column by column.
     jacobian: Vec<f64>,
+    /// `I / (gamma size)` less the Jacobian, column by column.
     matrix: Vec<f64>,
     factors: Factors,
+    /// The derivative of the right-hand side with respect to time.
     with_time: Vec<f64>,
 }
 
@@ -94,7 +101,7 @@ impl Rosenbrock {
     }
 
     /// Computes the Jacobian and the derivative with respect to time at the start of a step of about
-    /// `size`. `typical` is the size of a component.
+    /// `size`. `typical` is the least size of a component for its difference quotient.
     pub(crate) fn linearise<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
@@ -126,8 +133,8 @@ impl Rosenbrock {
         Ok(())
     }
 
-    /// The largest sum of a row of the Jacobian, with components divided by `weight`: a bound of its
-    /// eigenvalues.
+    /// The largest sum of magnitudes in a row of the Jacobian, with components divided by `weight`: a bound of
+    /// its eigenvalues.
     pub(crate) fn bound_of_eigenvalues(&self, weight: impl Fn(usize) -> f64) -> f64 {
         let n = self.end.len();
         let row = |i: usize| -> f64 {

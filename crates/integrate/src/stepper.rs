@@ -9,10 +9,11 @@ use crate::method::Method;
 use crate::rosenbrock::Rosenbrock;
 use crate::start::StepStart;
 
-/// Ratio of the chosen step to the largest step that meets the tolerance, and the bounds of the ratio of
-/// two steps.
+/// Ratio of the chosen step to the largest step that meets the tolerance.
 const SAFETY: f64 = 0.9;
+/// The smallest ratio of two consecutive steps.
 const SHRINK: f64 = 0.2;
+/// The largest ratio of two consecutive steps.
 const GROW: f64 = 5.0;
 /// The step after a trial step that cannot be evaluated, relative to it.
 const RETREAT: f64 = 0.25;
@@ -21,14 +22,15 @@ const STRETCH: f64 = 1.01;
 /// The size of a state below which its difference quotients do not depend on it, relative to its nominal
 /// value. Reactions have states far below their nominal value that matter.
 const SMALL: f64 = 1e-3;
-/// `size |lambda|` at the border of stability of the explicit method; so many steps there mean that the
-/// equations are stiff, and so many others in a row that they are not.
+/// `size |lambda|` at the border of stability of the explicit method.
 const BORDER: f64 = 3.25;
+/// Number of steps beyond [`BORDER`] after which the equations are stiff.
 const STIFF_STEPS: u32 = 15;
+/// Number of steps within [`BORDER`], in a row, after which the steps beyond it no longer count.
 const OTHER_STEPS: u32 = 6;
-/// `size |lambda|` at which the explicit method is stable with some room, and the number of steps in a
-/// row after which it is used again.
+/// `size |lambda|` at which the explicit method is stable with some room.
 const STABLE: f64 = 2.0;
+/// Number of steps within [`STABLE`], in a row, after which the explicit method is used again.
 const STABLE_STEPS: u32 = 5;
 
 /// What one step leaves to the next one.
@@ -40,8 +42,11 @@ pub(crate) struct Memory {
     error: f64,
     /// Whether the stiff method is in use.
     is_stiff: bool,
+    /// Number of steps of the explicit method beyond [`BORDER`].
     suspicious: u32,
+    /// Number of steps within [`BORDER`] since the last one beyond it.
     others: u32,
+    /// Number of steps of the stiff method within [`STABLE`], in a row.
     stable: u32,
 }
 
@@ -71,18 +76,22 @@ impl From<CallError> for StepError {
 
 /// Makes steps; keeps the last one for its continuous extension.
 pub(crate) struct Stepper {
+    /// What the last step leaves to the next one.
     pub(crate) memory: Memory,
     method: Method,
     scale: Scale,
     explicit: Explicit,
     /// The memory of the stiff method, allocated when it is first used.
     stiff: Option<Rosenbrock>,
-    /// The states, the derivative and the size of the last step.
+    /// The states at the start of the last step.
     start: Vec<f64>,
+    /// The derivative at the start of the last step; after a step of the explicit method, at its end.
     slope: Vec<f64>,
-    /// Whether `slope` is the derivative at the next start.
+    /// Whether `slope` is the derivative at the start of the next step.
     has_slope: bool,
+    /// The size of the last step in s.
     size: f64,
+    /// Whether the last step is one of the stiff method.
     last_is_stiff: bool,
 }
 
@@ -114,13 +123,14 @@ impl Stepper {
         self.has_slope = false;
     }
 
-    /// Forgets the step size too, because of an event.
+    /// Forgets the derivative, the step size and the error of the last step, because of an event.
     pub(crate) fn restart(&mut self) {
         self.has_slope = false;
         (self.memory.size, self.memory.error) = (0.0, 0.0);
     }
 
-    /// Makes one step from `states` at `time` to `limit` at most; returns the time reached.
+    /// Makes one step from `states` at `time` to `limit` at most, after trial steps that are shortened until one
+    /// meets the tolerance; returns the time reached. Without states it reaches `limit`.
     pub(crate) fn advance(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
@@ -202,7 +212,7 @@ impl Stepper {
         if self.last_is_stiff { 4.0 } else { 5.0 }
     }
 
-    /// Chooses the next step size (a PI controller, Gustafsson 1991) and method.
+    /// Chooses the size (by a PI controller, Gustafsson 1991) and the method of the next step.
     fn accept(&mut self, size: f64, error: f64, rejected: bool) {
         let order = self.order();
         let memory = &mut self.memory;
@@ -224,6 +234,7 @@ impl Stepper {
         }
     }
 
+    /// Selects the stiff method after [`STIFF_STEPS`] steps beyond the border of stability.
     fn look_for_stiffness(&mut self, size: f64) {
         if self.method != Method::Automatic {
             return;
@@ -244,6 +255,7 @@ impl Stepper {
         }
     }
 
+    /// Selects the explicit method after [`STABLE_STEPS`] steps in a row in which it would be stable.
     fn look_for_end_of_stiffness(&mut self, size: f64) {
         let (Method::Automatic, Some(method)) = (self.method, &self.stiff) else { return };
         let (scale, start) = (&self.scale, &self.start);
@@ -285,7 +297,7 @@ impl Stepper {
         for (i, end) in explicit.end.iter_mut().enumerate() {
             *end = start[i] + guess * slope[i];
         }
-        // The error estimate of the coming step is overwritten anyway.
+        // The memory of end and error is free until the next attempt.
         let bend = match derivative(time + guess, &explicit.end, &mut explicit.error) {
             Ok(()) => {
                 for (difference, slope) in explicit.error.iter_mut().zip(slope) {
@@ -321,7 +333,8 @@ impl Stepper {
     }
 }
 
-/// The root mean square of `values`, relative to the tolerances of the states from `a` to `b`.
+/// The root mean square of `values`, relative to the tolerances of the states from `a` to `b`; NaN if `b` is not
+/// finite.
 fn norm(scale: &Scale, values: &[f64], a: &[f64], b: &[f64]) -> f64 {
     let part = |(i, value): (usize, &f64)| (value / scale.weight(i, a[i], b[i])).powi(2);
     let sum: f64 = values.iter().enumerate().map(part).sum();

@@ -9,7 +9,8 @@ use super::{Integrated, Mode, TOLERANCE, failed};
 const GAP: f64 = 1e-6;
 
 impl Integrated {
-    /// Whether a variable that is no continuous input would get a new value.
+    /// Whether a variable that is no continuous input would get a new value; true if the FMU does not return the
+    /// present values.
     fn changes_discrete(&mut self, references: &[u32], values: &[f64]) -> bool {
         self.reals.resize(references.len(), 0.0);
         if self.instance.get_real(references, &mut self.reals).is_err() {
@@ -34,7 +35,7 @@ impl Integrated {
     }
 }
 
-/// Defines functions that the instance performs.
+/// Defines functions that call the same function of the instance.
 macro_rules! forward {
     ($($name:ident($($argument:ident: $kind:ty),*);)*) => {
         $(fn $name(&mut self, $($argument: $kind),*) -> Result<(), CallError> {
@@ -160,10 +161,10 @@ impl Slave for Integrated {
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
-        let at = self.point.time;
-        if !(size >= 0.0 && (time - at).abs() <= GAP * size.max(f64::EPSILON * at.abs())) {
+        let last = self.point.time;
+        if !(size >= 0.0 && (time - last).abs() <= GAP * size.max(f64::EPSILON * last.abs())) {
             return Err(failed(format!(
-                "cannot step from {time} s over {size} s: the last step ended at {at} s"
+                "cannot step from {time} s over {size} s: the last step ended at {last} s"
             )));
         }
         self.instance.begin_communication_step();

@@ -1,4 +1,4 @@
-//! Events: their iteration, and changes of variables that need one.
+//! Events: event mode, and the iteration of the discrete states.
 
 use fmu_description::number::seconds;
 use slave::{CallError, EventInfo, Events};
@@ -9,7 +9,7 @@ use super::{Integrated, Mode, failed};
 const ITERATIONS: usize = 1000;
 
 impl Integrated {
-    /// Enters event mode at the present point.
+    /// Enters event mode at the present point, unless the FMU is in it.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
         self.point.event = false;
         if self.point.mode == Mode::Continuous {
@@ -28,7 +28,11 @@ impl Integrated {
         Ok(info)
     }
 
-    /// Iterates the event and enters continuous-time mode, unless the FMU requests the end.
+    /// Iterates the event and enters continuous-time mode; stays in event mode if the FMU requests the end.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] of a call, or if the discrete states still change after 1000 iterations.
     pub(super) fn settle(&mut self) -> Result<(), CallError> {
         let mut iterations = 0;
         while self.update()?.discrete_states_need_update && !self.point.ends {
@@ -57,7 +61,7 @@ impl Integrated {
         Ok(())
     }
 
-    /// Reads states and event indicators. Not all FMUs say that an event changed the states.
+    /// Reads states and event indicators, the states always: not all FMUs report that an event changed them.
     fn read_point(&mut self) -> Result<(), CallError> {
         if !self.states.is_empty() {
             self.instance.get_continuous_states(&mut self.states)?;
@@ -82,7 +86,7 @@ impl Events for Integrated {
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        // In event mode already, this makes clocks tick.
+        // The call also makes clocks tick, in event mode too.
         if self.point.mode == Mode::Continuous || !self.clocks.is_empty() {
             self.instance.enter_event_mode()?;
         }
@@ -99,7 +103,7 @@ impl Events for Integrated {
     }
 }
 
-/// Returns an error if an indicator has no sign.
+/// Returns an error if an indicator is NaN, which has no sign.
 pub(super) fn check_indicators(time: f64, indicators: &[f64]) -> Result<(), CallError> {
     match indicators.iter().position(|indicator| indicator.is_nan()) {
         None => Ok(()),

@@ -9,7 +9,7 @@ use crate::inputs::Track;
 /// The state of the integration.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Saved {
-    /// `None` in a slot without a state.
+    /// The point with the memory of the integrator; `None` in a slot without a state.
     point: Option<Point>,
     states: Vec<f64>,
     indicators: Vec<f64>,
@@ -54,7 +54,8 @@ impl Integrated {
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
-    /// Restores both states from bytes of [`Integrated::serialize`]. On failure the integration is unchanged.
+    /// Restores both states from bytes of [`Integrated::serialize`]. On failure the state of the integration is
+    /// unchanged.
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
         let (saved, fmu_state) =
@@ -68,7 +69,7 @@ impl Integrated {
             return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&fmu_state)?;
-        // In a temporary slot behind those of the master.
+        // In a temporary slot after those of the master.
         let slot = self.saved.len();
         self.saved.push(saved);
         self.restore_integration(slot);

@@ -14,29 +14,39 @@ const ROUNDING: f64 = 1e-12;
 /// Width to which a state event is located, relative to the step of the integrator.
 const WIDTH: f64 = 1e-12;
 
-/// Memory for the search of a state event: times, event indicators before and after it, and those in
-/// between.
+/// The event indicators at a time.
+#[derive(Default)]
+struct Sample {
+    time: f64,
+    indicators: Vec<f64>,
+}
+
+/// Memory for the search of a state event.
 #[derive(Default)]
 pub(super) struct Search {
-    left: (f64, Vec<f64>),
-    right: (f64, Vec<f64>),
+    /// A time before the event.
+    left: Sample,
+    /// A time after the event.
+    right: Sample,
+    /// The event indicators at the time that was evaluated last.
     between: Vec<f64>,
+    /// The states at the time that was evaluated last.
     states: Vec<f64>,
 }
 
 impl Search {
     pub(super) fn new(states: usize, indicators: usize) -> Self {
-        let zeros = || vec![0.0; indicators];
+        let sample = || Sample { time: 0.0, indicators: vec![0.0; indicators] };
         Self {
-            left: (0.0, zeros()),
-            right: (0.0, zeros()),
-            between: zeros(),
+            left: sample(),
+            right: sample(),
+            between: vec![0.0; indicators],
             states: vec![0.0; states],
         }
     }
 }
 
-/// Returns the first event indicator whose sign differs: z > 0 or z <= 0.
+/// Returns the index of the first event indicator whose sign differs: z > 0 or z <= 0.
 fn changed(before: &[f64], after: &[f64]) -> Option<usize> {
     before.iter().zip(after).position(|(before, after)| (*before > 0.0) != (*after > 0.0))
 }
@@ -145,9 +155,9 @@ impl Integrated {
         Ok(())
     }
 
-    /// Reads the event indicators at `time` within the step from `start` to `end` into
-    /// `search.between`, the states into `search.states`.
-    fn look(&mut self, time: f64, start: f64, end: f64) -> Result<(), CallError> {
+    /// Computes the states at `time` within the step from `start` to `end` into `search.states`, and reads
+    /// the event indicators there into `search.between`.
+    fn evaluate(&mut self, time: f64, start: f64, end: f64) -> Result<(), CallError> {
         if !self.states.is_empty() {
             if time >= end {
                 self.search.states.copy_from_slice(self.stepper.end());
@@ -173,52 +183,55 @@ impl Integrated {
         if self.indicators.is_empty() {
             return Ok(None);
         }
-        self.search.left.0 = start;
-        self.search.left.1.copy_from_slice(&self.indicators);
+        self.search.left.time = start;
+        self.search.left.indicators.copy_from_slice(&self.indicators);
         for time in [start + 0.5 * (end - start), end] {
-            self.look(time, start, end)?;
-            let search = &mut self.search;
-            if changed(&search.left.1, &search.between).is_some() {
-                search.right.0 = time;
-                search.right.1.copy_from_slice(&search.between);
+            self.evaluate(time, start, end)?;
+            let Search { left, right, between, .. } = &mut self.search;
+            if changed(&left.indicators, between).is_some() {
+                right.time = time;
+                right.indicators.copy_from_slice(between);
                 return self.narrow(start, end).map(Some);
             }
-            search.left.0 = time;
-            search.left.1.copy_from_slice(&search.between);
+            left.time = time;
+            left.indicators.copy_from_slice(between);
         }
-        self.indicators.copy_from_slice(&self.search.left.1);
+        self.indicators.copy_from_slice(&self.search.left.indicators);
         Ok(None)
     }
 
-    /// Narrows the interval of `search`, in the step from `start` to `end`, around its first change of
-    /// sign; returns its end.
+    /// Narrows the interval from `search.left` to `search.right`, in the step from `start` to `end`, around
+    /// its first change of sign; returns the end of the interval, with the states there in `search.states`.
     fn narrow(&mut self, start: f64, end: f64) -> Result<f64, CallError> {
         let width = WIDTH * (end - start);
-        while let Some(index) = changed(&self.search.left.1, &self.search.right.1) {
+        while let Some(index) =
+            changed(&self.search.left.indicators, &self.search.right.indicators)
+        {
             let Search { left, right, .. } = &self.search;
-            let ends = ((left.0, left.1[index]), (right.0, right.1[index]));
-            // None if an indicator is infinite: the end of the interval is then as good as it gets.
-            let Some(mut bracket) = Bracket::new(ends.0, ends.1, width) else { break };
+            let [before, after] =
+                [left, right].map(|sample| (sample.time, sample.indicators[index]));
+            // None if an indicator is infinite: the interval cannot be narrowed then.
+            let Some(mut bracket) = Bracket::new(before, after, width) else { break };
             if bracket.ask().is_none() {
                 break;
             }
             while let Some(time) = bracket.ask() {
-                self.look(time, start, end)?;
-                let search = &mut self.search;
-                bracket.tell(time, search.between[index]);
-                let changes = (search.left.1[index] > 0.0) != (search.between[index] > 0.0);
-                let any = changed(&search.left.1, &search.between).is_some();
-                let side = if any { &mut search.right } else { &mut search.left };
-                side.0 = time;
-                side.1.copy_from_slice(&search.between);
+                self.evaluate(time, start, end)?;
+                let Search { left, right, between, .. } = &mut self.search;
+                bracket.tell(time, between[index]);
+                let changes = (left.indicators[index] > 0.0) != (between[index] > 0.0);
+                let any = changed(&left.indicators, between).is_some();
+                let side = if any { right } else { left };
+                side.time = time;
+                side.indicators.copy_from_slice(between);
                 if any && !changes {
                     // Another indicator changes earlier.
                     break;
                 }
             }
         }
-        let time = self.search.right.0;
-        self.look(time, start, end)?;
+        let time = self.search.right.time;
+        self.evaluate(time, start, end)?;
         Ok(time)
     }
 }
