@@ -93,7 +93,7 @@ fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
     Some((c, c * tangent))
 }
 
-/// Replaces columns a = m[p] and b = m[q] by c a - s b and s a + c b.
+/// Replaces columns p and q, called a and b, by c a - s b and s a + c b.
 pub(crate) fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
     for row in 0..m.nrows() {
         let (a, b) = (m[(row, p)], m[(row, q)]);

@@ -204,8 +204,7 @@ impl Integrated {
     /// its first change of sign; returns the end of the interval, with the states there in `search.states`.
     fn narrow(&mut self, start: f64, end: f64) -> Result<f64, CallError> {
         let width = WIDTH * (end - start);
-        while let Some(index) =
-            changed(&self.search.left.indicators, &self.search.right.indicators)
+        while let Some(index) = changed(&self.search.left.indicators, &self.search.right.indicators)
         {
             let Search { left, right, .. } = &self.search;
             let [before, after] =
