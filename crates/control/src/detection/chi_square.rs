@@ -1,19 +1,22 @@
 //! The chi-square distribution, central and noncentral, for a whole number of degrees of freedom.
 
-/// Terms of a series below this part of their sum end it.
+/// A series ends after a term below this part of the sum of its weights.
 const NEGLIGIBLE: f64 = 1e-17;
 const MOST_TERMS: u32 = 1_000_000;
-/// A variable is never so many standard deviations below its mean, in double precision.
+/// The largest noncentrality whose series is summed.
+const LARGEST: f64 = 1e6;
+/// In double precision the probability is 1 that a variable is not so many standard deviations below its mean.
 const FAR: f64 = 40.0;
 
 /// The probability that a chi-square variable with `degrees` degrees of freedom is above `x`.
 ///
 /// ```text
-/// Q(x) = e^(-x/2) sum (x/2)^j / j!, j < k/2                                          k even
-/// Q(x) = erfc((x/2)^(1/2)) + e^(-x/2) sum (x/2)^(j-1/2) / Gamma(j+1/2), j <= (k-1)/2     k odd
+/// Q(x) = e^(-x/2) sum (x/2)^j / j!, 0 <= j < k/2                                          k even
+/// Q(x) = erfc((x/2)^(1/2)) + e^(-x/2) sum (x/2)^(j-1/2) / Gamma(j+1/2), 1 <= j <= (k-1)/2     k odd
 /// ```
 ///
-/// All terms are positive, so the result has full relative precision, also far out. 1 for x <= 0.
+/// All terms are positive, so the result has full relative precision, also for large x. 1 for x <= 0; 0 for
+/// x > 0 without degrees of freedom.
 ///
 /// Source: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions (1964), 26.4.4, 26.4.5.
 ///
@@ -31,11 +34,12 @@ pub fn survival(degrees: u32, x: f64) -> f64 {
     Terms::new(degrees, 0.5 * x).survival
 }
 
-/// The probability that a noncentral chi-square variable is above `x`: of the squared length of a normal
-/// vector with `degrees` entries, unit covariance and a mean of squared length `noncentrality`.
+/// The probability that a noncentral chi-square variable is above `x`. The variable is the squared length of a
+/// normal vector with `degrees` entries, unit covariance and a mean of squared length `noncentrality`.
 ///
-/// Method: the Poisson mixture of the central probabilities of k, k + 2, ... degrees of freedom, about
-/// `noncentrality` terms.
+/// A `noncentrality` below 0 counts as 0; 1 for x <= 0. Method: the Poisson mixture of the central
+/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the normal
+/// distribution of the length.
 ///
 /// Source: Abramowitz and Stegun (1964), 26.4.25.
 #[must_use]
@@ -50,6 +54,9 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     let deviation = (2.0 * (mean + noncentrality)).sqrt();
     if x < mean - FAR * deviation {
         return 1.0;
+    }
+    if noncentrality > LARGEST {
+        return normal_below((mean - 1.0).sqrt() - x.sqrt());
     }
     let rate = 0.5 * noncentrality;
     let mut terms = Terms::new(degrees, 0.5 * x);
@@ -67,10 +74,11 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// The x above which a chi-square variable with `degrees` degrees of freedom is with `probability`.
+/// The x that a chi-square variable with `degrees` degrees of freedom exceeds with the probability
+/// `probability`.
 ///
 /// `probability`: in 0 to 1, both excluded. Method: bisection of [`survival`] to the resolution of double
-/// precision. NaN for a probability outside of its range.
+/// precision. NaN for a probability outside of its range, and for no degrees of freedom.
 #[must_use]
 pub fn quantile(degrees: u32, probability: f64) -> f64 {
     noncentral_quantile(degrees, 0.0, probability)
@@ -106,8 +114,9 @@ pub(super) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() * 0.5 * std::f64::consts::FRAC_2_SQRT_PI * std::f64::consts::FRAC_1_SQRT_2
 }
 
-/// The probabilities of rising degrees of freedom at one half of x.
+/// The probability that a chi-square variable is above x, for degrees of freedom that grow by two.
 struct Terms {
+    /// x / 2, above 0.
     half: f64,
     /// The probability of the present degrees of freedom.
     survival: f64,
@@ -116,7 +125,7 @@ struct Terms {
 }
 
 impl Terms {
-    /// The probability of `degrees` degrees of freedom, raised from none, or from one where `degrees` is odd.
+    /// The probability for `degrees` degrees of freedom, computed from 0 degrees up, or from 1 if odd.
     fn new(degrees: u32, half: f64) -> Self {
         let mut terms = match degrees % 2 {
             0 => Self { half, survival: 0.0, shape: 0.0 },
@@ -126,7 +135,8 @@ impl Terms {
         terms
     }
 
-    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), a half of the degrees before.
+    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, a half of the degrees
+    /// before.
     fn raise(&mut self) {
         let exponent = self.shape * self.half.ln() - self.half - libm::lgamma(self.shape + 1.0);
         self.survival += exponent.exp();
@@ -157,6 +167,14 @@ mod tests {
             let expected = normal_below(mean - root) + normal_below(-mean - root);
             let above = noncentral_survival(1, mean * mean, x);
             assert!((above / expected - 1.0).abs() < 1e-11, "{mean} {x}: {above} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_very_large_noncentrality_has_no_series() {
+        for shift in [-3.0, 0.0, 3.0] {
+            let above = noncentral_survival(1, 4e6, f64::powi(2000.0 + shift, 2));
+            assert!((above / normal_below(-shift) - 1.0).abs() < 1e-9, "{shift} {above}");
         }
     }
 

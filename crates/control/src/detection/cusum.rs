@@ -17,8 +17,10 @@ const LARGE: f64 = 40.0;
 const REDUCED: f64 = 20.0;
 /// The largest threshold that is tried.
 const LARGEST: f64 = 1e6;
-/// Mean excess of a sum of standard normal steps over a distant limit, twice: Siegmund (1985), (10.37).
+/// Twice the mean excess of a sum of standard normal steps over a distant limit: Siegmund (1985), (10.37).
 const EXCESS: f64 = 1.166;
+/// The largest run length that is taken from the LU factors: their relative error is about 1e-16 times it.
+const LONGEST: f64 = 1e12;
 
 /// The two-sided test by cumulative sums of a residual g with variance 1 and, without faults, mean 0.
 ///
@@ -32,14 +34,15 @@ const EXCESS: f64 = 1.166;
 ///
 /// The run length of one sum solves an integral equation (Page 1954, (4)), which is solved here by the
 /// Gauss-Legendre quadrature of Goel and Wu (1971); both sums together have 1/L = 1/L+ + 1/L- (Kemp 1961).
-/// Brook and Evans (1972) have the tables that the tests compare with. Above a threshold of 40, N samples
+/// Run lengths above 1e12 come from the elimination of Grassmann, Taksar and Heyman (1985), which subtracts
+/// nothing and so has no cancellation. Brook and Evans (1972) have the tables that the tests compare with. Above a threshold of 40, N samples
 /// are taken together as one of mean N^(1/2) times as large, which changes the run length by less than 1 %:
 /// the threshold plus 1.166, the mean excess on both sides (Siegmund 1985, section 10.2), scales with
 /// N^(-1/2).
 ///
 /// Source: E. S. Page, Biometrika 41 (1954); A. L. Goel and S. M. Wu, Technometrics 13 (1971); K. W. Kemp,
 /// J. Royal Stat. Soc. B 23 (1961); D. Brook and D. A. Evans, Biometrika 59 (1972); D. Siegmund, Sequential
-/// Analysis (1985).
+/// Analysis (1985); W. K. Grassmann, M. I. Taksar and D. P. Heyman, Operations Research 33 (1985).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cusum {
     /// kappa, in standard deviations of the residual, above 0.
@@ -49,10 +52,12 @@ pub struct Cusum {
 }
 
 impl Cusum {
-    /// The test with this drift whose mean number of samples between false alarms is `samples`.
+    /// The test with this drift whose mean number of samples between false alarms is `samples`; at a large
+    /// drift, a test with rarer false alarms.
     ///
-    /// `drift`: above 0; `samples`: at least 2. Method: bisection of [`Cusum::between_false_alarms`], relative
-    /// accuracy of the threshold 1e-12.
+    /// `drift`: above 0; `samples`: at least 2. If false alarms are rarer at every threshold, the threshold is
+    /// next to 0 and [`Cusum::between_false_alarms`] is larger than `samples`: 1.7e6 for a drift of 5. Method:
+    /// bisection, relative accuracy of the threshold 1e-12.
     ///
     /// # Example
     ///
@@ -72,19 +77,20 @@ impl Cusum {
         check::positive("the drift", drift)?;
         let name = "the number of samples between false alarms";
         check::that(samples >= 2.0, name, samples, "at least 2")?;
-        let of = |threshold: f64| Self { drift, threshold };
+        let test = |threshold: f64| Self { drift, threshold };
         let (mut low, mut high) = (0.0, 1.0);
-        while of(high).between_false_alarms() < samples {
+        // Infinity is too short for an infinite number of samples, which so reaches the largest threshold.
+        while test(high).between_false_alarms() <= samples {
             (low, high) = (high, 1.5 * high);
             let rule = "less, as the threshold would be above 1e6";
             check::that(high <= LARGEST, name, samples, rule)?;
         }
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            let short = of(middle).between_false_alarms() < samples;
-            *(if short { &mut low } else { &mut high }) = middle;
+            let is_short = test(middle).between_false_alarms() < samples;
+            *(if is_short { &mut low } else { &mut high }) = middle;
         }
-        Ok(of(high))
+        Ok(test(high))
     }
 
     /// The mean number of samples from zero sums to a false alarm of either sum.
@@ -108,7 +114,7 @@ impl Cusum {
     /// L(s) = 1 + L(0) Phi(kappa - mean - s) + integral of L(y) phi(y - s + kappa - mean), y from 0 to h
     /// ```
     ///
-    /// Infinite where the equation cannot be solved in double precision (beyond about 1e15).
+    /// Infinite beyond the range of double precision.
     #[must_use]
     pub fn run_length(&self, mean: f64) -> f64 {
         let (group, test) = self.grouped();
@@ -119,26 +125,30 @@ impl Cusum {
         let (nodes, weights) = self.quadrature();
         let shift = self.drift - mean;
         // The unknowns are L(0), then L at the nodes.
-        let from = |at: usize| if at == 0 { 0.0 } else { nodes[at - 1] };
-        let matrix = DMatrix::from_fn(nodes.len() + 1, nodes.len() + 1, |row, column| {
-            let stays = match column {
-                0 => normal_below(shift - from(row)),
-                _ => weights[column - 1] * normal_density(nodes[column - 1] - from(row) + shift),
-            };
-            f64::from(u8::from(row == column)) - stays
+        let count = nodes.len() + 1;
+        let start = |row: usize| if row == 0 { 0.0 } else { nodes[row - 1] };
+        let transitions = DMatrix::from_fn(count, count, |row, column| match column {
+            0 => normal_below(shift - start(row)),
+            _ => weights[column - 1] * normal_density(nodes[column - 1] - start(row) + shift),
         });
-        let ones = DVector::from_element(nodes.len() + 1, 1.0);
+        let matrix = DMatrix::<f64>::identity(count, count) - &transitions;
+        let ones = DVector::from_element(count, 1.0);
         match matrix.lu().solve(&ones) {
-            Some(lengths) if lengths[0] >= 1.0 => lengths[0],
-            _ => f64::INFINITY,
+            Some(lengths) if (1.0..=LONGEST).contains(&lengths[0]) => lengths[0],
+            _ => {
+                let alarm = |row: usize| normal_below(start(row) - self.threshold - shift);
+                mean_steps(transitions, DVector::from_fn(count, |row, _| alarm(row)))
+            }
         }
     }
 
     /// The distribution of the delay of a fault that moves the mean of the residual to `mean(k)` in its
     /// k-th sample, k from 0 on; at most `most` samples are followed.
     ///
-    /// The fault meets sums as they are after a long time without faults. Only the sum counts whose sign is
-    /// that of the means, all added.
+    /// When the fault starts, the sums have the distribution of a long time without faults and alarms. Only
+    /// one sum is followed: S- if the sum of the first `most` means is negative, otherwise S+. The result has
+    /// fewer samples where less than 1e-6 of the faults are missed before. With a threshold above 40, `mean`
+    /// is also called for some k from `most` on.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> f64, most: usize) -> Delay {
         let (group, test) = self.grouped();
@@ -163,7 +173,8 @@ impl Cusum {
         Delay { missed }
     }
 
-    /// The test with a smaller threshold for sums of several samples, divided by the root of their number.
+    /// The number of samples that are taken together, and the test for their sum divided by the root of this
+    /// number: one sample and the test itself up to a threshold of 40.
     fn grouped(&self) -> (usize, Self) {
         if self.threshold <= LARGE {
             return (1, *self);
@@ -185,6 +196,26 @@ impl Cusum {
         let nodes = nodes.iter().map(|node| half * (1.0 + node)).collect();
         (nodes, weights.iter().map(|weight| half * weight).collect())
     }
+}
+
+/// The mean number of steps from state 0 to an alarm.
+///
+/// `transitions`: the probabilities from the states in the rows to those in the columns; `alarms`: the
+/// probabilities of an alarm. States are eliminated from the last one on, without subtraction.
+fn mean_steps(mut transitions: DMatrix<f64>, mut alarms: DVector<f64>) -> f64 {
+    let mut steps = DVector::from_element(alarms.len(), 1.0);
+    for last in (1..alarms.len()).rev() {
+        let leaving = alarms[last] + transitions.row(last).columns(0, last).sum();
+        for row in 0..last {
+            let visits = transitions[(row, last)] / leaving;
+            alarms[row] += visits * alarms[last];
+            steps[row] += visits * steps[last];
+            for column in 0..last {
+                transitions[(row, column)] += visits * transitions[(last, column)];
+            }
+        }
+    }
+    steps[0] / alarms[0]
 }
 
 /// The distribution of one cumulative sum that has not been above its threshold: the probability of 0,
@@ -216,23 +247,23 @@ impl Sums {
         sums
     }
 
-    /// One sample with a residual of this mean; what passes the threshold is lost.
+    /// Advances by one sample of a residual with this mean, and drops the probability above the threshold.
     fn step(&mut self, mean: f64) {
         let shift = self.drift - mean;
         let masses: Vec<f64> =
             self.density.iter().zip(&self.weights).map(|(value, weight)| value * weight).collect();
-        let after = |to: f64| {
-            let from = masses.iter().zip(&self.nodes);
+        let points = || masses.iter().zip(&self.nodes);
+        let density_at = |to: f64| {
             self.zero * normal_density(to + shift)
-                + from.map(|(mass, node)| mass * normal_density(to - node + shift)).sum::<f64>()
+                + points().map(|(mass, node)| mass * normal_density(to - node + shift)).sum::<f64>()
         };
-        let density = self.nodes.iter().map(|&to| after(to)).collect();
-        let from = masses.iter().zip(&self.nodes);
+        let density = self.nodes.iter().map(|&to| density_at(to)).collect();
         self.zero = self.zero * normal_below(shift)
-            + from.map(|(mass, node)| mass * normal_below(shift - node)).sum::<f64>();
+            + points().map(|(mass, node)| mass * normal_below(shift - node)).sum::<f64>();
         self.density = density;
     }
 
+    /// The probability that there has been no alarm.
     fn total(&self) -> f64 {
         let inner = self.density.iter().zip(&self.weights).map(|(value, weight)| value * weight);
         self.zero + inner.sum::<f64>()
@@ -329,11 +360,40 @@ mod tests {
         assert!(delay < from_zero && delay > 0.6 * from_zero, "{delay} {from_zero}");
     }
 
+    /// Siegmund (1985): L = exp(h + 1.166) for both sums with a drift of 0.5.
+    #[test]
+    fn a_threshold_belongs_to_very_rare_false_alarms_too() {
+        let [rare, rarest] =
+            [1e12, 1e20].map(|samples| Cusum::with_false_alarms(0.5, samples).unwrap());
+        assert!((rarest.threshold - 44.9).abs() < 0.5, "{rarest:?}");
+        let grown = rarest.threshold - rare.threshold;
+        assert!((grown - 1e8_f64.ln()).abs() < 0.2, "{rare:?} {rarest:?}");
+        assert!((rarest.between_false_alarms() / 1e20 - 1.0).abs() < 1e-2);
+    }
+
+    #[test]
+    fn both_eliminations_have_the_same_run_length() {
+        let [short, long] = [LONGEST / 10.0, LONGEST * 10.0].map(|samples| {
+            let test = Cusum::with_false_alarms(0.5, samples).unwrap();
+            test.run_length(0.0) * (-test.threshold).exp()
+        });
+        assert!((short / long - 1.0).abs() < 1e-2, "{short} {long}");
+    }
+
+    #[test]
+    fn a_large_drift_alone_makes_false_alarms_rarer() {
+        let test = Cusum::with_false_alarms(5.0, 100.0).unwrap();
+        assert!(test.threshold > 0.0 && test.threshold < 1e-15);
+        let single = 0.5 / normal_below(-5.0);
+        assert!((test.between_false_alarms() / single - 1.0).abs() < 1e-6);
+    }
+
     #[test]
     fn numbers_without_a_threshold_are_refused() {
         assert!(Cusum::with_false_alarms(0.0, 100.0).is_err());
         assert!(Cusum::with_false_alarms(0.5, 1.0).is_err());
         assert!(Cusum::with_false_alarms(0.5, f64::NAN).is_err());
+        assert!(Cusum::with_false_alarms(0.5, f64::INFINITY).is_err());
         assert!(Cusum::with_false_alarms(1e-12, 1e40).is_err());
     }
 }

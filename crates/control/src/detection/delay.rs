@@ -9,15 +9,15 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// The probability that the fault is detected within `samples` samples; beyond the last computed one,
-    /// that of the last one.
+    /// The probability that the fault is detected within `samples` samples, at most as many as are computed;
+    /// 0 if `missed` is empty.
     #[must_use]
     pub fn detected_within(&self, samples: usize) -> f64 {
         1.0 - self.missed.get(samples).or(self.missed.last()).copied().unwrap_or(1.0)
     }
 
     /// The mean delay in samples: the sum of `missed`. None if more than 1e-3 of the faults are missed at
-    /// the last computed sample.
+    /// the last computed sample, or `missed` is empty.
     #[must_use]
     pub fn mean(&self) -> Option<f64> {
         let last = self.missed.last()?;

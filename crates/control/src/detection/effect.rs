@@ -6,12 +6,12 @@ use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
 /// The mean of each residual in the samples after a unit step of the input of `effect`: rows are
-/// residuals, column k is the k-th sample from the step on.
+/// residuals, column k, from 0, is the k-th sample from the step on.
 ///
-/// `effect`: n states, one input, p outputs. In sampled time the values of the step response. In
-/// continuous time the averages over each interval of `period` s, times the root of `period`: the average
-/// of white noise of intensity 1 over an interval has the variance 1 / `period`, so that the result is in
-/// standard deviations.
+/// `effect`: n states, one input, p outputs. In sampled time the result has the values of the step response,
+/// and `period` is only checked. In continuous time it has the averages over each interval of `period` s, times
+/// the root of `period`: the average of white noise of intensity 1 over an interval has the variance
+/// 1 / `period`, so that the result is in standard deviations.
 ///
 /// Method: one exponential for x and its integral (Van Loan 1978).
 ///
@@ -39,7 +39,7 @@ pub fn mean_after_step(
     Ok(means)
 }
 
-/// The limit of [`mean_after_step`] after many samples: the residuals' mean under a constant input.
+/// The limit of [`mean_after_step`] after many samples: the mean of the residuals under a constant input 1.
 ///
 /// # Errors
 ///

@@ -45,8 +45,8 @@ pub struct UnknownInput {
 pub struct DetectionFilter {
     /// The filter, from commands u and measurements y to r.
     pub generator: ResidualGenerator,
-    /// K: the initial state of the filter is K x, x the initial state of the plant; T of the unknown-input
-    /// observer, in the coordinates of the filter, whose state estimates T x.
+    /// k x n, k the order of the filter: this matrix times the initial state of the plant is the initial
+    /// state of the filter. It is T of the unknown-input observer in the coordinates of the filter.
     pub start: DMatrix<f64>,
 }
 
@@ -67,14 +67,14 @@ impl NoisyPlant {
     /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
     /// time `d[k+1] = d[k]` + noise of this covariance).
     ///
-    /// A filter of this plant estimates the input: a constant one leaves the residuals in steady state.
-    /// The larger the intensity, the sooner. Other inputs get a zero for the new state
-    /// ([`UnknownInput::extended`]).
+    /// A filter of this plant estimates the input, so that a constant one has no effect on the residuals in
+    /// steady state. A larger intensity makes the effect decay sooner. Other inputs need a zero for the new
+    /// state ([`UnknownInput::extended`]).
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::NotFinite`] for bad matrices; [`Error::OutOfRange`] for an intensity that
-    /// is not above 0.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad matrices; [`Error::OutOfRange`] for a
+    /// bad period, or an intensity that is not above 0.
     pub fn with_random_walk(&self, input: &UnknownInput, intensity: f64) -> Result<Self, Error> {
         self.check()?;
         self.check_input(input)?;
@@ -93,7 +93,7 @@ impl NoisyPlant {
 }
 
 impl UnknownInput {
-    /// The same input of a plant with `states` states, whose further states it does not act on.
+    /// The same input of a plant with `states` states, with zeros for the further states.
     #[must_use]
     pub fn extended(&self, states: usize) -> Self {
         Self { on_states: self.on_states.clone().resize_vertically(states, 0.0), ..self.clone() }
@@ -123,7 +123,7 @@ impl UnknownInput {
 /// which is white, and of all decoupled filters the one with the least covariance of the state error.
 ///
 /// Existence: rank C E = rank E < n, at least one row N is left, and (T A, N C) is detectable: (A, E, C) has no
-/// unstable invariant zeros. None says that one of them does not hold.
+/// unstable invariant zeros. The result is None if one of these conditions does not hold.
 ///
 /// Source: J. Chen and R. J. Patton, Robust Model-Based Fault Diagnosis for Dynamic Systems (1999), chapter
 /// 3; the correlation: B. D. O. Anderson and J. B. Moore, Optimal Filtering (1979), section 5.4; whiteness:
@@ -131,9 +131,10 @@ impl UnknownInput {
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad matrices;
-/// [`Error::NotPositiveDefinite`] for V, [`Error::Unweighted`] if a mode on the stability limit gets no
-/// process noise; the numerical errors of [`kalman`].
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad matrices; [`Error::OutOfRange`] for a bad
+/// period; [`Error::NotPositiveDefinite`] for V; [`Error::NotPositiveSemidefinite`] for W;
+/// [`Error::Unweighted`] if a mode on the stability limit gets no process noise; [`Error::NotDetectable`] if
+/// `unknown` is empty; the numerical errors of [`kalman`].
 pub fn detection_filter(
     plant: &NoisyPlant,
     unknown: &[UnknownInput],
@@ -149,7 +150,7 @@ pub fn detection_filter(
     }
 }
 
-/// T, H and N, the columns scaled to length one.
+/// T, H and N of the observer, from inputs scaled to columns of length one.
 struct UnknownInputObserver {
     /// Q, n x k: an orthonormal basis of the range of T.
     basis: DMatrix<f64>,
@@ -162,6 +163,7 @@ struct UnknownInputObserver {
 }
 
 impl UnknownInputObserver {
+    /// None if the rank condition fails, no measurement is left, or T is zero.
     fn new(plant: &NoisyPlant, unknown: &[UnknownInput]) -> Result<Option<Self>, Error> {
         let (n, p) = (plant.a.nrows(), plant.c.nrows());
         let columns = |of: fn(&UnknownInput) -> &DVector<f64>, rows: usize| {
@@ -171,8 +173,8 @@ impl UnknownInputObserver {
             units.iter().enumerate().for_each(|(at, unit)| matrix.set_column(at, unit));
             matrix
         };
-        let of_sensors = left_null_space(&columns(|input| &input.on_measurements, p))?;
-        let Some(unaffected) = of_sensors else { return Ok(None) };
+        let on_measurements = columns(|input| &input.on_measurements, p);
+        let Some(unaffected) = left_null_space(&on_measurements)? else { return Ok(None) };
         let e = columns(|input| &input.on_states, n);
         let visible = &unaffected * &plant.c * &e;
         if e.ncols() > 0 && rank(&unit_columns(&visible))? < rank(&e)? {
@@ -181,9 +183,9 @@ impl UnknownInputObserver {
         let Some(left) = left_null_space(&visible)? else { return Ok(None) };
         let mut h = DMatrix::zeros(n, p);
         if e.ncols() > 0 {
-            let inverse = Svd::new(&visible)?;
-            let of_measurements = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
-            h = &e * inverse.least_squares(&of_measurements, inverse.rank(TOLERANCE)) * &unaffected;
+            let svd = Svd::new(&visible)?;
+            let unit = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
+            h = &e * svd.least_squares(&unit, svd.rank(TOLERANCE)) * &unaffected;
         }
         let t = DMatrix::identity(n, n) - &h * &plant.c;
         let range = Svd::new(&t)?;
@@ -195,6 +197,7 @@ impl UnknownInputObserver {
         Ok(Some(Self { basis, projection, h, selection: left * unaffected }))
     }
 
+    /// The Kalman filter of the plant without the unknown inputs, with whitened innovation.
     fn filter(&self, plant: &NoisyPlant) -> Result<DetectionFilter, Error> {
         let Self { basis, projection, h, selection } = self;
         let NoisyPlant { a, b, c, w, v, domain } = plant;
@@ -238,7 +241,7 @@ impl DetectionFilter {
     /// e' = A e + (T e_d - B_y e_s) d,  r = -C e + D_y e_s d
     /// ```
     ///
-    /// with A, `B_y`, C, `D_y` of the generator. The commands have no part in it.
+    /// with A, `B_y`, C, `D_y` of the generator. Commands have no effect on e and r.
     ///
     /// # Errors
     ///
@@ -259,11 +262,12 @@ impl DetectionFilter {
     }
 }
 
-/// Gain and innovation covariance (in continuous time: intensity V) of the Kalman filter for correlated
-/// noise: A - S V^-1 C and W - S V^-1 S' have uncorrelated noise and a gain less by S V^-1.
+/// Gain of the Kalman filter for correlated noise, and covariance of its innovation (in continuous time its
+/// intensity V).
 ///
 /// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v, in continuous
-/// time intensities.
+/// time intensities. Method: the plant with A - S V^-1 C and W - S V^-1 S' has uncorrelated noise; S V^-1 is
+/// added to the gain of its filter.
 fn correlated_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

@@ -28,9 +28,11 @@ pub struct UncertainPlant {
 }
 
 impl UncertainPlant {
-    /// Bounds of the means of the residuals `rows` r of `filter`, one for each row, while no entry of u is
-    /// above `bounds` and the plant starts at rest: no r is larger, in sampled time at a sample. None if
-    /// no bound exists.
+    /// Bounds the means of the residuals `rows` r, r those of `filter`: no mean has a larger modulus, in sampled
+    /// time at the samples. None if no bound exists.
+    ///
+    /// `rows`: one row for each result, one column for each residual of `filter`; `bounds`: `u_max`, the
+    /// largest modulus of each entry of u. The plant starts at rest.
     ///
     /// ```text
     /// |x| <= x_max = G_u u_max + G_w w_max,  w_max = |dA| x_max + |dB| u_max      (w = dA x + dB u)
@@ -50,8 +52,9 @@ impl UncertainPlant {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for matrices that do not fit; the errors of [`peak_gain`], [`Error::NotHurwitz`] for
-    /// a plant that is not stable among them.
+    /// [`Error::Shape`] for matrices or bounds that do not fit; [`Error::Empty`] without `rows`; the errors of
+    /// [`peak_gain`], among them [`Error::NotHurwitz`] and [`Error::NotSchur`] for a plant or filter that is not
+    /// stable.
     pub fn largest_mean(
         &self,
         filter: &ResidualGenerator,
@@ -67,6 +70,8 @@ impl UncertainPlant {
         }
         check::shape("the filter's D_y", &filter.d_y, (filter.d_y.nrows(), c.nrows()))?;
         check::shape("the filter's D_u", &filter.d_u, (filter.d_u.nrows(), b.ncols()))?;
+        check::shape("rows", rows, (rows.nrows(), filter.d_y.nrows()))?;
+        check::column("the bounds of u", bounds.as_slice(), b.ncols())?;
         let Some([w, z]) = self.errors(bounds)? else { return Ok(None) };
         let n = a.nrows();
         let unit = DMatrix::identity(n, n);
@@ -78,18 +83,19 @@ impl UncertainPlant {
                 (phi, gamma, integral * w)
             }
         };
-        // Of the filter or of the residuals the rows of A or C, and of B or D, of both systems together.
+        // Rows of plant and filter in series: of its A and B for the states of the filter, of its C and D for
+        // the residuals.
         let rows_of = |[dynamics, from_u, from_y]: [&DMatrix<f64>; 3]| {
             let from_inputs = (from_u + from_y * d).resize_horizontally(b.ncols() + n, 0.0);
             (beside(&(from_y * c), dynamics), beside(&from_inputs, from_y))
         };
-        let (of_filter, into_filter) = rows_of([&filter.a, &filter.b_u, &filter.b_y]);
+        let (filter_a, filter_b) = rows_of([&filter.a, &filter.b_u, &filter.b_y]);
         let (output, direct) =
             rows_of([&(rows * &filter.c), &(rows * &filter.d_u), &(rows * &filter.d_y)]);
         let (order, width) = (n + filter.a.nrows(), direct.ncols());
         let whole = StateSpace {
-            a: stacked(&phi.resize_horizontally(order, 0.0), &of_filter),
-            b: stacked(&beside(&gamma, &unit).resize_horizontally(width, 0.0), &into_filter),
+            a: stacked(&phi.resize_horizontally(order, 0.0), &filter_a),
+            b: stacked(&beside(&gamma, &unit).resize_horizontally(width, 0.0), &filter_b),
             c: output,
             d: direct,
             domain: filter.domain,
@@ -98,25 +104,25 @@ impl UncertainPlant {
         Ok(Some(peak_gain(&whole, WIDTH)?.upper * inputs))
     }
 
-    /// Bounds of w = dA x + dB u and of z = dC x.
+    /// Bounds of w = dA x + dB u and of z = dC x; None if no bound exists.
     fn errors(&self, bounds: &DVector<f64>) -> Result<Option<[DVector<f64>; 2]>, Error> {
         let StateSpace { a, b, domain, .. } = &self.nominal;
-        let [of_a, of_b, of_c] = &self.sizes;
+        let [size_a, size_b, size_c] = &self.sizes;
         let (n, m) = b.shape();
         let unit = DMatrix::identity(n, n);
         let (inputs, d) = (beside(b, &unit), DMatrix::zeros(n, m + n));
         let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: *domain };
         let gains = peak_gain(&states, WIDTH)?.upper;
         let (from_u, from_w) = (gains.columns(0, m), gains.columns(m, n));
-        let feedback = from_w * of_a;
+        let feedback = from_w * size_a;
         let radius = eigenvalues(&feedback)?.into_iter().map(Complex::norm).fold(0.0, f64::max);
         if radius >= 1.0 {
             return Ok(None);
         }
-        let direct = of_b * bounds;
+        let direct = size_b * bounds;
         let open = from_u * bounds + from_w * &direct;
         let largest = (DMatrix::identity(n, n) - feedback).lu().solve(&open);
-        Ok(largest.map(|x| [of_a * &x + direct, of_c * x]))
+        Ok(largest.map(|x| [size_a * &x + direct, size_c * x]))
     }
 }
 
@@ -169,6 +175,18 @@ mod tests {
         let expected = 0.5 * (0.1 * largest + 0.2 * 3.0);
         let bound = bound([0.1, 0.2, 0.0]).unwrap();
         assert!(bound >= expected && bound < 1.03 * expected, "{bound} {expected}");
+    }
+
+    #[test]
+    fn bounds_of_another_number_of_inputs_are_refused() {
+        let one = || scalar(1.0);
+        let nominal =
+            StateSpace { a: -one(), b: one(), c: one(), d: one(), domain: Domain::Continuous };
+        let plant = UncertainPlant { nominal, sizes: [one(), one(), one()] };
+        let bounds = plant.largest_mean(&filter(), &one(), &DVector::zeros(2));
+        assert!(matches!(bounds, Err(Error::Shape { .. })), "{bounds:?}");
+        let rows = plant.largest_mean(&filter(), &DMatrix::zeros(1, 2), &DVector::zeros(1));
+        assert!(matches!(rows, Err(Error::Shape { .. })), "{rows:?}");
     }
 
     #[test]

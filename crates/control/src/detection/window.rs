@@ -5,7 +5,7 @@ use super::chi_square::{noncentral_quantile, noncentral_survival};
 use crate::check::as_number;
 use crate::{Error, check};
 
-/// At most as many phases of a window are averaged for a delay.
+/// The largest number of starts of a fault within a window that are averaged for a delay.
 const PHASES: usize = 32;
 
 /// The chi-square test of the mean of white residuals r, m of them with covariance I, over windows of N
@@ -56,7 +56,7 @@ impl WindowTest {
         Ok(Self { residuals, window, threshold })
     }
 
-    /// The mean number of samples between false alarms, residuals with mean zero.
+    /// The mean number of samples between false alarms while the residuals have mean zero.
     #[must_use]
     pub fn between_false_alarms(&self) -> f64 {
         as_number(self.window) / self.alarm_probability(0.0)
@@ -69,8 +69,11 @@ impl WindowTest {
     }
 
     /// The distribution of the delay of a fault that moves the mean of the residuals to `mean(k)`, m
-    /// entries, in its k-th sample; at most `most` samples are followed. The fault starts in any sample of
-    /// a window with the same probability.
+    /// entries, in its k-th sample, k from 0 on; at most `most` samples are followed.
+    ///
+    /// The fault starts in each sample of a window with the same probability; of a window with more than 32
+    /// samples, in 32 of them. The result has fewer samples where less than 1e-6 of the faults are missed
+    /// before.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> Vec<f64>, most: usize) -> Delay {
         let dimension = self.residuals as usize;
@@ -83,22 +86,22 @@ impl WindowTest {
         let phases = self.window.min(PHASES);
         let mut missed = vec![0.0; most + 1];
         for phase in 0..phases {
-            let inside = phase * self.window / phases;
-            let (mut left, mut start, mut end) = (1.0, 0, self.window - inside);
+            let before = phase * self.window / phases;
+            let (mut undetected, mut start, mut end) = (1.0, 0, self.window - before);
             for (k, missed) in missed.iter_mut().enumerate() {
                 if k == end {
                     let shift = sums[end].iter().zip(&sums[start]).map(|(end, start)| end - start);
                     let squared: f64 = shift.map(|value| value * value).sum();
                     let noncentrality = squared / as_number(self.window);
-                    left *=
+                    undetected *=
                         1.0 - noncentral_survival(self.residuals, noncentrality, self.threshold);
                     (start, end) = (end, end + self.window);
                 }
-                *missed += left / as_number(phases);
+                *missed += undetected / as_number(phases);
             }
         }
-        let done = missed.iter().position(|missed| *missed < 1e-6).unwrap_or(most);
-        missed.truncate(done + 1);
+        let last = missed.iter().position(|missed| *missed < 1e-6).unwrap_or(most);
+        missed.truncate(last + 1);
         Delay { missed }
     }
 }

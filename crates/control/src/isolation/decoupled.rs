@@ -21,16 +21,16 @@ pub(super) struct DecoupledPart {
     pub(super) d_f: DMatrix<f64>,
     /// H.
     pub(super) h: DMatrix<f64>,
-    /// For each fault the length of the columns of `B_f` and `D_f`, relative to those of the plant.
+    /// For each fault the length of its column of [`B_f`; `D_f`], relative to its column of the plant.
     pub(super) effects: Vec<f64>,
-    /// The least certain rank decision.
+    /// The singular values closest to the tolerance.
     pub(super) gap: Gap,
-    /// Numbers of states that y, y', ... determine in addition: the conjugate partition of the
-    /// observability indices.
+    /// The number of states that y determines, the number of further ones that y' determines, and so on:
+    /// the conjugate partition of the observability indices.
     pub(super) blocks: Vec<usize>,
 }
 
-/// Relative singular values on both sides of the tolerance, over all rank decisions.
+/// The relative singular values closest to the tolerance on both sides, over all rank decisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
     /// The smallest that counted as nonzero.
@@ -40,11 +40,12 @@ pub(super) struct Gap {
 }
 
 impl Gap {
+    /// The gap before the first rank decision.
     pub(super) fn none() -> Self {
         Self { above: f64::INFINITY, below: 0.0 }
     }
 
-    /// The number of singular values above `tolerance`.
+    /// The number of singular values above `tolerance`; narrows the gap.
     fn rank(&mut self, svd: &Svd, tolerance: f64) -> usize {
         let rank = svd.rank_above(tolerance);
         if rank > 0 {
@@ -70,7 +71,7 @@ impl DecoupledPart {
     ) -> Result<Option<Self>, Error> {
         let ([a, e, c, d], outputs, size) = scaled(plant, decoupled);
         let mut gap = Gap::none();
-        let w = reached_unseen([&a, &e, &c, &d], tolerance, &mut gap)?;
+        let w = conditioned_invariant([&a, &e, &c, &d], tolerance, &mut gap)?;
         let v = complement(&w, tolerance, &mut gap)?;
         let image = beside(&(&c * &w), &d);
         let h = complement(&image, tolerance, &mut gap)?.transpose();
@@ -82,7 +83,7 @@ impl DecoupledPart {
         let (basis, blocks) = observable_states(&dynamics, &(&h * &c * &v), tolerance, &mut gap)?;
         let (z, k) = (basis.tr_mul(&v.transpose()), basis.tr_mul(&k));
         let (dynamics, output) = (basis.tr_mul(&dynamics) * &basis, &h * &c * &v * &basis);
-        // Given units of time and of the outputs.
+        // Back to the units of the plant.
         let k = multiply_columns(&(k * size), &outputs);
         let h = multiply_columns(&h, &outputs);
         let b_f = &z * &plant.b_f - &k * &plant.d_f;
@@ -122,7 +123,7 @@ fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVe
 }
 
 /// W: an orthonormal basis of the smallest subspace with [A W, E] ker [C W, D] in it.
-fn reached_unseen(
+fn conditioned_invariant(
     [a, e, c, d]: [&DMatrix<f64>; 4],
     tolerance: f64,
     gap: &mut Gap,
@@ -134,19 +135,19 @@ fn reached_unseen(
     loop {
         let svd = Svd::new(&beside(&(c * &w), d))?;
         let rank = gap.rank(&svd, tolerance);
-        let unseen = svd.right.columns(rank, svd.right.ncols() - rank).into_owned();
-        let image = beside(&(a * &w), e) * unseen;
-        let all = Svd::new(&beside(&w, &image).transpose())?;
-        let reached = gap.rank(&all, tolerance);
-        if reached <= w.ncols() {
+        let kernel = svd.right.columns(rank, svd.right.ncols() - rank).into_owned();
+        let image = beside(&(a * &w), e) * kernel;
+        let sum = Svd::new(&beside(&w, &image).transpose())?;
+        let dimension = gap.rank(&sum, tolerance);
+        if dimension <= w.ncols() {
             return Ok(w);
         }
-        w = all.right.columns(0, reached).into_owned();
+        w = sum.right.columns(0, dimension).into_owned();
     }
 }
 
-/// An orthonormal basis of the vectors that are orthogonal to the columns of M; the rank decision is noted
-/// in `gap`.
+/// An orthonormal basis of the vectors that are orthogonal to the columns of M; narrows `gap` by the rank
+/// decision.
 pub(super) fn complement(
     m: &DMatrix<f64>,
     tolerance: f64,
@@ -160,8 +161,10 @@ pub(super) fn complement(
     Ok(svd.right.columns(rank, m.nrows() - rank).into_owned())
 }
 
-/// An orthonormal basis of the states that C shows, and how many of them y, y', ... add, by the
-/// staircase algorithm without further scaling, which would enlarge rounding errors.
+/// An orthonormal basis of the observable states of (A, C), and how many of them y, y', ... each add.
+///
+/// Method: the staircase algorithm without further scaling, which would enlarge rounding errors; narrows
+/// `gap` by its rank decisions.
 pub(super) fn observable_states(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
@@ -169,7 +172,7 @@ pub(super) fn observable_states(
     gap: &mut Gap,
 ) -> Result<(DMatrix<f64>, Vec<usize>), Error> {
     let n = a.nrows();
-    let (mut shown, mut rest) = (DMatrix::zeros(n, 0), DMatrix::identity(n, n));
+    let (mut observable, mut rest) = (DMatrix::zeros(n, 0), DMatrix::identity(n, n));
     let (mut link, mut blocks) = (c.clone(), Vec::new());
     while rest.ncols() > 0 {
         let svd = Svd::new(&link)?;
@@ -178,16 +181,16 @@ pub(super) fn observable_states(
             break;
         }
         blocks.push(rank);
-        let turned: DMatrix<f64> = rest * svd.right;
-        let new = turned.columns(0, rank).into_owned();
-        rest = turned.columns(rank, turned.ncols() - rank).into_owned();
+        let rotated: DMatrix<f64> = rest * svd.right;
+        let new = rotated.columns(0, rank).into_owned();
+        rest = rotated.columns(rank, rotated.ncols() - rank).into_owned();
         link = new.tr_mul(a) * &rest;
-        shown = beside(&shown, &new);
+        observable = beside(&observable, &new);
     }
-    Ok((shown, blocks))
+    Ok((observable, blocks))
 }
 
-/// The K of least norm with K `image` = `target`.
+/// The K of least norm with K `image` = `target`; singular values below `tolerance` count as zero.
 fn injection(
     image: &DMatrix<f64>,
     target: &DMatrix<f64>,

@@ -3,7 +3,7 @@
 use crate::balance::unit_columns;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Patterns of signs are tried one by one up to this number of faults.
+/// The largest number of faults for which all patterns of signs are tried.
 const ENUMERATED: usize = 7;
 const SWEEPS: usize = 2000;
 
@@ -11,12 +11,12 @@ const SWEEPS: usize = 2000;
 pub(super) struct Direction {
     /// One factor for each member.
     pub(super) factors: DVector<f64>,
-    /// The smallest gain of a fault, each relative to the largest gain that the fault can have, for
-    /// the same effect of noise: 1 if each fault has its largest gain.
+    /// The smallest relative gain of the faults. The gain of a fault is relative to the largest that the
+    /// fault can have for the same effect of noise: 1 if each fault has its largest gain.
     pub(super) quality: f64,
 }
 
-/// Maximises the smallest gain for a given effect of noise.
+/// The combination with the largest smallest gain for a given effect of noise.
 ///
 /// ```text
 /// max over v of min over j of |g_j' v| / |g_j|_W,  v' W v = 1,  |g|_W^2 = g' W^-1 g
@@ -25,8 +25,8 @@ pub(super) struct Direction {
 /// `gains`: the columns are the `g_j`, none zero; `noise`: W, positive definite. For each pattern of
 /// signs the problem is a quadratic programme with one constraint per fault, solved by Hildreth's
 /// sweeps over the multipliers (C. Hildreth, A quadratic programming procedure, Naval Research
-/// Logistics Quarterly 4 (1957)). With more than 7 faults each has the sign of its product with
-/// the first one. None if no pattern of signs is feasible.
+/// Logistics Quarterly 4 (1957)). With more than 7 faults only one pattern is tried: each fault has the
+/// sign of its product with the first one. None if no pattern of signs is feasible.
 pub(super) fn strongest_weakest(
     gains: &DMatrix<f64>,
     noise: &Cholesky<f64, Dyn>,
@@ -43,7 +43,7 @@ pub(super) fn strongest_weakest(
     Some(Direction { factors, quality })
 }
 
-/// Patterns of signs, the first fault positive.
+/// The patterns of signs to try, the first fault positive.
 fn signs(products: &DMatrix<f64>) -> Vec<Vec<f64>> {
     let faults = products.nrows();
     let sign = |negative: bool| if negative { -1.0 } else { 1.0 };
@@ -55,7 +55,10 @@ fn signs(products: &DMatrix<f64>) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Multipliers of the shortest v with `s_j` `u_j'` v >= 1, times the signs `s_j`; `products`: `u_i'` `u_j`.
+/// Multipliers of the shortest v with `s_j` `u_j'` v >= 1, times the signs `s_j`, scaled so that the smallest
+/// of the products is 1; None if there is no such v.
+///
+/// `products`: `u_i'` `u_j`.
 fn multipliers(products: &DMatrix<f64>, signs: &[f64]) -> Option<DVector<f64>> {
     let faults = signs.len();
     let mut signed = DVector::zeros(faults);

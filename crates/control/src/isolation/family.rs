@@ -6,7 +6,8 @@ use crate::svd::Svd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// Frequencies at which the effect of measurement noise is averaged, and the decades that they span.
+/// Frequencies at which the effect of measurement noise is averaged, and the decades that they span in
+/// continuous time.
 const NOISE_POINTS: u32 = 40;
 const NOISE_DECADES: f64 = 4.0;
 
@@ -76,7 +77,7 @@ impl Family {
         Ok(svd.right.columns(rank, m.nrows() - rank).transpose())
     }
 
-    /// Replaces the members by the combinations in the rows of `factors`.
+    /// Replaces the t and L of the members by their combinations with the rows of `factors`.
     fn combine(&mut self, factors: &DMatrix<f64>) {
         for m in self.t.iter_mut().chain(&mut self.l) {
             *m = factors * &*m;
@@ -96,7 +97,7 @@ impl Family {
         self.response(frequency, input, &(&self.w * &part.d_f))
     }
 
-    /// For each fault the size that its gains would have without cancellation.
+    /// For each fault an upper bound of the size that its gains would have without cancellation.
     pub(super) fn fault_scale(&self, part: &DecoupledPart, frequency: f64) -> Vec<f64> {
         let s = self.domain.point(frequency);
         let size = |fault: usize| {
@@ -109,8 +110,11 @@ impl Family {
         (0..part.b_f.ncols()).map(size).collect()
     }
 
-    /// W: the combination v of the members has the variance v W v', averaged over frequencies up to ten
-    /// times the fastest pole, when measurement i has noise of the intensity `noise[i]`^2.
+    /// W: the combination v of the members has the variance v W v' per frequency when measurement i has noise
+    /// of the intensity `noise[i]`^2.
+    ///
+    /// The mean over 40 frequencies: in continuous time over four decades up to ten times `fastest`, the
+    /// rate of the fastest pole; in sampled time evenly from 0 to pi / period.
     pub(super) fn noise(&self, part: &DecoupledPart, noise: &[f64], fastest: f64) -> DMatrix<f64> {
         let sizes = DMatrix::from_diagonal(&nalgebra::DVector::from_column_slice(noise));
         let (h, k) = (&part.h * &sizes, &part.k * &sizes);
@@ -130,7 +134,7 @@ impl Family {
         sum
     }
 
-    /// The response through the chain of lags: `input(i)` drives lag i, `direct` the residual.
+    /// The response through the chain of lags: `input(i)` drives lag i, from 0, and `direct` the residual.
     fn response(
         &self,
         frequency: f64,

@@ -11,9 +11,10 @@ use nalgebra::{Complex, DMatrix};
 
 /// A gain counts as zero below this times the accuracy of the family.
 const ACCURACIES: f64 = 10.0;
-/// A decoupling error up to the first is the rounding of the data; a larger one comes from a coupling that
-/// counted as zero, so that smaller tolerances are tried while the last one is above the second.
+/// A decoupling error up to this comes from rounding of the data; a larger one comes from a coupling that
+/// counted as zero, so that smaller tolerances are tried.
 const DECOUPLED: f64 = 1e-6;
+/// A tolerance above this is reduced once more.
 const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// The largest decoupling error that is accepted.
 const ALLOWED: f64 = 1e-3;
@@ -26,11 +27,11 @@ pub struct Requirements {
     /// Poles of the generator, real and stable: s < 0, or 1e-3 < z < 1 in sampled time. A generator of
     /// order k has the first k of them; the last one is repeated as often as necessary.
     pub poles: Vec<f64>,
-    /// The frequency, in rad per unit of time, at which the residual must respond to each fault of
-    /// its pattern: 0 for constant faults.
+    /// The frequency, in rad per unit of time, from 0, at which the residual must respond to each fault
+    /// of its pattern: 0 for constant faults.
     pub frequency: f64,
-    /// Smallest gain of a fault that is accepted, relative to the largest that the fault can have
-    /// for the same effect of noise, in (0, 1).
+    /// The smallest accepted gain of a fault, relative to the largest that the fault can have for the same
+    /// effect of noise, in (0, 1).
     pub quality: f64,
     /// Relative singular values below this count as zero. If the residual then is not decoupled up to
     /// 1e-6 (see [`Residual::decoupling_error`]), smaller values are tried.
@@ -47,13 +48,13 @@ impl Requirements {
         Self { poles, frequency: 0.0, quality: 1e-3, tolerance: 1e-7, noise: None }
     }
 
-    /// The first k poles.
+    /// The first k poles; the last one is repeated if there are fewer.
     pub(super) fn poles(&self, k: usize) -> Vec<f64> {
         let last = self.poles[self.poles.len() - 1];
         (0..k).map(|at| self.poles.get(at).copied().unwrap_or(last)).collect()
     }
 
-    /// The modulus of the fastest pole, as a frequency.
+    /// The decay rate of the fastest pole, in rad per unit of time.
     pub(super) fn fastest(&self, domain: Domain) -> f64 {
         let rate = |pole: &f64| match domain {
             Domain::Continuous => -pole,
@@ -62,6 +63,7 @@ impl Requirements {
         self.poles.iter().map(rate).fold(0.0, f64::max)
     }
 
+    /// Checks the ranges of all requirements, and the number of entries of the noise.
     pub(super) fn check(&self, measurements: usize, domain: Domain) -> Result<(), Error> {
         let (low, high, rule) = match domain {
             Domain::Continuous => {
@@ -74,8 +76,12 @@ impl Requirements {
         if let Some(value) = first_bad.or(self.poles.is_empty().then_some(f64::NAN)) {
             return Err(Error::OutOfRange { name: "poles", value, rule });
         }
+        let Self { frequency, quality, .. } = *self;
+        let is_frequency = frequency >= 0.0 && frequency.is_finite();
+        check::that(is_frequency, "frequency", frequency, "a finite number from 0")?;
         check::positive("tolerance", self.tolerance)?;
-        check::positive("quality", self.quality)?;
+        let is_part = quality > 0.0 && quality < 1.0;
+        check::that(is_part, "quality", quality, "above 0 and below 1")?;
         if let Some(noise) = &self.noise {
             noise.iter().try_for_each(|&size| check::positive("noise", size))?;
             check::length("noise", noise, measurements)?;
@@ -90,14 +96,14 @@ impl Requirements {
 pub struct Residual {
     /// The generator, with one residual. Its order is the least one for this pattern.
     pub generator: ResidualGenerator,
-    /// The response of the residual to the faults f: the poles are those of the generator. The
-    /// columns of decoupled faults are zero up to rounding.
+    /// The system from the faults f to the residual, with the poles of the generator. The columns of
+    /// decoupled faults are zero up to rounding.
     pub from_faults: StateSpace,
-    /// The gain of each fault at the required frequency: 1 if the pattern has one fault; otherwise
-    /// the largest has the modulus 1.
+    /// The gain of each fault at the required frequency; the largest of the pattern has the modulus 1. The
+    /// gain of a single fault of the pattern at frequency 0 is 1.
     pub gains: Vec<Complex<f64>>,
-    /// The smallest gain of a fault of the pattern, each relative to the largest gain that it can
-    /// have for the same effect of noise.
+    /// The smallest relative gain of the faults of the pattern. The gain of a fault is relative to the
+    /// largest that it can have for the same effect of noise.
     pub quality: f64,
     /// Number of modes of the plant that no command, disturbance or fault moves. Their initial
     /// values count as zero: they may appear in the residual.
@@ -113,7 +119,7 @@ pub struct Residual {
 /// Computes a residual generator of least order that responds to the faults with `pattern[fault]`
 /// and is decoupled from commands, disturbances and all other faults.
 ///
-/// `pattern`: one entry per fault, at least one true. Without faults of the pattern and noise the
+/// `pattern`: one entry per fault, at least one true. Without noise and without faults of the pattern the
 /// residual decays with the prescribed poles for all commands, disturbances and decoupled faults, from all
 /// initial states of the reachable part of the plant. Method, cost and sources: see
 /// [`crate::isolation`]; about 100 n^3 multiplications for each order that is tried. The order is
@@ -149,11 +155,12 @@ pub struct Residual {
 ///
 /// # Errors
 ///
-/// [`Error::FaultNotIsolable`] names a fault of the pattern that no such residual shows at the
-/// required frequency; [`Error::OutOfRange`] for `requirements`, and when no order reaches the
-/// quality; [`Error::ResidualTooLarge`] if the decoupling error of the result is above 1e-3 for all
-/// tolerances; same as [`DisturbedPlant::check`]; [`Error::Shape`] if `pattern` has not one entry per
-/// fault; [`Error::NotConverged`], [`Error::Overflow`] when an inner computation fails.
+/// [`Error::FaultNotIsolable`] names a fault of the pattern to which no such residual responds at the
+/// required frequency; [`Error::OutOfRange`] for `requirements`, and if no order reaches the quality;
+/// [`Error::ResidualTooLarge`] if the decoupling error of the result is above 1e-3 for all tolerances; same
+/// as [`DisturbedPlant::check`]; [`Error::Shape`] if `pattern` has not one entry per fault or the noise not
+/// one per measurement; [`Error::Empty`] if no entry of `pattern` is true; [`Error::NotPositiveDefinite`],
+/// [`Error::NotConverged`], [`Error::Overflow`] if an inner computation fails.
 pub fn residual_generator(
     plant: &DisturbedPlant,
     pattern: &[bool],
@@ -185,7 +192,7 @@ pub fn residual_generator(
     Err(Error::ResidualTooLarge { equation, residual, allowed: ALLOWED })
 }
 
-/// The generator that follows when relative singular values below `tolerance` count as zero.
+/// The generator for which relative singular values below `tolerance` count as zero.
 fn with_tolerance(
     plant: &DisturbedPlant,
     pattern: &[bool],
@@ -241,7 +248,7 @@ fn least_order(
             0 => (part.c.nrows(), blocks.first().copied().unwrap_or(0)),
             _ => (blocks[k - 1], blocks.get(k).copied().unwrap_or(0)),
         };
-        // No further annihilator begins at this order.
+        // This order adds no generator to those of lower orders.
         if before == here {
             continue;
         }
@@ -342,8 +349,8 @@ pub(super) fn gains(from_faults: &StateSpace, frequency: f64) -> Vec<Complex<f64
     (0..b.ncols()).map(gain).collect()
 }
 
-/// Scales the residual such that the largest gain of a fault of the pattern is 1, with the sign of
-/// the first one positive.
+/// Scales the residual so that the largest gain of a fault of the pattern has the modulus 1, and the larger
+/// part of the first one, real or imaginary, is positive.
 fn normalise(residual: &mut Residual, pattern: &[bool]) {
     let both = residual.gains.iter().zip(pattern);
     let responses: Vec<_> =
@@ -362,5 +369,26 @@ fn normalise(residual: &mut Residual, pattern: &[bool]) {
     }
     for gain in gains {
         *gain *= scale;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requirements_out_of_range_are_refused_by_name() {
+        let refused = |requirements: Requirements| match requirements.check(1, Domain::Continuous) {
+            Err(Error::OutOfRange { name, .. }) => name,
+            other => panic!("{other:?}"),
+        };
+        let good = Requirements::with_pole(-1.0);
+        assert_eq!(good.check(1, Domain::Continuous), Ok(()));
+        for frequency in [f64::NAN, f64::INFINITY, -1.0] {
+            assert_eq!(refused(Requirements { frequency, ..good.clone() }), "frequency");
+        }
+        for quality in [f64::NAN, 0.0, 1.0] {
+            assert_eq!(refused(Requirements { quality, ..good.clone() }), "quality");
+        }
     }
 }

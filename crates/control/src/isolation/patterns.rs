@@ -25,19 +25,19 @@ pub struct AchievablePattern {
 
 /// All patterns of residuals that are decoupled from the commands and the disturbances.
 ///
-/// `requirements`: its frequency decides which patterns are strong; its poles only must be stable.
-/// Starting with no fault decoupled, further faults are decoupled one by one; the faults to which
-/// the remaining innovation does not respond are decoupled with them. The patterns are those of all
-/// sets found, the ones with most faults first. Up to 2^q sets, each at the cost of the decoupling,
-/// about 20 n^3 multiplications.
+/// `requirements`: its frequency decides which patterns are strong, its tolerance which singular values count
+/// as zero; the other fields are only checked. Starting with no fault decoupled, further faults are decoupled
+/// one by one; faults to which no residual then responds are decoupled with them. Patterns with most faults
+/// come first. Up to 2^q sets of faults, each at the cost of the decoupling, about 20 n^3 multiplications.
 ///
-/// Source: A. Varga, Solving fault diagnosis problems (2017), section 5.4; the recursion is the one
-/// of his genspec, on unobservability subspaces in place of rational null spaces.
+/// Source: A. Varga, Solving fault diagnosis problems (2017), section 5.4; the recursion of his genspec, on
+/// unobservability subspaces in place of rational null spaces.
 ///
 /// # Errors
 ///
 /// Same as [`DisturbedPlant::check`]; [`Error::OutOfRange`] for `requirements`, and for more than
-/// 4096 patterns; [`Error::NotConverged`], [`Error::Overflow`] when an inner computation fails.
+/// 4096 patterns; [`Error::Shape`] if the noise has not one entry per measurement; [`Error::NotConverged`],
+/// [`Error::Overflow`] if an inner computation fails.
 pub fn achievable_patterns(
     plant: &DisturbedPlant,
     requirements: &Requirements,
@@ -109,7 +109,7 @@ fn is_strong(
 }
 
 /// The structure matrix of several residuals: entry (i, j) is true if the gain of residual i for
-/// fault j at `frequency` is at least `threshold` times the largest gain of the residual.
+/// fault j at `frequency` is above zero and at least `threshold` times the largest gain of the residual.
 ///
 /// # Errors
 ///

@@ -59,19 +59,20 @@ impl DisturbedPlant {
         self.domain.check()
     }
 
-    /// The columns of the disturbances and of the faults with `decoupled[fault]`.
+    /// The columns of the disturbances and of the faults with `decoupled[fault]`: of `B_d` and `B_f`, and of
+    /// `D_d` and `D_f`.
     pub(super) fn unknown_inputs(&self, decoupled: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
-        let chosen: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
-        let with_chosen =
-            |m: &DMatrix<f64>, of: &DMatrix<f64>| beside(m, &of.select_columns(&chosen));
-        (with_chosen(&self.b_d, &self.b_f), with_chosen(&self.d_d, &self.d_f))
+        let faults: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
+        let with_faults =
+            |m: &DMatrix<f64>, of: &DMatrix<f64>| beside(m, &of.select_columns(&faults));
+        (with_faults(&self.b_d, &self.b_f), with_faults(&self.d_d, &self.d_f))
     }
 
     /// The plant without the modes that no input moves, in balanced coordinates, and the number of these
     /// modes.
     ///
-    /// Such a mode depends on the initial state alone. [`super::residual_generator`] leaves it out, so
-    /// that its initial value counts as zero: the norm of a quaternion, for example. Method: A is
+    /// Such a mode, for example the norm of a quaternion, depends on the initial state alone.
+    /// [`super::residual_generator`] leaves it out, so that its initial value counts as zero. Method: A is
     /// balanced; then the staircase form of (A, [`B_u`, `B_d`, `B_f`]) by orthogonal transformations,
     /// where singular values below `tolerance` count as zero, relative to the norm of A and to
     /// columns of length one.
@@ -90,7 +91,7 @@ impl DisturbedPlant {
         let mut gap = Gap::none();
         let dual = (&matrix / size).transpose();
         let (basis, _) = observable_states(&dual, &inputs, tolerance, &mut gap)?;
-        // Without an unreachable mode the coordinates stay what they are, up to their scale.
+        // If all modes are reachable, only the scale of the coordinates changes.
         let left = n - basis.ncols();
         let basis = if left == 0 { DMatrix::identity(n, n) } else { basis };
         let part = Self {

@@ -1,4 +1,4 @@
-//! Verification of a residual generator on the plant for which it was made.
+//! Verification of a residual generator on its plant.
 
 use super::DisturbedPlant;
 use crate::blocks::{ComplexMatrix, beside, to_complex};
@@ -20,8 +20,10 @@ const SAMPLED: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 0.9];
 ///
 /// g is a column of the plant with b and d, [`q_u`, `q_y`] the generator, `c_i` the length of row i of C.
 /// The last term, the effect that an input of this size could have, keeps rounding errors out where
-/// no terms cancel. `plant`: in balanced coordinates. The largest over commands, disturbances and decoupled faults, at five frequencies; one at which
-/// plant or generator have a pole is left out.
+/// no terms cancel. The result is the largest over commands, disturbances and decoupled faults, at five
+/// frequencies; a frequency at which plant or generator have a pole is left out.
+///
+/// `plant`: in balanced coordinates; `fastest`: the rate of the fastest pole of the generator.
 pub(super) fn decoupling_error(
     plant: &DisturbedPlant,
     pattern: &[bool],
@@ -29,7 +31,7 @@ pub(super) fn decoupling_error(
     fastest: f64,
 ) -> f64 {
     let commands = plant.b_u.ncols();
-    let before = commands + plant.b_d.ncols();
+    let first_fault = commands + plant.b_d.ncols();
     let whole = StateSpace {
         a: plant.a.clone(),
         b: beside(&beside(&plant.b_u, &plant.b_d), &plant.b_f),
@@ -60,7 +62,8 @@ pub(super) fn decoupling_error(
         let (q_u, q_y) = (q.columns(0, commands), q.columns(commands, plant.c.nrows()));
         let strongest = q_y.iter().zip(&lengths).map(|(q, length)| q.norm() * length);
         let strongest = strongest.fold(0.0, f64::max);
-        for input in (0..g.ncols()).filter(|&input| input < before || !pattern[input - before]) {
+        let is_decoupled = |input: &usize| *input < first_fault || !pattern[*input - first_fault];
+        for input in (0..g.ncols()).filter(is_decoupled) {
             let direct = if input < commands { q_u[(0, input)] } else { Complex::new(0.0, 0.0) };
             let column = g.column(input);
             let terms = q_y.iter().zip(column.iter());

@@ -14,7 +14,7 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Largest number of inputs with a loss: a box has a corner for every combination.
+/// Largest number of inputs with a loss: a box over k inputs has 2^k corners.
 const MOST_INPUTS: usize = 6;
 /// Number of points between no loss and the largest loss at which stability is tested.
 const POINTS: u32 = 50;
@@ -46,17 +46,18 @@ pub struct LossyLoop {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ConstantLimit {
-    /// The factor of the box, from no loss, up to which the loop is stable; `most` if it is stable in the
-    /// whole range.
+    /// The factor of the box up to which the loop is stable; `most` if it is stable in the whole box, 0 if it
+    /// is not stable without loss.
     pub factor: f64,
-    /// The losses at which the loop becomes unstable; those of the least stable corner if it does not.
+    /// The losses at which the loop becomes unstable; the least stable of the tested losses on the far faces
+    /// of the box if the loop is stable in the whole box.
     pub loss: Vec<f64>,
 }
 
 impl LossyLoop {
-    /// The loop of `plant` and `controller`, of which the inputs `inputs` may lose effect.
+    /// The loop of `plant` and `controller` in which the inputs `inputs` may lose effect.
     ///
-    /// `plant`: in the time domain of `controller`; `inputs`: from zero, at least one, at most six.
+    /// `plant`: in the time domain of `controller`; `inputs`: indices from zero, at least one, at most six.
     ///
     /// # Errors
     ///
@@ -108,22 +109,23 @@ impl LossyLoop {
     /// Computes the factor t up to which the loop is stable for every constant loss in the box from 0 to t
     /// times `largest`, by eigenvalues.
     ///
-    /// `largest`: one number for each input, above zero for at least one; `most`: the largest t. On rays
-    /// from no loss to points on the far faces of the box, its corners among them, 50 losses each are
-    /// tested, and the first loss of stability is located by bisection. For one input that is the limit
-    /// itself, unless an unstable interval lies between two points; for several it is an upper bound of
-    /// the limit, and what is beyond it is unstable.
+    /// `largest`: one number for each input, from zero to one, above zero for at least one; `most`: the
+    /// largest t. On each ray from no loss to a point on a far face of the box, the corners among them, 50
+    /// losses are tested, and the first loss of stability is located by bisection. For one input the result is
+    /// the limit itself, unless an unstable interval lies between two tested losses; for several inputs it is
+    /// an upper bound of the limit: there are unstable losses in every larger box.
     ///
     /// # Errors
     ///
-    /// Same as [`instability`]; [`Error::OutOfRange`] for a bad `largest` or `most`.
+    /// Same as [`instability`]; [`Error::Shape`] or [`Error::NotFinite`] for a bad `largest`;
+    /// [`Error::OutOfRange`] for a bad `largest` or `most`.
     pub fn constant_limit(&self, largest: &[f64], most: f64) -> Result<ConstantLimit, Error> {
         self.check(largest)?;
         check::positive("the largest factor", most)?;
         let mut limit = ConstantLimit { factor: most, loss: Vec::new() };
         let mut least_stable = f64::NEG_INFINITY;
         for direction in directions(largest) {
-            let factor = self.along(&direction, limit.factor)?;
+            let factor = self.stability_limit(&direction, limit.factor)?;
             let loss: Vec<f64> = direction.iter().map(|part| part * factor).collect();
             if factor < limit.factor {
                 limit = ConstantLimit { factor, loss };
@@ -137,8 +139,9 @@ impl LossyLoop {
         Ok(limit)
     }
 
-    /// The largest t, at most `end`, such that the loop is stable from zero to t times `direction`.
-    pub(super) fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
+    /// The largest t, at most `end`, such that the loop is stable at the tested losses up to t times
+    /// `direction`; 0 if it is not stable without loss.
+    pub(super) fn stability_limit(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
         let stable = |t: f64| {
             let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();
             Ok::<_, Error>(self.instability(&loss)? < 0.0)
@@ -168,6 +171,7 @@ impl LossyLoop {
         instability(&self.at(loss), self.domain)
     }
 
+    /// Checks the largest losses: one for each input, from zero to one, not all zero.
     fn check(&self, largest: &[f64]) -> Result<(), Error> {
         check::column("the largest losses", largest, self.effects.len())?;
         let rule = "from zero to one, above zero for at least one input";
@@ -179,19 +183,21 @@ impl LossyLoop {
     }
 }
 
-/// All combinations of `points` values from 0 to the largest of each input.
+/// All combinations of `points` losses from 0 to the largest of each input; an input whose largest loss is 0
+/// has this loss only.
 pub(super) fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
     largest.iter().fold(vec![Vec::new()], |all, largest| {
         let values = if *largest > 0.0 { points } else { 1 };
         let value = |at: usize| largest * as_number(at) / as_number(points - 1);
-        let extended = |begun: &Vec<f64>| -> Vec<_> {
-            (0..values).map(|at| [begun.as_slice(), &[value(at)]].concat()).collect()
+        let extended = |prefix: &Vec<f64>| -> Vec<_> {
+            (0..values).map(|at| [prefix.as_slice(), &[value(at)]].concat()).collect()
         };
         all.iter().flat_map(extended).collect()
     })
 }
 
-/// Points on the faces of the box away from 0, of a grid with at most 11 points for each input.
+/// The points on the far faces of the box, those where an input has its largest loss, of a grid with at most 11
+/// points for each input; fewer if there were more than 70.
 fn directions(largest: &[f64]) -> Vec<Vec<f64>> {
     let lossy = largest.iter().filter(|loss| **loss > 0.0).count();
     let power = |base: usize| base.pow(u32::try_from(lossy).unwrap_or(u32::MAX));

@@ -5,11 +5,12 @@ use crate::check::as_number;
 use crate::faulty_plant::FaultyPlant;
 use crate::{Error, StateSpace, check};
 
-/// Largest number of points of the grid over several inputs.
+/// Largest number of points of the grid over all inputs.
 const GRID: usize = 1000;
+/// Largest number of points of the grid for one input.
 const GRID_PER_INPUT: usize = 11;
 
-/// Estimates the part E of its effect that an input has lost, from the estimate of f = -E u.
+/// Estimates the loss of effectiveness E of an input from the estimate of the fault f = -E u.
 ///
 /// ```text
 /// E_hat = -u f_hat / (u^2 + u_e^2)
@@ -33,32 +34,32 @@ pub fn estimated_loss(u: f64, f_hat: f64, excitation: f64) -> Result<f64, Error>
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossTolerance {
-    /// Loss up to which the loop is stable if all inputs lose the same part.
+    /// The loss up to which the loop is stable if all inputs lose the same part; at most the largest loss.
     pub common: f64,
-    /// For each input, the loss up to which the loop is stable if only this input loses.
+    /// For each input, the loss up to which the loop is stable if only this input loses effect.
     pub single: Vec<f64>,
-    /// The point of the grid over all combinations where the loop is least stable.
+    /// The losses, a point of the grid over all combinations, at which the loop is least stable.
     pub worst: Vec<f64>,
-    /// [`instability`](crate::stability::instability) there; negative when the loop is stable at every point of the grid.
+    /// [`instability`](crate::stability::instability) at `worst`; negative if the loop is stable at every
+    /// point of the grid.
     pub worst_instability: f64,
 }
 
 /// Computes the constant losses E up to which the loop of the plant x' = A x + B (I - E) u and the
 /// controller is stable.
 ///
-/// `plant`: in the time domain of `controller`; `inputs`: which inputs may lose effect, from zero;
+/// `plant`: in the time domain of `controller`; `inputs`: the inputs that may lose effect, indices from zero;
 /// `largest`: the largest loss of each, in (0, 1]. For a constant E the loop is linear and its
-/// eigenvalues decide stability. On each line 50 points are tested and the first loss of stability
-/// is located by bisection; an unstable interval between two points is missed. The grid has 11
-/// points for each input, fewer if there were more than 1000 combinations, at least the corners.
-/// The observer receives the command, not its remaining effect, so that the loss acts on it as a
-/// fault.
+/// eigenvalues decide stability. For `common` and each entry of `single` 50 losses are tested, and the first
+/// loss of stability is located by bisection; an unstable interval between two tested losses is missed. The
+/// grid has 11 points for each input, fewer if there were more than 1000 combinations, at least the corners.
+/// The observer receives the command without the loss, so that the loss acts on it as a fault.
 ///
 /// # Errors
 ///
 /// Same as [`closed_loop`](crate::controller::closed_loop) and
 /// [`instability`](crate::stability::instability); [`Error::OutOfRange`] for a bad
-/// `largest`, an input that does not exist, or more than nine inputs.
+/// `largest`, an input that does not exist, no inputs, or more than nine inputs.
 pub fn loss_tolerance(
     plant: &FaultyPlant,
     controller: &StateSpace,
@@ -74,7 +75,7 @@ pub fn loss_tolerance(
     let alone = |at: usize| {
         let mut direction = vec![0.0; count];
         direction[at] = 1.0;
-        lossy.along(&direction, largest)
+        lossy.stability_limit(&direction, largest)
     };
     let (mut worst, mut worst_instability) = (vec![0.0; count], f64::NEG_INFINITY);
     for loss in grid(&vec![largest; count], points(count)) {
@@ -84,14 +85,14 @@ pub fn loss_tolerance(
         }
     }
     Ok(LossTolerance {
-        common: lossy.along(&vec![1.0; count], largest)?,
+        common: lossy.stability_limit(&vec![1.0; count], largest)?,
         single: (0..count).map(alone).collect::<Result<_, _>>()?,
         worst,
         worst_instability,
     })
 }
 
-/// The largest number of points for each input, at most eleven, whose grid is small enough.
+/// The number of points for each input, from 2 to 11: the largest whose grid has at most 1000 points.
 fn points(inputs: usize) -> usize {
     let inputs = u32::try_from(inputs).unwrap_or(u32::MAX);
     let fits = |points: &usize| points.checked_pow(inputs).is_some_and(|all| all <= GRID);

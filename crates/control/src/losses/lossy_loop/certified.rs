@@ -1,4 +1,4 @@
-//! What one Lyapunov matrix proves about losses that vary.
+//! Proofs by one Lyapunov matrix for losses that vary.
 
 use super::LossyLoop;
 use crate::Error;
@@ -7,14 +7,14 @@ use crate::stability::instability;
 
 /// Relative accuracy of the largest certified factor and of the largest certified decay rate.
 const WIDTH: f64 = 1e-2;
-/// The smallest part of the decay rate of the corners that is tried.
+/// The smallest decay rate that is tried, relative to the slowest of the corners.
 const SLOWEST: f64 = 1e-3;
 
-/// Losses that are proven to leave a loop stable, also if they vary.
+/// A box of losses for which a loop is proven stable, also if they vary.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CertifiedLoss {
-    /// The factor of the box; zero if not even small losses are proven.
+    /// The factor of the box; zero if no factor above 1 % of the largest tried one is proven.
     pub factor: f64,
     /// The proof, if the factor is above zero.
     pub certificate: Option<RegionCertificate>,
