@@ -23,23 +23,23 @@ pub struct SampledLoop<'a> {
     pub period: f64,
 }
 
-/// Computes the peak gains of a sampled loop over all times, not over the samples only: from faults of
-/// any course, from f' of faults without jumps, and from the part of such faults that the compensation
+/// Computes upper bounds of the peak gains of a sampled loop over all times, not over the samples only: from
+/// arbitrary faults, from f' of faults without jumps, and from the part of such faults that the compensation
 /// leaves.
 ///
 /// ```text
 /// x(kT + t) = Phi(t) x[k] + Gamma(t) u[k] + integral of e^(A (t - s)) F_a f(kT + s) ds over s from 0 to t
 /// ```
 ///
-/// `parts`: N, into how many parts each interval is divided; `rows`: the positions in [x; e; eps] of the
-/// outputs, where x has the plant's states at all times, and e and eps
-/// those at the samples, where the estimates are made; each result has a row for each of them and q
-/// columns; `width`: see [`peak_gain`]. The fault is taken constant over each part, with
-/// any sequence of values, and x is read at the start of each part; with growing N the gains
-/// approach those of arbitrary faults, with an error of the order of 1/N. The gains of the
-/// [`super::peak_gain`] of [`super::fault_system`] are those of N = 1: a fault that changes at the
-/// samples only, seen at the samples only. Every (i, j) is the sum of |`h_ij`| over all parts and
-/// samples, from above.
+/// `parts`: N, the number of parts of each interval, at least 1; `rows`: the positions in [x; e; eps] of the
+/// outputs, at least one, where x are the states of the plant at all times, and e and eps are the errors at
+/// the samples, where the estimates are computed; `width`: see [`peak_gain`]. Each result has a row for each
+/// output and q columns.
+///
+/// The fault is constant over each part, with any sequence of values, and x is read at the start of each
+/// part; with growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With
+/// N = 1 they are those of [`peak_gain`] for [`super::fault_system`]: the fault changes only at the samples,
+/// and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
 /// Systems, Springer (1995), chapter 10.
@@ -78,7 +78,8 @@ struct Lifted<'a> {
     entry: DMatrix<f64>,
 }
 
-/// How an input acts: on x at the end of the interval, on x at the start of each part, and on eps.
+/// The effects of an input on the loop over one interval: on x at its end and at the start of each part, and on
+/// eps.
 struct Effects {
     /// For each part of the input: its effect on x[k+1], n + filters rows.
     states_after: Vec<DMatrix<f64>>,
@@ -113,21 +114,21 @@ impl<'a> Lifted<'a> {
         self.phi.len() - 1
     }
 
-    /// The effect at time i h of a fault of one during part j.
+    /// The effect on x at time i h of a fault of one during part j, n x q; zero if part j is not before i h.
     fn effect(&self, i: usize, j: usize) -> DMatrix<f64> {
         if j < i { &self.phi[i - 1 - j] * &self.entry } else { &self.entry * 0.0 }
     }
 
-    /// The rows of the sampled `F_a` of the filter, which sees the fault at the samples.
-    fn at_samples(&self) -> DMatrix<f64> {
+    /// The rows of the sampled `F_a` for the states of the filter, on which the fault acts at the samples.
+    fn filter_entry(&self) -> DMatrix<f64> {
         let all = self.plant.a.nrows();
         self.plant.f_a.rows(self.states, all - self.states).into_owned()
     }
 
-    /// The input f, one value for each part.
+    /// The effects of f, with one value for each part.
     fn faults(&self) -> Effects {
         let count = self.parts();
-        let filter = |j| self.at_samples() * f64::from(u8::from(j == 0));
+        let filter = |j| self.filter_entry() * f64::from(u8::from(j == 0));
         let states_after = |j| stacked(&self.effect(count, j), &filter(j));
         Effects {
             states_after: (0..count).map(states_after).collect(),
@@ -137,15 +138,15 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The input f', one value for each part: f in part j is f[k] + h times the sum of those before.
+    /// The effects of f', with one value for each part: f in part j is f[k] + h times the sum of the values before.
     fn rates(&self) -> Effects {
         let count = self.parts();
         let sum = |i: usize, r: usize| {
             let zero = &self.entry * 0.0;
             (r + 1..i).fold(zero, |sum, j| sum + self.effect(i, j)) * self.part
         };
-        let nothing = self.at_samples() * 0.0;
-        let states_after = |r| stacked(&sum(count, r), &nothing);
+        let filter = self.filter_entry() * 0.0;
+        let states_after = |r| stacked(&sum(count, r), &filter);
         Effects {
             states_after: (0..count).map(states_after).collect(),
             outputs: (0..count).map(|i| (0..count).map(|r| sum(i, r)).collect()).collect(),
@@ -154,35 +155,35 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The input f[k] of a fault without jumps: `F_a` + B `K_f` of the sampled plant.
+    /// The effects of f[k] of a fault without jumps: `F_a` + B `K_f` of the sampled plant.
     fn uncancelled(&self) -> Effects {
         let Gains { k_f, .. } = self.gains;
         let until = |i: usize| (0..i).fold(&self.gamma[i] * k_f, |sum, j| sum + self.effect(i, j));
         Effects {
-            states_after: vec![stacked(&until(self.parts()), &self.at_samples())],
+            states_after: vec![stacked(&until(self.parts()), &self.filter_entry())],
             outputs: (0..self.parts()).map(|i| vec![until(i)]).collect(),
             next_error: vec![0.0],
             present_error: vec![0.0],
         }
     }
 
-    /// The rows of [x; e; `f_hat` or eps; `x_i`] from which x at the start of part i follows.
+    /// The matrix from the state [x; e; `f_hat` or eps; `x_i`] of the loop to x at the start of part i.
     fn output(&self, i: usize) -> DMatrix<f64> {
         let Gains { k_x, k_f, integral, .. } = self.gains;
-        let (of_states, of_faults) = (&self.gamma[i] * k_x, &self.gamma[i] * k_f);
-        let mut of_errors = -&of_states;
+        let (from_states, from_faults) = (&self.gamma[i] * k_x, &self.gamma[i] * k_f);
+        let mut from_errors = -&from_states;
         if let Some(direct) = self.gains.direct(self.plant) {
-            of_errors += &of_faults * direct;
+            from_errors += &from_faults * direct;
         }
         let phi = self.phi[i].clone().resize_horizontally(self.plant.a.nrows(), 0.0);
-        let rows = beside(&beside(&(phi + of_states), &of_errors), &of_faults);
+        let rows = beside(&beside(&(phi + from_states), &from_errors), &from_faults);
         match integral {
             Some(integral) => beside(&rows, &(&self.gamma[i] * &integral.gain)),
             None => rows,
         }
     }
 
-    /// The effect of part j on the state of the loop.
+    /// The effect of part j of an input on the state of the loop at the next sample.
     fn input(&self, inputs: &Effects, j: usize) -> DMatrix<f64> {
         let (n, q) = self.plant.f_a.shape();
         let states_after = &inputs.states_after[j];
@@ -245,7 +246,7 @@ impl<'a> Lifted<'a> {
             for (mut gains, &row) in largest.row_iter_mut().zip(rows) {
                 for read in at..at + reads(row).len() {
                     for fault in 0..q {
-                        // The parts of a fault act together; of x the largest value counts.
+                        // The effects of all parts of a fault add up; the largest value of x counts.
                         let parts = (0..count).map(|j| sums[(read, first + j * q + fault)]);
                         gains[fault] = parts.sum::<f64>().max(gains[fault]);
                     }

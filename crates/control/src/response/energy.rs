@@ -55,8 +55,8 @@ pub struct Energy {
 pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     system.check()?;
     let covariance = match covariance(system) {
-        // States that w does not reach have the covariance zero, of which only rounding is found.
-        Err(error @ Error::ResidualTooLarge { .. }) => match reached_part(system)? {
+        // States that w does not reach have the covariance zero; the computed one is rounding alone.
+        Err(error @ Error::ResidualTooLarge { .. }) => match reachable_part(system)? {
             Some(part) => covariance(&part)?,
             None => return Err(error),
         },
@@ -90,8 +90,8 @@ fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
     Ok(symmetric_part(&covariance))
 }
 
-/// The states that w reaches; None if these are all, or none.
-fn reached_part(system: &StateSpace) -> Result<Option<StateSpace>, Error> {
+/// The system without the states that w does not reach; None if w reaches all states, or none.
+fn reachable_part(system: &StateSpace) -> Result<Option<StateSpace>, Error> {
     let staircase = Staircase::new(&system.a, &system.b)?;
     if staircase.decision.is_full() || staircase.decision.rank == 0 {
         return Ok(None);

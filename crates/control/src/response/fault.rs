@@ -13,11 +13,11 @@ const WIDTH: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FaultBounds {
-    /// Of |`x_i`|, n.
+    /// Bounds of |`x_i`|, n.
     pub states: Vec<f64>,
-    /// Of |`x_i` - `x_hat_i`|, n.
+    /// Bounds of |`x_i` - `x_hat_i`|, n.
     pub state_errors: Vec<f64>,
-    /// Of |`f_hat_j` - `f_j`|, q.
+    /// Bounds of |`f_hat_j` - `f_j`|, q.
     pub fault_errors: Vec<f64>,
 }
 
@@ -28,9 +28,9 @@ pub struct FaultBounds {
 /// ```
 ///
 /// z = [x; e; eps]; `gain_f` is the [`super::peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that
-/// of the two halves of the inputs of [`super::fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|;
-/// `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, infinite if the fault may jump (in sampled
-/// time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
+/// of the two halves of the inputs of [`super::fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|,
+/// above zero; `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, above zero, infinite if the fault may jump
+/// (in sampled time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
 /// rest with the commands within the limits of the actuators, and each of the two terms alone is
 /// the least upper bound for its class of faults. Unlike delta of theorem 1, each quantity has its
 /// own bound in its own unit. The bounds are the upper ends of brackets of relative width 1e-3.
@@ -57,10 +57,7 @@ pub fn fault_bounds(
 ) -> Result<FaultBounds, Error> {
     let (n, q) = plant.f_a.shape();
     for (name, bounds) in [("magnitudes", magnitudes), ("rates", rates)] {
-        if bounds.len() != q {
-            let (expected, actual) = ((q, 1), (bounds.len(), 1));
-            return Err(Error::Shape { matrix: name, expected, actual });
-        }
+        check::length(name, bounds, q)?;
     }
     for (&magnitude, &rate) in magnitudes.iter().zip(rates) {
         check::positive("magnitude", magnitude)?;
@@ -77,8 +74,8 @@ pub fn fault_bounds(
             if rates[j] == f64::INFINITY {
                 return by_size;
             }
-            let left = uncancelled[(output, j)] * magnitudes[j];
-            by_size.min(gain_of_rate[(output, j)] * rates[j] + left)
+            let remainder = uncancelled[(output, j)] * magnitudes[j];
+            by_size.min(gain_of_rate[(output, j)] * rates[j] + remainder)
         };
         (0..q).map(of_fault).sum::<f64>()
     };
@@ -93,11 +90,11 @@ pub fn fault_bounds(
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Reversal {
-    /// Of the states, n.
+    /// Peaks and settling times of the states, n.
     pub states: Vec<Transient>,
-    /// Of the errors x - `x_hat`, n.
+    /// Peaks and settling times of the errors x - `x_hat`, n.
     pub state_errors: Vec<Transient>,
-    /// Of the errors `f_hat` - f, q.
+    /// Peaks and settling times of the errors `f_hat` - f, q.
     pub fault_errors: Vec<Transient>,
     /// The outputs [x; e; eps] over time, for figures.
     pub trace: TimeResponse,
@@ -106,9 +103,9 @@ pub struct Reversal {
 /// Computes the response of the loop, from rest, to a change of one fault, such as a reversal of
 /// friction.
 ///
-/// `fault`: which fault, an index from 0; `change`: the size of the change in the unit of the
-/// fault, 2 `F_s` for friction that reverses from -`F_s` to `F_s`; `rate`: above zero, None for a
-/// jump; `fraction`: the band of the settling times, relative to the largest distance of the
+/// `fault`: the index of the fault, from 0; `change`: the size of the change in the unit of the
+/// fault, above zero, 2 `F_s` for friction that reverses from -`F_s` to `F_s`; `rate`: the rate of the change,
+/// above zero, None for a jump; `fraction`: the band of the settling times, relative to the largest distance of the
 /// quantity from its final value. The loop is linear, so that this is the step or ramp response of
 /// [`fault_system`]. The peaks of the states predict the amplitude (half of peak to peak) of the
 /// limit cycle that remains after compensation, provided that the loop settles between reversals.
@@ -139,9 +136,9 @@ pub struct Reversal {
 /// let one = |value| DMatrix::from_element(1, 1, value);
 /// let plant = aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
 /// let gains = aso::design(&plant, &real_poles(&[-1.0]), &real_poles(&[-20.0, -30.0]), None)?.gains;
-/// let turn = response::reversal(&plant, &gains, Domain::Continuous, 0, 2.0, None, 0.02)?;
-/// assert!((turn.fault_errors[0].peak + 2.0).abs() < 1e-12);
-/// assert!(turn.states[0].final_value.abs() < 1e-12);
+/// let reversal = response::reversal(&plant, &gains, Domain::Continuous, 0, 2.0, None, 0.02)?;
+/// assert!((reversal.fault_errors[0].peak + 2.0).abs() < 1e-12);
+/// assert!(reversal.states[0].final_value.abs() < 1e-12);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///

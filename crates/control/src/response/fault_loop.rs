@@ -47,7 +47,7 @@ pub fn fault_system(
     Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
 }
 
-/// `b`, the effect of a fault on [x; e; `f_hat`], and below it its effect `factor` H `F_s` on the integrals.
+/// Appends to `b`, the effect of a fault on [x; e; `f_hat`], its effect on the integrals: `factor` H `F_s`.
 pub(super) fn with_integrals(gains: &Gains, b: &DMatrix<f64>, factor: f64) -> DMatrix<f64> {
     let none = DMatrix::zeros(0, b.ncols());
     stacked(b, &gains.integral.as_ref().map_or(none, |integral| &integral.faults * factor))
@@ -85,8 +85,8 @@ pub fn fault_rate_system(
 }
 
 /// The part of [`fault_system`] or [`fault_rate_system`] on which e and eps depend: its states are
-/// [e; `f_hat`] or [e; eps], n + q. The states of the plant and integrals do not act on them, so that rows of e
-/// and eps keep their transfer functions; those of x lose theirs.
+/// [e; `f_hat`] or [e; eps], n + q. The states of the plant and the integrals do not act on them, so that outputs
+/// in e and eps keep their transfer functions; outputs in x do not.
 #[must_use]
 pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
     let (n, q) = plant.f_a.shape();
@@ -101,11 +101,12 @@ pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
 }
 
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
-/// the part of them that the compensation leaves.
+/// the part of faults that the compensation leaves.
 ///
-/// The first are those of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
-/// positions in [x; e; eps] of the outputs; each result has a row for each of them and q columns. `width`:
-/// see [`peak_gain`]. Both systems have the same dynamics, so that one call of [`peak_gain`] serves both.
+/// The first are the gains of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
+/// positions in [x; e; eps] of the outputs, at least one; each result has a row for each output and q columns.
+/// `width`: see [`peak_gain`]. Both systems have the same dynamics, so that one call of [`peak_gain`] serves
+/// both.
 ///
 /// # Errors
 ///
@@ -139,7 +140,8 @@ pub(super) fn require_rows(plant: &FaultyPlant, rows: &[usize]) -> Result<(), Er
     Err(Error::OutOfRange { name: "rows", value: check::as_number(*row), rule })
 }
 
-/// [x; e; eps] of the state of both systems: the identity without a direct term and integrals.
+/// C of both systems, from the state to [x; e; `f_hat`] or [x; e; eps]: the identity without a direct term and
+/// integrals.
 pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut c = DMatrix::identity(2 * n + q, 2 * n + q + gains.integrals());

@@ -15,10 +15,10 @@ use std::ops::Range;
 pub struct FrequencyPoint {
     /// w in rad per unit of time.
     pub frequency: f64,
-    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time z = e^(j w h) takes the place of
-    /// s.
+    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time with the period h, s is replaced by
+    /// z = e^(j w h).
     pub gain: DMatrix<Complex<f64>>,
-    /// The singular values of G, descending, the smaller of p and m of them.
+    /// The singular values of G, descending; their number is the smaller one of p and m.
     pub singular_values: Vec<f64>,
 }
 
@@ -61,17 +61,19 @@ pub fn frequency_response(
     frequencies.iter().map(point).collect()
 }
 
-/// The singular values of a complex matrix, descending, as many as rows or columns, whichever are fewer.
+/// The singular values of a complex matrix, descending; their number is the smaller one of rows and columns.
 pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, Error> {
     let is_wide = gain.nrows() < gain.ncols();
     let svd = if is_wide { ComplexSvd::new(&gain.transpose()) } else { ComplexSvd::new(gain) };
     Ok(svd?.values())
 }
 
-/// Frequencies for a figure: `per_decade` points in each decade, evenly on the logarithmic scale.
+/// Frequencies for a figure, ascending: at least `per_decade` points in each decade, evenly on the logarithmic
+/// scale.
 ///
-/// From a tenth of the slowest eigenvalue of A (those at the origin left out) to ten times the
-/// fastest; in sampled time to the Nyquist frequency pi / h.
+/// They range from a tenth of the slowest eigenvalue of A to ten times the fastest, eigenvalues at the origin
+/// left out; without any other eigenvalue from 0.1 to 10. In sampled time they end at the Nyquist frequency
+/// pi / h and start at a hundredth of it or below.
 ///
 /// # Errors
 ///
@@ -137,7 +139,7 @@ impl Transfer {
         }
     }
 
-    /// From one input to the output of the same number.
+    /// The transfer function from one input to the output of the same number.
     pub(super) fn channel(&self, channel: usize) -> Self {
         Self {
             transposed: self.transposed.clone(),
@@ -222,11 +224,11 @@ impl Parts {
         self.im.swap_columns(one, other);
     }
 
-    /// Subtracts `factor` times the column `from` from the column `of`, in these rows.
-    fn subtract(&mut self, of: usize, factor: Complex<f64>, from: usize, rows: Range<usize>) {
+    /// Subtracts `factor` times the column `source` from the column `target`, in these rows.
+    fn subtract(&mut self, target: usize, factor: Complex<f64>, source: usize, rows: Range<usize>) {
         let Complex { re, im } = factor;
-        let (mut to_re, from_re) = self.re.columns_range_pair_mut(of, from);
-        let (mut to_im, from_im) = self.im.columns_range_pair_mut(of, from);
+        let (mut to_re, from_re) = self.re.columns_range_pair_mut(target, source);
+        let (mut to_im, from_im) = self.im.columns_range_pair_mut(target, source);
         let to = to_re.as_mut_slice()[rows.clone()]
             .iter_mut()
             .zip(&mut to_im.as_mut_slice()[rows.clone()]);

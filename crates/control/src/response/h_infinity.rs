@@ -9,13 +9,13 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
-/// From this order of the Hamiltonian matrix on eigenvalues with a real part above `IMAGINARY` of their
+/// The order of the Hamiltonian matrix from which on eigenvalues with a real part above `IMAGINARY` of their
 /// modulus and above `ROUNDING` of the norm count as not imaginary.
 const LARGE: usize = 96;
 const IMAGINARY: f64 = 1e-3;
 const ROUNDING: f64 = 1e-7;
-/// Logarithmic steps of the frequency about a local maximum; the smallest one relative to the root of
-/// the width, as the maximum is flat.
+/// The first and the smallest logarithmic step of the frequency towards a local maximum; the smallest one
+/// relative to the root of the width, as the maximum is flat.
 const FIRST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 0.02;
 
@@ -35,8 +35,9 @@ pub struct HInfinity {
 /// Computes the H-infinity norm: the largest singular value of G over all frequencies.
 ///
 /// It is the root of the largest ratio of the energy of z to the energy of w. `width`: relative
-/// width of the result, at least 1e-10. It is finite when A is stable. Method: the singular values
-/// of G equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
+/// width of the result; values below 1e-10 count as 1e-10. The norm is finite when A is stable.
+///
+/// Method: the singular values of G equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
 ///
 /// ```text
 /// [A + B R^-1 D' C, B R^-1 B'; -C' (I + D R^-1 D') C, -(A + B R^-1 D' C)'],  R = gamma^2 I - D' D
@@ -83,7 +84,7 @@ pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
     norm_of(&KnownResponse::new(system.clone())?, width)
 }
 
-/// [`h_infinity`] of a system whose response is known in part.
+/// Same as [`h_infinity`], for a system whose response is known at some frequencies.
 pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Error> {
     check::positive("width", width)?;
     let width = width.max(1e-10);
@@ -94,7 +95,7 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
     let frequency = original_frequency(f64::INFINITY, system.domain);
     let mut best = HInfinity { lower, upper: lower, frequency };
     for frequency in std::iter::once(0.0).chain(known.resonances()) {
-        best.offer(known, frequency)?;
+        best.raise_at(known, frequency)?;
     }
     best.climb(known, width)?;
     for _ in 0..ROUNDS {
@@ -103,7 +104,7 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
         }
         best.upper = best.lower * (1.0 + width);
         for frequency in crossings(&continuous, best.upper)? {
-            best.offer(known, original_frequency(frequency, system.domain))?;
+            best.raise_at(known, original_frequency(frequency, system.domain))?;
         }
         if best.lower >= best.upper {
             best.climb(known, width)?;
@@ -115,8 +116,8 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
 }
 
 impl HInfinity {
-    /// Raises the lower bound to the local maximum about its frequency, by steps that grow while they
-    /// climb and shrink otherwise: each of them saves eigenvalues of a Hamiltonian matrix.
+    /// Raises the lower bound to the local maximum about its frequency, which saves eigenvalues of Hamiltonian
+    /// matrices. Steps grow while the value rises; otherwise they turn back and shrink.
     fn climb(&mut self, known: &KnownResponse, width: f64) -> Result<(), Error> {
         let last = original_frequency(f64::INFINITY, known.system.domain);
         if self.frequency <= 0.0 || self.frequency >= last {
@@ -125,14 +126,14 @@ impl HInfinity {
         let mut step = FIRST_STEP;
         while step.abs() > SMALLEST_STEP * width.sqrt() {
             let before = self.lower;
-            self.offer(known, (self.frequency * step.exp()).min(last))?;
+            self.raise_at(known, (self.frequency * step.exp()).min(last))?;
             step *= if self.lower > before { 1.5 } else { -0.5 };
         }
         Ok(())
     }
 
     /// Raises the lower bound to the value at `frequency` if that is larger.
-    fn offer(&mut self, known: &KnownResponse, frequency: f64) -> Result<(), Error> {
+    fn raise_at(&mut self, known: &KnownResponse, frequency: f64) -> Result<(), Error> {
         let size = singular_values(&known.gain(frequency)?)?[0];
         if size > self.lower {
             (self.lower, self.frequency) = (size, frequency);
@@ -141,7 +142,8 @@ impl HInfinity {
     }
 }
 
-/// The continuous system whose frequency response takes the same values as that of `system`.
+/// The continuous system whose frequency response has the same values as that of `system`, at other frequencies
+/// (see [`original_frequency`]). [`Error::Overflow`] if a sampled A has the eigenvalue -1.
 ///
 /// A sampled system is transformed by z = (1 + s) / (1 - s), with R = (A + I)^-1:
 ///
@@ -165,8 +167,8 @@ pub(crate) fn continuous_equivalent(system: &StateSpace) -> Result<StateSpace, E
     })
 }
 
-/// Frequencies of a continuous system: all those at which a singular value of G equals `gamma`, and
-/// the midpoints between them.
+/// Frequencies of a continuous system among which are all those at which a singular value of G equals `gamma`,
+/// and the midpoints between neighbours.
 fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
     let (m, p) = (system.b.ncols(), system.c.nrows());
     let (b, c) = (&system.b / gamma.sqrt(), &system.c / gamma.sqrt());
@@ -182,10 +184,10 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
     let mut frequencies = if hamiltonian.nrows() < LARGE {
         eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect()
     } else {
-        let halved = Hamiltonian::balanced(&a, &g, &q);
-        let rounding = ROUNDING * halved.norm();
+        let reduced = Hamiltonian::balanced(&a, &g, &q);
+        let rounding = ROUNDING * reduced.norm();
         let possible = |x: &&Complex<f64>| x.re.abs() <= rounding.max(IMAGINARY * x.norm());
-        let all = halved.eigenvalues().map_or_else(|| eigenvalues(&hamiltonian), Ok)?;
+        let all = reduced.eigenvalues().map_or_else(|| eigenvalues(&hamiltonian), Ok)?;
         all.iter().filter(possible).map(|x| x.im.abs()).collect::<Vec<_>>()
     };
     frequencies.push(0.0);

@@ -7,22 +7,22 @@ use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-/// The longest power of two of samples over which the system must contract.
+/// The state must shrink by half within 2 to the power of this many samples.
 const LONGEST: u32 = 24;
-/// Periods of contraction by half that a sum needs, about.
+/// The approximate number of contractions by half that a sum needs.
 const HALVINGS: f64 = 12.0;
 /// Intervals that [`super::peak_gain`] needs for an impulse response, and for each of its oscillations.
 const INTERVALS: [f64; 2] = [500.0, 50.0];
-/// Lengths of its intervals.
+/// The number of lengths of these intervals.
 const LENGTHS: f64 = 30.0;
-/// The part of the first state that is left where a sum counts as complete.
+/// A sum is complete when the state is below this part, times the width, of the first state.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// |D| and the sums over k of |C A^k B|, entry by entry: the lower bound without the samples after the
-/// last one, the upper bound with all that the contraction of A leaves of them.
+/// Bounds of |D| + the sum over k of |C A^k B|, entry by entry.
 ///
-/// `eigenvalues`: of A. None if A contracts so slowly that intervals of many samples need fewer
-/// operations.
+/// The lower bound is the sum of finitely many samples; the upper bound adds a bound of all later ones, from the
+/// contraction of A. `eigenvalues`: of A. None if A contracts so slowly that intervals of many samples need
+/// fewer operations.
 pub(super) fn impulse_sums(
     system: &StateSpace,
     eigenvalues: &[Complex<f64>],
@@ -30,28 +30,29 @@ pub(super) fn impulse_sums(
 ) -> Result<Option<Bracket>, Error> {
     let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
     let (mut states, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
-    // After `block` samples the state has at most half of its norm, by the root of the product of the largest sums of
-    // rows and of columns, which is not below the norm.
+    // After `block` samples the state has at most half of its norm: the root of the product of the largest sums of
+    // rows and of columns is not below the norm of the power.
     let (mut block, mut power) = (1_u32, a.clone());
     let largest_sum =
         |m: &DMatrix<f64>| m.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max);
     while (largest_sum(&power) * largest_sum(&power.transpose())).sqrt().min(power.norm()) > 0.5 {
-        if block == 1 << LONGEST || f64::from(block) > affordable(system, eigenvalues) {
+        if block == 1 << LONGEST || f64::from(block) > largest_block(system, eigenvalues) {
             return Ok(None);
         }
         block *= 2;
         power = &power * &power;
     }
-    let mut rest = vec![0.0; c.nrows()];
+    // Bounds of the sums after a state of norm one.
+    let mut tails = vec![0.0; c.nrows()];
     let mut rows = c.clone();
     for _ in 0..block {
-        rest.iter_mut().zip(rows.row_iter()).for_each(|(rest, row)| *rest += 2.0 * row.norm());
+        tails.iter_mut().zip(rows.row_iter()).for_each(|(tail, row)| *tail += 2.0 * row.norm());
         rows *= &a;
     }
     let lengths = |states: &DMatrix<f64>| -> Vec<f64> {
         states.column_iter().map(|column| column.norm()).collect()
     };
-    let begin = lengths(&states);
+    let initial = lengths(&states);
     let mut lower = system.d.abs();
     let mut response = DMatrix::zeros(c.nrows(), states.ncols());
     let mut next = states.clone();
@@ -62,24 +63,25 @@ pub(super) fn impulse_sums(
             next.gemm(1.0, &a, &states, 0.0);
             std::mem::swap(&mut states, &mut next);
         }
-        let left = lengths(&states);
-        // An output that an input does not reach has a sum of zero, which no remainder is small against.
-        let is_short = |input: usize| left[input] <= NEGLIGIBLE * width * begin[input];
+        let sizes = lengths(&states);
+        // If an input does not reach an output, the sum is zero, and no bound of its tail is small beside it.
+        let is_short = |input: usize| sizes[input] <= NEGLIGIBLE * width * initial[input];
         let is_small =
-            |row: usize, input: usize| rest[row] * left[input] <= width * lower[(row, input)];
+            |row: usize, input: usize| tails[row] * sizes[input] <= width * lower[(row, input)];
         let is_complete =
-            |input| is_short(input) || (0..rest.len()).all(|row| is_small(row, input));
-        if (0..left.len()).all(is_complete) {
-            let tail = |row: usize, input: usize| lower[(row, input)] + rest[row] * left[input];
-            let upper = DMatrix::from_fn(rest.len(), left.len(), tail);
+            |input| is_short(input) || (0..tails.len()).all(|row| is_small(row, input));
+        if (0..sizes.len()).all(is_complete) {
+            let upper = DMatrix::from_fn(tails.len(), sizes.len(), |row, input| {
+                lower[(row, input)] + tails[row] * sizes[input]
+            });
             return Ok(Some(Bracket { lower, upper }));
         }
     }
 }
 
-/// The largest number of samples of contraction by half for which adding all samples needs fewer
+/// The largest number of samples for one contraction by half with which adding all samples needs fewer
 /// operations than intervals do.
-fn affordable(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
+fn largest_block(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
     let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(as_number);
     let oscillations = |value: &Complex<f64>| {
         let decay = -value.norm().max(f64::MIN_POSITIVE).ln();

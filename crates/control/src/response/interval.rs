@@ -9,19 +9,20 @@ use std::rc::Rc;
 
 /// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
-/// Relative rounding error of a product of a row and a state, with that of the doublings before.
+/// Relative rounding error of a product of a row and a state, the errors of the doublings included.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Largest number of doublings of the length.
 const LENGTHS: usize = 120;
 
-/// An interval: its effect on the state at its start, for one output row c and h(t) = c x(t).
+/// Intervals of one length, for one output row c: matrices that act on the state x at the start of an interval,
+/// h(t) = c x(t).
 pub(super) struct Length {
     /// Time, or number of samples.
     pub(super) time: f64,
     /// The state at the end, the same for all outputs.
     pub(super) phi: Rc<DMatrix<f64>>,
-    /// R, r x n, with |R x|^2 the integral of h^2: over a short interval h is smooth, and r is small; below it a row s with
-    /// s x the integral of h. One matrix, for one product.
+    /// R, r x n, with |R x|^2 the integral of h^2, and below it a row s with s x the integral of h: one matrix, for one
+    /// product. Over a short interval h is smooth, and r is small.
     rows: DMatrix<f64>,
     /// The lengths of the columns of R.
     scales: DVector<f64>,
@@ -52,13 +53,13 @@ impl Length {
         Self::new(2.0 * self.time, phi, &without_negligible_rows(&root), &sum)
     }
 
-    /// The absolute integral of h from a state on.
+    /// The absolute value of the integral of h over an interval that starts at `state`.
     pub(super) fn integral(&self, state: &DVector<f64>) -> f64 {
         (self.rows.rows(self.rows.nrows() - 1, 1) * state)[0].abs()
     }
 
-    /// Bounds of the integral of |h| from each column of `states` on: |integral of h|, and by Cauchy and Schwarz the root
-    /// of the length times the integral of h^2.
+    /// Bounds of the integral of |h| over the interval that starts at each column of `states`: |integral of h|, and by
+    /// Cauchy and Schwarz the root of the length times the integral of h^2.
     pub(super) fn bounds(&self, states: &DMatrix<f64>) -> Vec<Bounds> {
         let products = &self.rows * states;
         let rank = products.nrows() - 1;
@@ -75,7 +76,7 @@ impl Length {
         states.column_iter().zip(products.column_iter()).map(one).collect()
     }
 
-    /// A bound of the integral of |h| over all intervals from here on; infinite unless this one at
+    /// A bound of the integral of |h| over all time from `state` on; infinite unless an interval of this length at
     /// least halves every state.
     pub(super) fn tail(&self, state: &DVector<f64>) -> f64 {
         let contraction = self.phi.norm();
@@ -86,13 +87,14 @@ impl Length {
     }
 }
 
-/// Balanced states of unit size, and the shortest interval.
+/// A system in balanced coordinates, with its shortest interval and the intervals of twice, four times, ... its
+/// length.
 pub(super) struct Intervals {
     /// Columns of B in balanced coordinates: the states after an impulse.
     pub(super) starts: DMatrix<f64>,
     outputs: DMatrix<f64>,
     shortest: Shortest,
-    /// The states at the end of intervals, each of twice the length of the one before.
+    /// For each length the matrix from the state at the start of an interval to the state at its end.
     powers: Vec<Rc<DMatrix<f64>>>,
 }
 
@@ -105,13 +107,14 @@ impl Intervals {
         Ok(Self { starts, outputs, shortest, powers: vec![Rc::new(phi)] })
     }
 
-    /// The shortest interval for one output, the first of its lengths.
+    /// The shortest length for one output.
     pub(super) fn first(&self, output: usize) -> Length {
         self.shortest.length(&self.powers[0], &self.outputs.rows(output, 1).into())
     }
 
-    /// Adds lengths for one output, each twice the one before, until the tail of h for one input is
-    /// below `part` of a lower bound of the integral before it; returns how many are needed.
+    /// Adds lengths for one output, each twice the one before, until the bound of the integral after an interval of the
+    /// last length is at most `part` times a lower bound of the integral over it, for one input. Returns the number of
+    /// lengths that this input needs, which may be fewer than there are.
     pub(super) fn extend(
         &mut self,
         lengths: &mut Vec<Length>,
@@ -138,7 +141,7 @@ impl Intervals {
     }
 }
 
-/// What the shortest interval has for every output.
+/// The shortest interval, the same for all outputs.
 struct Shortest {
     time: f64,
     /// A times the length; None in sampled time.
@@ -146,7 +149,7 @@ struct Shortest {
 }
 
 impl Shortest {
-    /// Returns the state at the end, too.
+    /// The matrix from the state at the start of the shortest interval to the state at its end, and the interval.
     fn new(a: DMatrix<f64>, domain: Domain) -> Result<(DMatrix<f64>, Self), Error> {
         if let Domain::Sampled { .. } = domain {
             return Ok((a, Self { time: 1.0, continuous: None }));
@@ -157,6 +160,7 @@ impl Shortest {
         Ok((exponential(&a)?, Self { time, continuous: Some(a) }))
     }
 
+    /// The shortest length for the output `row`.
     fn length(&self, phi: &Rc<DMatrix<f64>>, row: &DMatrix<f64>) -> Length {
         let (time, phi) = (self.time, Rc::clone(phi));
         let Some(a) = &self.continuous else {
@@ -165,7 +169,7 @@ impl Shortest {
         let mut sum = DMatrix::zeros(1, row.ncols());
         let mut root = DMatrix::zeros(NODES.len(), row.ncols());
         for (at, Node { part, weight }) in NODES.into_iter().enumerate() {
-            let h = later(row, a, part);
+            let h = row_after(row, a, part);
             root.row_mut(at).copy_from(&(&h * (time * weight).sqrt()));
             sum += h * (time * weight);
         }
@@ -187,9 +191,9 @@ const NODES: [Node; 3] = [
     Node { part: 0.887_298_334_620_741_7, weight: 5.0 / 18.0 },
 ];
 
-/// `row` times e^(A t) for `part` of the shortest interval; `a`: A times its length. The terms after the sixth are below
-/// the rounding.
-fn later(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
+/// `row` times e^(A t), t being `part` of the shortest interval; `a`: A times its length. The terms after the sixth are
+/// below the rounding.
+fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     let (mut term, mut sum) = (row.clone(), row.clone());
     for degree in 1..=5 {
         term = term * a * (part / f64::from(degree));
@@ -198,9 +202,11 @@ fn later(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     sum
 }
 
-/// A matrix with the same length of M x for every x, up to the rounding of its columns, and as many rows as M has rank:
-/// the triangle of a QR decomposition with pivots, of columns of length about one, because an output may see one state
-/// far more weakly than another.
+/// A matrix R with |R x| = |M x| for every x, up to the rounding of its columns, and as many rows as the rank of M, at
+/// least one.
+///
+/// R is the triangle of a QR decomposition with pivots, of columns of length about one, because the effects of two
+/// states on an output may differ by many orders of magnitude.
 fn without_negligible_rows(m: &DMatrix<f64>) -> DMatrix<f64> {
     let unit = |column: usize| match power_of_two(m.column(column).norm()) {
         unit if unit.is_normal() => unit,

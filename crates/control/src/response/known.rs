@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 const PER_DECADE: u32 = 60;
-/// Below this order a scaled system is computed afresh, with the same bits as alone.
+/// From this order on a scaled system keeps the known responses; below, it has the same bits as a new system.
 const LARGE: usize = 48;
 
 /// The system from one input to the output of the same number.
@@ -37,16 +37,18 @@ pub(crate) struct KnownResponse {
 }
 
 impl KnownResponse {
+    /// A system without known responses.
+    ///
     /// # Errors
     ///
-    /// Same as [`StateSpace::check`]; [`Error::NotHurwitz`], [`Error::NotSchur`].
+    /// Same as [`StateSpace::check`]; [`Error::NotHurwitz`], [`Error::NotSchur`]; [`Error::NotConverged`].
     pub(crate) fn new(system: StateSpace) -> Result<Self, Error> {
         let modes = system.stable_eigenvalues()?;
         let transfer = Transfer::new(&system);
         Ok(Self { system, modes, transfer, known: HashMap::new() })
     }
 
-    /// The same with the response at all [`Self::frequencies`] and [`Self::resonances`].
+    /// The system with known responses at all [`Self::frequencies`] and [`Self::resonances`].
     pub(crate) fn swept(mut self) -> Result<Self, Error> {
         for frequency in self.frequencies().into_iter().chain(self.resonances()) {
             let response = self.transfer.without_direct(frequency)?;
@@ -63,18 +65,18 @@ impl KnownResponse {
         }
     }
 
-    /// The frequencies of the eigenvalues, where G may have peaks.
+    /// The frequencies of the eigenvalues, where G may have peaks: in continuous time imaginary part and modulus.
     pub(crate) fn resonances(&self) -> Vec<f64> {
         let modes = self.modes.iter().filter(|mode| mode.im >= 0.0);
-        let of = |mode: &Complex<f64>| match self.system.domain {
+        let frequencies = |mode: &Complex<f64>| match self.system.domain {
             Domain::Continuous => vec![mode.im.abs(), mode.norm()],
             Domain::Sampled { period } => vec![mode.arg().abs() / period],
         };
-        modes.flat_map(of).collect()
+        modes.flat_map(frequencies).collect()
     }
 
-    /// The frequencies of a sweep, ascending: 60 for each decade from zero to ten times the fastest
-    /// eigenvalue, or to the Nyquist frequency, and the resonances.
+    /// The frequencies of a sweep, ascending: zero, 60 for each decade as in [`super::frequency_grid`], and the
+    /// resonances; in sampled time none above the Nyquist frequency.
     pub(crate) fn frequencies(&self) -> Vec<f64> {
         let mut all = grid(&self.system, &self.modes, PER_DECADE);
         all.push(0.0);

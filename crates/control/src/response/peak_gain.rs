@@ -9,10 +9,10 @@ use std::rc::Rc;
 
 /// Largest number of rounds; each round halves the intervals with the widest bounds.
 const ROUNDS: usize = 200;
-/// Intervals wait until no other one has bounds this many times as wide.
+/// A round halves only intervals whose bounds are wider than the widest ones divided by this.
 const WIDEST: f64 = 32.0;
 const MOST_INTERVALS: usize = 1 << 18;
-/// Outputs for which the states after an impulse are computed once.
+/// Number of outputs that share the states after an impulse.
 const OUTPUTS_AT_ONCE: usize = 8;
 /// Largest number of states that are stored for other outputs.
 const MOST_STATES: usize = 1 << 14;
@@ -42,9 +42,11 @@ pub struct Bracket {
 /// halved where the two differ most, so that fast and slow modes get the steps they need; the
 /// contraction of the state bounds the integral after the last interval. In sampled time all samples are
 /// added where that needs fewer operations. The bracket is proven up to rounding; it is not narrowed below
-/// the rounding error of the root of the integral of h^2. Cost: for each output, or each input if there are fewer, about
-/// 100 n^3, and for each pair and each time constant or oscillation some 50 intervals of (r + 1) n multiplications, r <= n
-/// the rank of the Gramian of the interval, and n^2 for the states, which up to 8 outputs share.
+/// the rounding error of the root of the integral of h^2.
+///
+/// Cost: for each output, or each input if there are fewer, about 100 n^3, and for each pair and each time constant
+/// or oscillation some 50 intervals of (r + 1) n multiplications, r <= n the rank of the Gramian of the interval,
+/// and n^2 for the states, which up to 8 outputs share.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
 /// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.
@@ -91,7 +93,7 @@ pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     by_intervals(system, width)
 }
 
-/// The peak gains by intervals, for each output its own.
+/// The peak gains by intervals, which are chosen for each output separately.
 fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     let mut intervals = Intervals::new(system)?;
     let mut lower = system.d.abs();
@@ -115,7 +117,7 @@ fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
 /// The states after an impulse, which all outputs share.
 struct Trajectory {
     start: Rc<DVector<f64>>,
-    /// By the time, in shortest intervals.
+    /// The states by their time, in shortest intervals.
     states: HashMap<u128, Rc<DVector<f64>>>,
 }
 
@@ -124,8 +126,8 @@ impl Trajectory {
         Self { start: Rc::new(start), states: HashMap::new() }
     }
 
-    /// The starts of the second halves of intervals that begin at `firsts`; `half`: their length, of 2^`level` of the
-    /// shortest.
+    /// The starts of the second halves of intervals that start at `firsts`; `half`: the length of the halves, 2^`level`
+    /// times the shortest.
     fn middles(&mut self, half: &Length, level: usize, firsts: &[Start]) -> Vec<Start> {
         let time = |first: &Start| first.time + (1_u128 << level);
         let is_missing = |first: &&Start| !self.states.contains_key(&time(first));
@@ -149,10 +151,10 @@ impl Trajectory {
     }
 }
 
-/// Where an interval starts.
+/// The start of an interval.
 #[derive(Clone)]
 struct Start {
-    /// In shortest intervals.
+    /// Time in shortest intervals.
     time: u128,
     state: Rc<DVector<f64>>,
 }
@@ -164,12 +166,12 @@ struct Piece {
 }
 
 impl Piece {
-    fn open(&self) -> f64 {
+    fn gap(&self) -> f64 {
         self.bounds.upper - self.bounds.lower
     }
 }
 
-/// Bounds of the integral of |h| over all time.
+/// The lower and the upper bound of the integral of |h| over all time.
 fn integral(
     lengths: &[Length],
     trajectory: &mut Trajectory,
@@ -189,7 +191,7 @@ fn integral(
         let allowed = width * lower + sum(|bounds| bounds.rounding);
         let count: usize = pieces.iter().map(Vec::len).sum();
         let share = allowed / check::as_number(count);
-        let widest = pieces[1..].iter().flatten().map(Piece::open).fold(0.0, f64::max);
+        let widest = pieces[1..].iter().flatten().map(Piece::gap).fold(0.0, f64::max);
         if upper - lower <= allowed || widest <= share {
             return Ok((lower, upper + tail));
         }
@@ -198,7 +200,7 @@ fn integral(
         }
         let least = share.max(widest / WIDEST);
         for length in 1..=longest {
-            let wide = |piece: &mut Piece| piece.open() > least;
+            let wide = |piece: &mut Piece| piece.gap() > least;
             let wide: Vec<_> =
                 pieces[length].extract_if(.., wide).map(|piece| piece.start).collect();
             if !wide.is_empty() {
@@ -211,7 +213,7 @@ fn integral(
     Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })
 }
 
-/// The pieces of one length from these starts on.
+/// The pieces of one length with these starts.
 fn from_starts(length: &Length, starts: Vec<Start>) -> Vec<Piece> {
     let states: Vec<_> = starts.iter().map(|start| &start.state).collect();
     let bounds = length.bounds(&columns(&states));

@@ -11,7 +11,7 @@ use std::f64::consts::SQRT_2;
 const FOLLOWED: f64 = 25.0;
 /// Steps per time constant, and per radian of an oscillation; the second for `LARGE` systems.
 const STEPS: [f64; 2] = [10.0, 4.0];
-/// Points of one response, and those kept for each mode that has not been followed yet.
+/// The largest number of points of a response, and the number reserved for each mode that has not been followed yet.
 const MOST_POINTS: f64 = 200_000.0;
 const RESERVED: f64 = 500.0;
 /// From this order on the outputs of all times are computed together, at fewer points.
@@ -81,8 +81,8 @@ pub fn ramp_response(
     response(system, input, Some(duration))
 }
 
-/// Computes the limit of z for large times after a unit step of one input, p: that of [`step_response`]
-/// without its points.
+/// Computes the limit of z for large times after a unit step of one input, p: the final value of
+/// [`step_response`].
 ///
 /// # Errors
 ///
@@ -96,7 +96,7 @@ pub fn settled_output(system: &StateSpace, input: usize) -> Result<DVector<f64>,
     settled(system, &constant)
 }
 
-/// C (s I - A)^-1 B w + D w at the eigenvalue of a constant signal w.
+/// C (s I - A)^-1 B w + D w for a constant signal w: s = 0, in sampled time s = 1.
 fn settled(system: &StateSpace, input: &DVector<f64>) -> Result<DVector<f64>, Error> {
     let rest = system.dc_matrix().lu().solve(&(&system.b * input));
     let rest = rest.ok_or(Error::Overflow { what: "the settled output" })?;
@@ -111,6 +111,7 @@ fn check_input(system: &StateSpace, input: usize) -> Result<(), Error> {
     Err(Error::OutOfRange { name: "input", value: as_number(input), rule })
 }
 
+/// The response to a unit step, or to a ramp that lasts `rise`.
 fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<TimeResponse, Error> {
     let eigenvalues = system.stable_eigenvalues()?;
     check_input(system, input)?;
@@ -130,18 +131,25 @@ fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<Time
     }
     simulation.input[input] = 1.0;
     simulation.follow(&modes.segments(f64::INFINITY))?;
-    simulation.finished()
+    simulation.into_response()
 }
 
-/// Relative distance from a whole number of samples within which a duration is one.
+/// A duration this close, relatively, to a whole number of samples counts as that number.
 const ON_A_SAMPLE: f64 = 1e-9;
 
-/// Time constants of a system, and its time step.
+/// The modes of a system, and its period.
 struct Modes {
-    /// For each mode: the time at which it has decayed, and its rate in 1 / time.
-    lives: Vec<(f64, f64)>,
+    /// The fastest decay first.
+    list: Vec<Mode>,
     /// Zero in continuous time.
     period: f64,
+}
+
+struct Mode {
+    /// The time at which it has decayed.
+    end: f64,
+    /// The modulus of its eigenvalue in continuous time, in 1 / time.
+    rate: f64,
 }
 
 /// Steps of one length.
@@ -165,16 +173,17 @@ impl Modes {
             Domain::Sampled { period } => period,
         };
         let shift_register = period * as_number(eigenvalues.len());
-        let life = |exponent: Complex<f64>| {
-            ((FOLLOWED / exponent.re.abs()).max(shift_register), exponent.norm())
+        let mode = |exponent: Complex<f64>| Mode {
+            end: (FOLLOWED / exponent.re.abs()).max(shift_register),
+            rate: exponent.norm(),
         };
-        let mut lives: Vec<_> = exponents.map(life).collect();
-        lives.sort_by(|x, y| x.0.total_cmp(&y.0));
-        Self { lives, period }
+        let mut list: Vec<_> = exponents.map(mode).collect();
+        list.sort_by(|x, y| x.end.total_cmp(&y.end));
+        Self { list, period }
     }
 
-    /// Divides the duration of a ramp: the whole samples in it, and one more, or none, that reaches its
-    /// end. In continuous time all of it, and nothing.
+    /// Divides the duration of a ramp into the time of the whole samples in it, and the time of one more sample
+    /// that contains its end, 0 if it ends on a sample. In continuous time the result is `time` and 0.
     fn samples_in(&self, time: f64) -> (f64, f64) {
         if self.period == 0.0 {
             return (time, 0.0);
@@ -187,25 +196,26 @@ impl Modes {
         (samples.floor() * self.period, self.period)
     }
 
-    /// Rounds a time to samples, at least one.
-    fn whole(&self, time: f64) -> f64 {
+    /// Rounds a time to whole samples, at least one; in continuous time the same time.
+    fn in_samples(&self, time: f64) -> f64 {
         if self.period > 0.0 { (time / self.period).round().max(1.0) * self.period } else { time }
     }
 
-    /// Steps from 0 to the end of the slowest mode, or to `end` if that is earlier.
+    /// Steps from 0 to `end`, or to the end of the slowest mode if `end` is infinite.
     fn segments(&self, end: f64) -> Vec<Segment> {
         let mut segments = Vec::new();
         let (mut from, mut left) = (0.0, MOST_POINTS);
-        for first in 0..self.lives.len() {
-            let last = first + 1 == self.lives.len();
-            let until = if last && end.is_finite() { end } else { self.lives[first].0.min(end) };
-            let until = self.whole(until);
+        for first in 0..self.list.len() {
+            let is_last = first + 1 == self.list.len();
+            let mode_end = self.list[first].end;
+            let until = if is_last && end.is_finite() { end } else { mode_end.min(end) };
+            let until = self.in_samples(until);
             if until <= from {
                 continue;
             }
-            let rate = self.lives[first..].iter().fold(0.0_f64, |most, life| most.max(life.1));
-            let resolving = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
-            let reserved = RESERVED * as_number(self.lives.len() - first);
+            let rate = self.list[first..].iter().map(|mode| mode.rate).fold(0.0_f64, f64::max);
+            let resolving = 1.0 / (STEPS[usize::from(self.list.len() >= LARGE)] * rate);
+            let reserved = RESERVED * as_number(self.list.len() - first);
             let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
             if self.period == 0.0 && until < end {
@@ -214,7 +224,7 @@ impl Modes {
                 let count = ((until - from) / step).ceil();
                 left -= count;
                 from += count * step;
-                segments.push(Segment { step, count: whole(count), is_coarse });
+                segments.push(Segment { step, count: as_count(count), is_coarse });
                 continue;
             }
             let count = if self.period > 0.0 {
@@ -233,14 +243,14 @@ impl Modes {
     /// Adds `count` steps that take `time`; in sampled time of whole samples, the last one shorter.
     fn push(&self, list: &mut Vec<Segment>, time: f64, count: f64, is_coarse: bool) {
         if self.period == 0.0 {
-            list.push(Segment { step: time / count, count: whole(count), is_coarse });
+            list.push(Segment { step: time / count, count: as_count(count), is_coarse });
             return;
         }
         let samples = (time / self.period).round();
         let stride = (samples / count).ceil();
         let full = (samples / stride).floor();
         let rest = samples - full * stride;
-        list.push(Segment { step: stride * self.period, count: whole(full), is_coarse });
+        list.push(Segment { step: stride * self.period, count: as_count(full), is_coarse });
         if rest > 0.0 {
             list.push(Segment { step: rest * self.period, count: 1, is_coarse });
         }
@@ -248,7 +258,7 @@ impl Modes {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of samples")]
-fn whole(samples: f64) -> u64 {
+fn as_count(samples: f64) -> u64 {
     samples as u64
 }
 
@@ -259,7 +269,7 @@ struct GridSimulation<'a> {
     input: DVector<f64>,
     slope: DVector<f64>,
     time: Vec<f64>,
-    /// States, inputs and their slopes at all times, one time after the other.
+    /// States, inputs and slopes of the inputs at all times, one time after the other.
     states: Vec<f64>,
     inputs: Vec<f64>,
     slopes: Vec<f64>,
@@ -283,6 +293,7 @@ impl<'a> GridSimulation<'a> {
         }
     }
 
+    /// Adds the present state, input and slope as a point of the grid.
     fn record(&mut self, time: f64) {
         self.time.push(time);
         self.states.extend(self.state.iter());
@@ -320,7 +331,8 @@ impl<'a> GridSimulation<'a> {
         Ok(())
     }
 
-    fn finished(self) -> Result<TimeResponse, Error> {
+    /// The outputs at all points of the grid.
+    fn into_response(self) -> Result<TimeResponse, Error> {
         let StateSpace { a, b, c, d, domain } = self.system;
         let (points, (n, m)) = (self.time.len(), b.shape());
         let states = DMatrix::from_vec(n, points, self.states);
@@ -356,22 +368,22 @@ fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
     let Domain::Sampled { period } = *domain else {
         return FirstOrderHold::new(a, b, step);
     };
-    let mut left = whole((step / period).round());
+    let mut left = as_count((step / period).round());
     let (n, m) = b.shape();
     let (zero, identity) = (DMatrix::zeros(n, m), DMatrix::identity(n, n));
-    let mut whole = FirstOrderHold { phi: identity, gamma_0: zero.clone(), gamma_1: zero.clone() };
+    let mut total = FirstOrderHold { phi: identity, gamma_0: zero.clone(), gamma_1: zero.clone() };
     let mut power = FirstOrderHold { phi: a.clone(), gamma_0: b.clone(), gamma_1: zero };
     let (mut power_time, mut time) = (period, 0.0);
     while left > 0 {
         if left % 2 == 1 {
-            whole = chained(&whole, time, &power);
+            total = chained(&total, time, &power);
             time += power_time;
         }
         power = chained(&power, power_time, &power);
         power_time *= 2.0;
         left /= 2;
     }
-    Ok(whole)
+    Ok(total)
 }
 
 /// The propagator of step `one`, which takes `time`, followed by step `other`.

@@ -11,7 +11,8 @@ pub struct Transient {
     pub peak: f64,
     /// The time of the peak.
     pub peak_time: f64,
-    /// The time after which z stays within the band around its final value; zero if it always does.
+    /// The time after which z stays within the band around its final value; zero if it always does, the last time
+    /// of the response if it is outside to the end.
     pub settling_time: f64,
     /// The limit of z for large times.
     pub final_value: f64,
@@ -21,9 +22,9 @@ impl TimeResponse {
     /// Computes peak and settling time of an output.
     ///
     /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
-    /// final value. In continuous time peaks between grid points are those of the cubic through
-    /// both values and slopes (error 1e-6 of the peak, 1e-5 from 48 states on), settling times are interpolated linearly.
-    /// In sampled time, and where the points do not follow every oscillation, both are at grid points.
+    /// final value. In continuous time peaks between grid points are those of the cubic through both values and
+    /// slopes (error 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly. In
+    /// sampled time, and where the points do not follow every oscillation, both are at grid points.
     ///
     /// # Panics
     ///
@@ -33,16 +34,16 @@ impl TimeResponse {
         let (z, final_value) = (self.output.row(output), self.final_value[output]);
         let (mut peak, mut peak_time) = (0.0_f64, 0.0);
         let mut distance = 0.0_f64;
-        let mut see = |time: f64, value: f64| {
+        let mut update = |time: f64, value: f64| {
             distance = distance.max((value - final_value).abs());
             if value.abs() > peak.abs() {
                 (peak, peak_time) = (value, time);
             }
         };
         for (k, &time) in self.time.iter().enumerate() {
-            see(time, z[k]);
-            if let Some((time, value)) = self.turn(output, k) {
-                see(time, value);
+            update(time, z[k]);
+            if let Some((time, value)) = self.extremum(output, k) {
+                update(time, value);
             }
         }
         let band = fraction * distance;
@@ -51,8 +52,9 @@ impl TimeResponse {
         Transient { peak, peak_time, settling_time, final_value }
     }
 
-    /// Time and value of an extremum of z between points k and k + 1.
-    fn turn(&self, output: usize, k: usize) -> Option<(f64, f64)> {
+    /// Time and value of an extremum of z between points k and k + 1; None if the slope does not change its sign
+    /// or is not known.
+    fn extremum(&self, output: usize, k: usize) -> Option<(f64, f64)> {
         let slopes: &DMatrix<f64> = &self.slope;
         if k + 1 >= slopes.ncols() {
             return None;
