@@ -13,7 +13,7 @@
 //! | changes of gain and phase in all channels at once | [`disk_margin`] |
 //! | changes of gain, phase and delay in one channel | [`channel_margins`] |
 //! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
-//! | all of these at one point of a large loop | [`OpenedLoop`] |
+//! | several of these at one point of a loop | [`OpenedLoop`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
 //! | effect of measurement noise | [`noise_gains`] |
 //! | which of several loops has the lowest peaks of S | [`least_sensitive`] |
@@ -72,11 +72,11 @@ pub enum Point {
     Output,
 }
 
-/// The `plant` under a zero-order hold of its inputs, in samples of `period` seconds: those of a continuous plant, and a
-/// sampled plant as it is.
+/// The `plant` under a zero-order hold of its inputs, in samples of `period` seconds.
 ///
-/// With y = C x + D u a sample contains the command that was held until then: `y[k] = C x[k] + D v[k]`,
-/// `v[k+1] = u[k]`; the state is [x; v], and D of the result is zero.
+/// A continuous plant is discretised; a sampled plant keeps A and B. With y = C x + D u a sample contains the
+/// command that was held until then: `y[k] = C x[k] + D v[k]`, `v[k+1] = u[k]`; the state is [x; v], and D of
+/// the result is zero.
 ///
 /// # Errors
 ///
@@ -169,7 +169,8 @@ impl Loop {
         ]
     }
 
-    /// What is added to the commands, and to the measurements: [B; `B_k` D] and [B `D_k`; `B_k`].
+    /// The effects of signals that are added to the commands, and to the measurements, on the states of plant and
+    /// controller: [B; `B_k` D] and [B `D_k`; `B_k`].
     fn entries(&self) -> [DMatrix<f64>; 2] {
         let (plant, controller) = (&self.plant, &self.controller);
         [
@@ -178,8 +179,8 @@ impl Loop {
         ]
     }
 
-    /// The loop as a system: from signals that are added to commands and measurements to commands and
-    /// measurements, these without what is added to them.
+    /// The loop as a system: from signals that are added to commands and measurements to the commands and
+    /// measurements before the addition.
     #[must_use]
     pub fn system(&self) -> StateSpace {
         let (plant, controller) = (&self.plant, &self.controller);
@@ -204,7 +205,7 @@ impl Loop {
         system
     }
 
-    /// T as a system: from a signal that is added at `at` to the negative of what comes back.
+    /// T as a system: from a signal that is added at `at` to the negative of the signal that returns there.
     #[must_use]
     pub fn complementary(&self, at: Point) -> StateSpace {
         let mut system = self.response(at);
@@ -224,7 +225,7 @@ impl Loop {
 
     /// The system from noise that is added to the measurements to another output of the controller.
     ///
-    /// `output`: the controller's A and B, which are not read, with C and D of that output.
+    /// `output`: C and D of that output; A and B are not read.
     ///
     /// # Errors
     ///
@@ -234,8 +235,8 @@ impl Loop {
         check::shape("C of the output", &output.c, (output.c.nrows(), controller.a.nrows()))?;
         check::shape("D of the output", &output.d, (output.c.nrows(), controller.b.ncols()))?;
         let mut c = &output.d * &self.signals()[1];
-        let mut of_states = c.columns_mut(self.plant.a.nrows(), controller.a.nrows());
-        of_states += &output.c;
+        let mut from_controller = c.columns_mut(self.plant.a.nrows(), controller.a.nrows());
+        from_controller += &output.c;
         Ok(StateSpace { c, d: output.d.clone(), ..self.response(Point::Output) })
     }
 }

@@ -35,10 +35,11 @@ const LONGEST: f64 = 1e12;
 /// The run length of one sum solves an integral equation (Page 1954, (4)), which is solved here by the
 /// Gauss-Legendre quadrature of Goel and Wu (1971); both sums together have 1/L = 1/L+ + 1/L- (Kemp 1961).
 /// Run lengths above 1e12 come from the elimination of Grassmann, Taksar and Heyman (1985), which subtracts
-/// nothing and so has no cancellation. Brook and Evans (1972) have the tables that the tests compare with. Above a threshold of 40, N samples
-/// are taken together as one of mean N^(1/2) times as large, which changes the run length by less than 1 %:
-/// the threshold plus 1.166, the mean excess on both sides (Siegmund 1985, section 10.2), scales with
-/// N^(-1/2).
+/// nothing and so has no cancellation. Brook and Evans (1972) and textbooks have tables of run lengths.
+///
+/// Above a threshold of 40, N samples are taken together as one of mean N^(1/2) times as large, which changes
+/// the run length by less than 1 % for a small drift: the threshold plus 1.166, the mean excess on both sides
+/// (Siegmund 1985, section 10.2), scales with N^(-1/2).
 ///
 /// Source: E. S. Page, Biometrika 41 (1954); A. L. Goel and S. M. Wu, Technometrics 13 (1971); K. W. Kemp,
 /// J. Royal Stat. Soc. B 23 (1961); D. Brook and D. A. Evans, Biometrika 59 (1972); D. Siegmund, Sequential

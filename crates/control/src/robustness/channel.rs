@@ -10,8 +10,8 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
 
-/// Gains beyond which no limit is searched, and the number of gains at which stability is tested on
-/// each side.
+/// The largest gain up to which a limit is searched, as down to its reciprocal, and the number of gains at which
+/// stability is tested on each side.
 const LARGEST_GAIN: f64 = 1e6;
 const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.
@@ -32,8 +32,8 @@ pub struct ChannelMargins {
     pub phase: f64,
     /// The frequency of `phase`, in rad per unit of time; zero if |L| is never 1.
     pub phase_frequency: f64,
-    /// The delay, in the unit of time, below which the loop is stable. In sampled time it is exact
-    /// for whole samples, see [`super::delay_margin`].
+    /// The delay, in the unit of time, below which the loop is stable; infinite if |L| is never 1. In sampled
+    /// time it is exact for whole samples, see [`super::delay_margin`].
     pub delay: f64,
 }
 
@@ -49,6 +49,10 @@ pub struct ChannelMargins {
 ///
 /// [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable; same as
 /// [`crate::response::frequency_response`].
+///
+/// # Panics
+///
+/// If there is no such channel.
 pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<ChannelMargins, Error> {
     margins_of(&KnownResponse::new(of_channel(&closed.complementary(at), channel))?)
 }
@@ -56,15 +60,15 @@ pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<Chann
 /// The margins of the channel with this T.
 pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins, Error> {
     let sweep = Sweep::new(complementary)?;
-    let transfer = |t: &DMatrix<Complex<f64>>| open(t[(0, 0)]);
+    let transfer = |t: &DMatrix<Complex<f64>>| loop_transfer(t[(0, 0)]);
     let crossings = sweep.crossings(|t| transfer(t).im)?;
     let mut limits = vec![];
     let ends = [0, sweep.frequencies.len() - 1].map(|end| sweep.frequencies[end]);
     for frequency in crossings.into_iter().chain(ends) {
         let l = transfer(&complementary.gain(frequency)?);
         let limit = -1.0 / l.re;
-        let searched = (1.0 / LARGEST_GAIN..LARGEST_GAIN).contains(&limit);
-        if searched && l.im.abs() <= ON_AXIS * l.re.abs() {
+        let is_in_range = (1.0 / LARGEST_GAIN..LARGEST_GAIN).contains(&limit);
+        if is_in_range && l.im.abs() <= ON_AXIS * l.re.abs() {
             limits.push(limit);
         }
     }
@@ -87,7 +91,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
 }
 
 /// L = T / (1 - T).
-fn open(t: Complex<f64>) -> Complex<f64> {
+fn loop_transfer(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
 }
 
@@ -95,7 +99,7 @@ fn open(t: Complex<f64>) -> Complex<f64> {
 /// `candidates`, or one that the tests find.
 fn gain_limits(system: &StateSpace, candidates: &[f64]) -> Result<[f64; 2], Error> {
     let StateSpace { a, b, c, domain, .. } = system;
-    // A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c is the negative of what comes back.
+    // A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c gives the negative of the signal that returns.
     let family = RankOne::new(a, b, c);
     let instability =
         |gain: f64| Ok::<_, Error>(largest_excess(&family.eigenvalues(1.0 - gain)?, *domain));

@@ -8,28 +8,29 @@ use nalgebra::{Complex, DMatrix};
 
 /// Frequencies for each decade at which the loops are compared.
 const PER_DECADE: u32 = 12;
-/// The first loop is kept unless another one is lower by more than this factor.
-const KEPT: f64 = 1.1;
+/// The first loop is preferred unless another one is lower by more than this factor.
+const ADVANTAGE: f64 = 1.1;
 /// Factor by which a peak may exceed the lowest one of the references.
 const ACCEPTABLE: f64 = 1.02;
 
-/// The number, from 0, of the loop with the lowest peaks of S among loops with the same eigenvalues.
+/// Returns the index of the loop with the lowest peaks of S among loops with the same eigenvalues.
 ///
-/// Compared is `p_u^2 p_y` of the largest singular values `p_u` at the input and `p_y` at the output:
+/// The measure is `p_u^2 p_y` with the largest singular values `p_u` at the input and `p_y` at the output:
 /// relative changes of both count, those at the commands twice, because errors of actuators and
-/// delays of the computation act there. The first loop is kept unless another one is lower by more
-/// than 10 %. Without loops the result is 0.
+/// delays of the computation act there. The first loop is preferred unless another one is lower by more
+/// than 10 %.
 ///
-/// `references`: loops that other methods have for these eigenvalues. The product alone may buy a peak
-/// far below theirs at one point with one above theirs at the other. Therefore only loops count whose
-/// peaks are each at most 2 % above the lowest one of the references. `loops`: the first ones, then
-/// others, counted on, which are considered if none of the first ones counts. If no loop
-/// counts, the one is chosen whose larger ratio to the lowest peaks is least: these need not be those
-/// of one reference.
+/// `loops`: a first and a second list; an index counts through both. `references`: loops that other methods
+/// have for these eigenvalues. A loop is acceptable if each of its peaks is at most 2 % above the lowest one of
+/// the stable references: the measure alone could trade a peak far above theirs at one point for a lower one at
+/// the other. The loops of the second list are considered if none of the first list is acceptable. If no loop
+/// is acceptable, the result is the loop whose larger ratio to the lowest peaks is least; the lowest peaks at
+/// input and output need not be those of one reference. The result is 0 if the first list is empty, its first
+/// loop is not stable, or no loop can be compared.
 ///
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
-/// first loop. A resonance of S between two of them is possible only near an eigenvalue, of which the
-/// loops have the same. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
+/// first loop. A resonance of S between two of them is possible only near an eigenvalue, and all loops have the
+/// same eigenvalues. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
 /// p) for each frequency. A loop whose response cannot be computed, or that is not stable, is left
 /// out. The result is deterministic.
 #[must_use]
@@ -49,7 +50,7 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
         let [input, output] = peaks(one, &frequencies).ok()?;
         let ratio = (input / lowest[0]).max(output / lowest[1]);
         let excess = if ratio <= ACCEPTABLE { 0.0 } else { ratio };
-        Some((excess, input * input * output * if at == 0 { 1.0 } else { KEPT }, at))
+        Some((excess, input * input * output * if at == 0 { 1.0 } else { ADVANTAGE }, at))
     };
     let mut all = vec![];
     for (from, loops) in [(0, first), (first.len(), second)] {
@@ -65,7 +66,7 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
     0
 }
 
-/// The largest singular values of S at input and output over the frequencies.
+/// The largest singular values of S at the input and at the output over the frequencies.
 fn peaks(closed: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
     let (p, m) = closed.plant().d.shape();
     let d = DMatrix::identity(m + p, m + p);

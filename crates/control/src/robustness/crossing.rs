@@ -1,4 +1,4 @@
-//! The place where a function changes its sign.
+//! The argument at which a function changes its sign.
 
 /// Relative width of the interval at the end.
 const WIDTH: f64 = 1e-14;
@@ -17,10 +17,10 @@ pub(super) struct Evaluation {
 /// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function
 /// need not be continuous. Method: regula falsi in the variant of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois);
 /// every third step bisects.
-pub(super) fn narrowed<E>(
+pub(super) fn narrow<E>(
     mut low: Evaluation,
     mut high: Evaluation,
-    of: impl Fn(f64) -> Result<f64, E>,
+    function: impl Fn(f64) -> Result<f64, E>,
 ) -> Result<(f64, f64), E> {
     let positive = low.value > 0.0;
     let mut before = None;
@@ -36,7 +36,7 @@ pub(super) fn narrowed<E>(
         let finite = [low.value, high.value, part].iter().all(|value| value.is_finite());
         let inside = finite && step % 3 != 0;
         let middle = low.at + width * if inside { part.clamp(edge, 1.0 - edge) } else { 0.5 };
-        let value = of(middle)?;
+        let value = function(middle)?;
         let replaces_low = (value > 0.0) == positive;
         if replaces_low {
             low = Evaluation { at: middle, value };
@@ -51,7 +51,7 @@ pub(super) fn narrowed<E>(
 }
 
 /// The argument up to which `instability` is negative from `start` on, tested at `points`; None if it is negative at
-/// all of them.
+/// all of them. At `start` it is taken as negative.
 pub(super) fn stability_limit<E>(
     start: f64,
     points: impl IntoIterator<Item = f64>,
@@ -66,7 +66,7 @@ pub(super) fn stability_limit<E>(
         }
         // Zero and NaN are unstable.
         let bad = Evaluation { at, value: value.max(f64::MIN_POSITIVE) };
-        return Ok(Some(narrowed(good, bad, instability)?.0));
+        return Ok(Some(narrow(good, bad, instability)?.0));
     }
     Ok(None)
 }
@@ -83,7 +83,7 @@ mod tests {
             Ok::<_, ()>(of(x))
         };
         let [low, high] = [low, high].map(|at| Evaluation { at, value: of(at) });
-        (narrowed(low, high, counted).unwrap(), calls.get())
+        (narrow(low, high, counted).unwrap(), calls.get())
     }
 
     #[test]

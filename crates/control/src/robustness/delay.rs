@@ -1,6 +1,6 @@
 //! The delay margin for a common delay in all channels.
 
-use super::crossing::{Evaluation, narrowed};
+use super::crossing::{Evaluation, narrow};
 use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point, held_plant};
@@ -23,10 +23,12 @@ const REFINED_SAMPLES: f64 = 20.0;
 /// ```
 ///
 /// has a solution where an eigenvalue of L(j w) has the modulus 1. Method: the moduli of the
-/// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection. In
-/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the others. It is below one
-/// sample, zero if the moduli do not tell it, where an eigenvalue of L at z = -1 has a modulus above 1: each sample of
-/// delay turns it by half a turn around -1, which adds an unstable eigenvalue of the loop.
+/// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection.
+///
+/// In sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for parts of a sample
+/// too. If an eigenvalue of L at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each
+/// sample of delay turns L by half a turn around -1, which adds an unstable eigenvalue of the loop. The result is
+/// then zero, unless the moduli give a limit below one sample.
 ///
 /// # Errors
 ///
@@ -45,8 +47,8 @@ pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
         let excess: Vec<_> = all.iter().map(|loci| loci[rank].excess).collect();
         let value = |t: &DMatrix<Complex<f64>>| Ok(loci(t)?[rank].excess);
         for frequency in sweep.crossings_of(&excess, value)? {
-            let at = loci(&complementary.gain(frequency)?)?[rank].value;
-            delay = delay.min((-at).arg().rem_euclid(TAU) / frequency);
+            let locus = loci(&complementary.gain(frequency)?)?[rank].value;
+            delay = delay.min((-locus).arg().rem_euclid(TAU) / frequency);
         }
     }
     if let Domain::Sampled { period } = complementary.system.domain
@@ -65,7 +67,7 @@ struct Locus {
     excess: f64,
 }
 
-/// The eigenvalues of L = T (I - T)^-1, those of T divided by one less themselves, by modulus.
+/// The eigenvalues of L = T (I - T)^-1, t / (1 - t) for each eigenvalue t of T, by ascending modulus.
 fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
     let one = Complex::new(1.0, 0.0);
     let mut loci: Vec<_> = complex_eigenvalues(t)?
@@ -79,11 +81,11 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 /// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
 /// which the loop with the continuous plant becomes unstable.
 ///
-/// `plant`: continuous, or in the samples of the controller, where the result is the largest number of whole samples;
+/// `plant`: continuous, or in the samples of the controller, for which the result is rounded down to whole samples;
 /// `controller`: sampled. Over an interval the plant receives first the command
 /// of the sample before, then the new one, so that every delay gives a sampled loop whose
-/// eigenvalues decide. Method: the whole samples by [`delay_margin`], the rest by bisection; above
-/// 20 samples without the rest.
+/// eigenvalues decide. Method: the whole samples by [`delay_margin`], the part of a sample by regula falsi; above
+/// 20 samples the result is that of [`delay_margin`].
 ///
 /// # Errors
 ///
@@ -92,7 +94,7 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let period = period_of(controller)?;
     let estimate = delay_margin(&Loop::new(held_plant(plant, period)?, controller.clone())?)?;
-    refined(plant, controller, estimate)
+    refine(plant, controller, estimate)
 }
 
 /// The period of a sampled controller; [`Error::OutOfRange`] for a continuous one.
@@ -104,8 +106,8 @@ pub(super) fn period_of(controller: &StateSpace) -> Result<f64, Error> {
     }
 }
 
-/// The delay margin of a sampled controller from the one that is exact for whole samples.
-pub(super) fn refined(
+/// The delay margin of a sampled controller from `estimate`, which is exact for whole samples.
+pub(super) fn refine(
     plant: &StateSpace,
     controller: &StateSpace,
     estimate: f64,
@@ -127,7 +129,7 @@ pub(super) fn refined(
     // Rounding may hide that the loop is stable at the start and unstable at the end.
     let start = Evaluation { at: 0.0, value: value(0.0)?.min(-f64::MIN_POSITIVE) };
     let end = Evaluation { at: 1.0, value: value(1.0)?.max(f64::MIN_POSITIVE) };
-    Ok(period * (whole + narrowed(start, end, value)?.0))
+    Ok(period * (whole + narrow(start, end, value)?.0))
 }
 
 /// The loop whose commands are delayed by `samples` and a part of one, 0 to 1: its states are those of plant and

@@ -19,11 +19,11 @@ const FLAT: f64 = 1e-5;
 #[non_exhaustive]
 pub struct DiskMargin {
     /// The size alpha of the disk of factors (1 + delta alpha / 2) / (1 - delta alpha / 2), |delta|
-    /// < 1. At 2 and above the disk holds the right half plane.
+    /// < 1. At 2 and above the disk contains the right half plane.
     pub alpha: f64,
     /// A size for which stability is certain, at most `alpha`.
     pub certified: f64,
-    /// The frequency that limits it, in rad per unit of time.
+    /// The frequency that determines `alpha`, in rad per unit of time; infinite for the D of a continuous system.
     pub frequency: f64,
 }
 
@@ -82,6 +82,10 @@ impl DiskMargin {
 /// # Errors
 ///
 /// Same as [`crate::response::h_infinity`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable.
+///
+/// # Panics
+///
+/// If there is no such channel.
 pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<DiskMargin, Error> {
     let mut system = closed.sensitivity(at);
     if let Some(channel) = channel {
@@ -114,22 +118,23 @@ pub fn scaled_peak(system: &StateSpace) -> Result<ScaledPeak, Error> {
     peak_of(&KnownResponse::new(system.clone())?)
 }
 
+/// Same as [`scaled_peak`], for a system whose response is known at some frequencies.
 pub(super) fn peak_of(response: &KnownResponse) -> Result<ScaledPeak, Error> {
     scaled_below(response, &norm_of(response, WIDTH)?)
 }
 
-/// The scaled peak of a response with the H-infinity norm `whole`.
+/// The scaled peak of a response with the H-infinity norm `norm`.
 pub(super) fn scaled_below(
     response: &KnownResponse,
-    whole: &HInfinity,
+    norm: &HInfinity,
 ) -> Result<ScaledPeak, Error> {
     if response.system.d.nrows() == 1 {
-        let (value, frequency) = (whole.lower, whole.frequency);
-        return Ok(ScaledPeak { value, frequency, certified: whole.upper });
+        let (value, frequency) = (norm.lower, norm.frequency);
+        return Ok(ScaledPeak { value, frequency, certified: norm.upper });
     }
     let Largest { value, frequency, scaling } = Largest::search(response)?;
     let scaled = response.scaled(&scaling.map(f64::exp));
-    let certified = whole.upper.min(norm_of(&scaled, WIDTH)?.upper).max(value);
+    let certified = norm.upper.min(norm_of(&scaled, WIDTH)?.upper).max(value);
     Ok(ScaledPeak { value, frequency, certified })
 }
 
@@ -142,13 +147,13 @@ struct Largest {
 }
 
 impl Largest {
-    /// On the frequencies of a [`Sweep`], refined about the largest value.
+    /// Searches the frequencies of a [`Sweep`] and about the one with the largest value.
     fn search(response: &KnownResponse) -> Result<Self, Error> {
         let (sweep, system) = (Sweep::new(response)?, &response.system);
         let scaling = DVector::zeros(system.d.nrows());
         let mut best = Self { value: 0.0, frequency: 0.0, scaling };
         if system.domain == Domain::Continuous {
-            best.offer(&to_complex(&system.d), f64::INFINITY, 0.0)?;
+            best.evaluate(&to_complex(&system.d), f64::INFINITY, 0.0)?;
         }
         let bounds = sweep.values.iter().map(balanced_norm).collect::<Result<Vec<_>, _>>()?;
         let mut order: Vec<usize> = (0..bounds.len()).collect();
@@ -159,7 +164,7 @@ impl Largest {
                 break;
             }
             let before = best.value;
-            if best.offer(&sweep.values[at], sweep.frequencies[at], before)? > before {
+            if best.evaluate(&sweep.values[at], sweep.frequencies[at], before)? > before {
                 place = Some(at);
             }
         }
@@ -177,9 +182,9 @@ impl Largest {
         for _ in 0..REFINEMENTS {
             let third = (high - low) / 3.0;
             let (first, second) = (low + third, high - third);
-            let left = self.offer(&sweep.response.gain(first)?, first, 0.0)?;
-            let right = self.offer(&sweep.response.gain(second)?, second, 0.0)?;
-            // As flat as the values are precise.
+            let left = self.evaluate(&sweep.response.gain(first)?, first, 0.0)?;
+            let right = self.evaluate(&sweep.response.gain(second)?, second, 0.0)?;
+            // The values differ by no more than their precision.
             if left.min(right) >= (1.0 - FLAT) * self.value {
                 break;
             }
@@ -192,8 +197,9 @@ impl Largest {
         Ok(())
     }
 
-    /// Takes the value at a frequency if it is larger; returns it, or a bound of it that is at most `enough`.
-    fn offer(
+    /// Evaluates the bound at a frequency and stores it if it is the largest; returns it, or a higher one that is at
+    /// most `enough`.
+    fn evaluate(
         &mut self,
         gain: &DMatrix<Complex<f64>>,
         frequency: f64,

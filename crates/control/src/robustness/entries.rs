@@ -44,13 +44,13 @@ pub struct SensitivityPeak {
 /// d sigma / d theta = Re(u* dS/d theta v),   S v = sigma u
 /// ```
 ///
-/// `plant`: in continuous time, or in the samples of the controller; `controller`: in its own domain, a sampled one with a
-/// continuous plant under a zero-order hold. At the frequency of the peak the derivative of sigma with respect to the frequency
-/// is zero, so that a move of the peak has an effect of second order only. The derivative exists if the largest singular value is simple. For a
-/// sampled loop the derivatives with respect to A and B follow from those of the sampled plant by
-/// the adjoint of the derivative of the matrix exponential, L(M', G) for the gradient G. Cost: about
-/// that of three solutions of a complex system of the order of the loop. An infinite frequency gives
-/// zeros: there S = I.
+/// `plant`: in continuous time, or in the samples of the controller; `controller`: in continuous or sampled time. A
+/// continuous plant with a sampled controller is under a zero-order hold. At the peak the derivative of sigma with
+/// respect to the frequency is zero, so that a move of the peak has an effect of second order only. The derivative
+/// exists if the largest singular value is simple. For a sampled loop the derivatives with respect to A and B follow
+/// from those of the sampled plant by the adjoint of the derivative of the matrix exponential, L(M', G) for the
+/// gradient G. Cost: about that of three solutions of a complex system of the order of the loop. An infinite
+/// frequency gives the value 1 and zeros: there S = I.
 ///
 /// Source: derivative of a simple singular value, G. W. Stewart and J. Sun, Matrix perturbation
 /// theory (1990), section IV.2; Fréchet derivative of the exponential by a block matrix, N. J.
@@ -58,7 +58,8 @@ pub struct SensitivityPeak {
 ///
 /// # Errors
 ///
-/// Same as [`Loop::new`]; [`Error::Overflow`] if the loop has a pole at the frequency.
+/// Same as [`Loop::new`] and [`held_plant`]; [`Error::Overflow`] if the loop has a pole at the frequency, or S is
+/// zero there; [`Error::NotConverged`].
 pub fn peak_derivatives(
     plant: &StateSpace,
     controller: &StateSpace,
@@ -79,7 +80,7 @@ pub fn peak_derivatives(
     derivatives.a = derivatives.a.view((0, 0), (n, n)).into();
     derivatives.b = derivatives.b.rows(0, n).into();
     if derivatives.c.ncols() > n {
-        // The command before is a state of the held plant, and D a part of its C.
+        // The previous command is a state of the held plant, and D is a part of its C.
         derivatives.d = derivatives.c.columns(n, m).into();
         derivatives.c = derivatives.c.columns(0, n).into();
     }
@@ -90,7 +91,7 @@ pub fn peak_derivatives(
 }
 
 impl Loop {
-    /// The derivatives with respect to the plant of the loop's own domain.
+    /// The derivatives with respect to the matrices of the plant of this loop.
     fn derivatives(&self, peak: &SensitivityPeak) -> Result<PeakDerivatives, Error> {
         let SensitivityPeak { point, frequency, scaled } = *peak;
         let (plant, controller) = (self.plant(), self.controller());
@@ -104,7 +105,7 @@ impl Loop {
         let y = pencil.transpose().lu().solve(&to_complex(&outputs.transpose()));
         let y = y.ok_or(singular)?.transpose();
         let mut response = to_complex(&outputs) * &x;
-        // The controller's D from y to u, the plant's from u to y; the added signals themselves.
+        // The direct terms of controller and plant, and the added signals themselves.
         for (row, column) in (0..m).flat_map(|i| (0..p).map(move |j| (i, j))) {
             response[(row, m + column)] += controller.d[(row, column)];
             response[(m + column, row)] += plant.d[(column, row)];
@@ -131,7 +132,7 @@ impl Loop {
         let left = (&weighted * &right) / Complex::from(value);
         let right = right.zip_map(&units, |entry, unit| entry / unit);
         let left = left.zip_map(&units, |entry, unit| entry * unit);
-        // u* (effect of what is added to x' and to y), and (x and u) under v.
+        // u* times the effect on S of additions to x' and to y; x and u for the input v.
         let on_states = left.adjoint() * y.view((from, 0), (count, n));
         let on_outputs = left.adjoint() * response.view((from, m), (count, p));
         let of_states = x.view((0, from), (n, count)) * &right;

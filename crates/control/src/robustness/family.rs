@@ -15,25 +15,25 @@ const SMALL: f64 = 0.05;
 
 /// The plants that a controller may meet: each parameter deviates by -1 to 1 of its tolerance.
 pub trait PlantFamily {
-    /// Why a plant cannot be had.
+    /// The reason why a plant cannot be computed.
     type Error: From<Error>;
 
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples of the
-    /// controller.
+    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples
+    /// of the controller.
     ///
     /// # Errors
     ///
-    /// The plant cannot be had.
+    /// The plant cannot be computed.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
 
-    /// How a quantity changes with each deviation, from its derivatives with respect to the entries
-    /// of A, B, C and D. It guides the search only.
+    /// The derivatives of a quantity with respect to each deviation, from those with respect to the entries
+    /// of A, B, C and D. They guide the search only.
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
 
-    /// The rising multiples of the tolerances at which the worst direction is tested.
+    /// The ascending multiples of the tolerances at which the worst direction is tested, from 1e-6 to at most 16.
     fn multiples(&self) -> Vec<f64> {
         let factor = |multiple: f64| if multiple < SMALL { 2.0 } else { FACTOR };
         let next =
@@ -66,10 +66,11 @@ impl<F: PlantFamily> Loops<'_, F> {
         Ok(Loop::new(plant, self.controller.clone())?.dynamics())
     }
 
+    /// [`instability`] of the loop with these deviations; infinite if the samples of the plant overflow.
     pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
         let plant = self.family.plant(deviations)?;
         match self.dynamics(plant) {
-            // The plant leaves the range of the numbers within a sample.
+            // The states of the plant leave the range of double precision within a sample.
             Err(Error::Overflow { .. }) if self.controller.domain != Domain::Continuous => {
                 Ok(f64::INFINITY)
             }

@@ -45,7 +45,7 @@ pub(super) fn mean(a: &Balance, h: f64) -> Result<DMatrix<f64>, Error> {
     check::in_range("e^(A h)", a.restore(&mean))
 }
 
-/// [`hold::zero_order_hold`], by [`mean`] from 48 states on.
+/// Same as [`hold::zero_order_hold`], computed by [`mean`] from 48 states on.
 pub(super) fn hold_inputs(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -1,6 +1,6 @@
 //! The longest time over which the signals between plant and controller may be held.
 
-use super::crossing::{Evaluation, narrowed};
+use super::crossing::{Evaluation, narrow};
 use super::delay::period_of;
 use super::held::mean;
 use super::{Loop, beside, held_plant};
@@ -8,10 +8,10 @@ use crate::balance::Balance;
 use crate::blocks::{block_2x2, stacked};
 use crate::eigen::eigenvalues;
 use crate::stability::instability;
-use crate::{Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// The search begins at this part of the shortest time constant of the loop and ends at `LONGEST`
+/// The search starts at this part of the shortest time constant of the loop and ends at `LONGEST`
 /// times the longest one.
 const SHORTEST: f64 = 1e-9;
 const LONGEST: f64 = 100.0;
@@ -25,15 +25,19 @@ const SHORT: f64 = 1e-2;
 /// discretised continuous one.
 ///
 /// Returns the h below which the loop is stable: zero if it diverges with a hold of 1e-9 of its
-/// shortest time constant already, infinite if it is stable at 100 times its longest one. Method:
-/// stability at h in ratios of 1.25 (of 8 below 1e-2 of the shortest time constant), then regula
-/// falsi; the eigenvalues of the difference of two samples decide, which are precise at a short h. An unstable interval between two steps is missed.
+/// shortest time constant already, infinite if it is stable at all tested h up to 100 times its longest one.
+/// Method: stability at h in ratios of 1.25 (of 8 below 1e-2 of the shortest time constant), then regula
+/// falsi. The eigenvalues of (Phi - I) / h decide, Phi the dynamics from sample to sample; they are precise at a
+/// short h. An unstable interval between two steps is missed.
 ///
 /// # Errors
 ///
-/// [`Error::NotHurwitz`] for a loop that is not stable, or sampled; same as [`crate::hold::zero_order_hold`].
+/// [`Error::OutOfRange`] for a sampled loop; [`Error::NotHurwitz`] for a loop that is not stable;
+/// [`Error::NotConverged`], [`Error::Overflow`].
 pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
     let (plant, controller) = (closed.plant(), closed.controller());
+    let is_continuous = plant.domain == Domain::Continuous;
+    check::that(is_continuous, "the domain", f64::NAN, "that of a continuous loop")?;
     let balanced = [&plant.a, &controller.a].map(Balance::new);
     let value = |h: f64| {
         let (of_plant, of_controller) = (mean(&balanced[0], h)?, mean(&balanced[1], h)?);
@@ -44,7 +48,7 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
             [&(&b_k * &plant.c), &a_k],
         );
         if plant.d.amax() > 0.0 {
-            // The commands before are further states v: a measurement C x + D v contains the command that was held
+            // The previous commands are further states v: a measurement C x + D v contains the command that was held
             // until then.
             let (n, m) = plant.b.shape();
             let of_held = stacked(&DMatrix::zeros(n, m), &(b_k * &plant.d));
@@ -63,14 +67,16 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
 }
 
 /// Computes the longest sample time at which the loop of the continuous `plant` and the sampled
-/// `controller` is stable, the matrices of the controller unchanged: a clock that is too slow.
+/// `controller` is stable, the matrices of the controller unchanged: the effect of a clock that is too slow.
 ///
-/// The search begins at the period of the controller and ends at 1000 times of it, with the result
-/// infinite; the result is zero if the loop is unstable at its period. Method: see [`longest_hold`].
+/// The search starts at the period of the controller and ends at 1000 times the period. The result is zero if
+/// the loop is unstable at the period, and infinite if it is stable to the end. Method: stability at sample times
+/// in ratios of 1.25, then regula falsi.
 ///
 /// # Errors
 ///
-/// Same as [`crate::hold::zero_order_hold`]; [`Error::OutOfRange`] when the controller is continuous.
+/// Same as [`held_plant`] and [`Loop::new`]; [`Error::OutOfRange`] if the controller is continuous or the plant is
+/// sampled.
 pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let period = period_of(controller)?;
     let value = |h: f64| {
@@ -81,25 +87,40 @@ pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64
     search(value, [period, period, 1000.0 * period])
 }
 
-/// The first loss of stability, where the value is no longer negative, between the first and the last
-/// time; up to the second one the steps are long.
+/// The first time between `from` and `to` at which the value is no longer negative; zero if it is not negative at
+/// `from`, infinite if it is negative at all tested times. Up to `short` the steps are long.
 fn search(
     value: impl Fn(f64) -> Result<f64, Error>,
     [from, short, to]: [f64; 3],
 ) -> Result<f64, Error> {
     let (mut good, mut h) = (Evaluation { at: 0.0, value: f64::NAN }, from);
     while h <= to {
-        let there = Evaluation { at: h, value: value(h)? };
-        if there.value < 0.0 {
-            good = there;
+        let tested = Evaluation { at: h, value: value(h)? };
+        if tested.value < 0.0 {
+            good = tested;
             h *= FACTORS[usize::from(h >= short)];
             continue;
         }
         if good.at <= 0.0 {
             return Ok(0.0);
         }
-        let bad = Evaluation { value: there.value.max(f64::MIN_POSITIVE), ..there };
-        return Ok(narrowed(good, bad, value)?.0);
+        let bad = Evaluation { value: tested.value.max(f64::MIN_POSITIVE), ..tested };
+        return Ok(narrow(good, bad, value)?.0);
     }
     Ok(f64::INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sampled_loop_has_no_hold_time() {
+        let one = |value| DMatrix::from_element(1, 1, value);
+        let domain = Domain::Sampled { period: 1.0 };
+        let plant = StateSpace { a: one(0.5), b: one(1.0), c: one(1.0), d: one(0.0), domain };
+        let controller = StateSpace { a: one(0.0), b: one(0.0), c: one(0.0), d: one(-0.1), domain };
+        let closed = Loop::new(plant, controller).unwrap();
+        assert!(matches!(longest_hold(&closed), Err(Error::OutOfRange { .. })));
+    }
 }

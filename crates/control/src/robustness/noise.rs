@@ -4,9 +4,9 @@ use crate::response::energy;
 use crate::{Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// Computes the root-mean-square value of each output under white noise at each input: H2 norms.
+/// Computes the root-mean-square value of each output under white noise at each input, p x m: H2 norms.
 ///
-/// Returns p x m. In continuous time the noise has the spectral density 1 (a variance of one unit
+/// In continuous time the noise has the spectral density 1 (a variance of one unit
 /// squared times the unit of time), in sampled time each sample has the variance 1. Independent
 /// noises add their squares. Method: a Lyapunov equation for each input, or for each output if these are
 /// fewer (the transposed system has the same norms), see [`energy`].

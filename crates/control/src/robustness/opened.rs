@@ -1,7 +1,7 @@
-//! All that is asked about one point of a loop.
+//! Peaks and margins at one point of a loop.
 
 use super::channel::{self, ChannelMargins};
-use super::delay::{delay_of, refined};
+use super::delay::{delay_of, refine};
 use super::disk::{self, DiskMargin, WIDTH};
 use super::scaling::ScaledPeak;
 use super::{Loop, Point};
@@ -10,8 +10,8 @@ use crate::{Error, StateSpace};
 
 /// A loop opened at one point, with its eigenvalues and the responses S and T on a sweep of frequencies.
 ///
-/// Each answer has the value of the function of the same name; all of them share the sweep: it needs
-/// 4 n^2 (1 + m) multiplications for each of 60 frequencies in a decade and each resonance.
+/// Each method returns the value of the function of the same name. All of them share one sweep of 60 frequencies
+/// for each decade and the resonances, which needs 4 n^2 (1 + m) multiplications for each frequency.
 pub struct OpenedLoop {
     sensitivity: KnownResponse,
     complementary: KnownResponse,
@@ -57,11 +57,15 @@ impl OpenedLoop {
         disk::scaled_below(&self.sensitivity, &self.peak)
     }
 
-    /// [`super::disk_margin`].
+    /// [`super::disk_margin`] of all channels, or of one.
     ///
     /// # Errors
     ///
     /// Same as [`super::disk_margin`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such channel.
     pub fn disk_margin(&self, channel: Option<usize>) -> Result<DiskMargin, Error> {
         disk::margin_of(match channel {
             Some(channel) => self.sensitivity.channel(channel),
@@ -69,11 +73,15 @@ impl OpenedLoop {
         })
     }
 
-    /// [`super::channel_margins`].
+    /// [`super::channel_margins`] of one channel.
     ///
     /// # Errors
     ///
     /// Same as [`super::channel_margins`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such channel.
     pub fn channel_margins(&self, channel: usize) -> Result<ChannelMargins, Error> {
         channel::margins_of(&self.complementary.channel(channel))
     }
@@ -87,8 +95,8 @@ impl OpenedLoop {
         delay_of(&self.complementary)
     }
 
-    /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`: that of
-    /// the loop, in continuous time or sampled, as `controller` is.
+    /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`, continuous or sampled, and `controller`,
+    /// sampled: those of the loop.
     ///
     /// # Errors
     ///
@@ -98,6 +106,6 @@ impl OpenedLoop {
         plant: &StateSpace,
         controller: &StateSpace,
     ) -> Result<f64, Error> {
-        refined(plant, controller, self.delay_margin()?)
+        refine(plant, controller, self.delay_margin()?)
     }
 }

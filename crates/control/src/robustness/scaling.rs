@@ -4,7 +4,7 @@ use crate::Error;
 use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
-/// Widths of ln(mu) at which the search ends.
+/// The width of the bracket of ln(mu) at which the search ends.
 const WIDTH: f64 = 1e-5;
 const STEPS_PER_DIMENSION: usize = 400;
 const BALANCINGS: usize = 30;
@@ -16,12 +16,11 @@ const RANGE: f64 = 12.0;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ScaledPeak {
-    /// The largest value found.
+    /// The largest value over the evaluated frequencies.
     pub value: f64,
-    /// The frequency where it was found, in rad per unit of time; infinite for the D of a
-    /// continuous system.
+    /// The frequency of `value`, in rad per unit of time; infinite for the D of a continuous system.
     pub frequency: f64,
-    /// A value that is exceeded at no frequency, up to rounding.
+    /// An upper bound over all frequencies, up to rounding.
     pub certified: f64,
 }
 
@@ -38,13 +37,13 @@ pub(super) fn scaled_norm(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<f64
     scaled_norm_above(m, 0.0)
 }
 
-/// [`scaled_norm`], but the search ends as soon as the bound is at most `enough`.
+/// Same as [`scaled_norm`], but the search ends as soon as the bound is at most `enough`.
 pub(super) fn scaled_norm_above(
     m: &DMatrix<Complex<f64>>,
     enough: f64,
 ) -> Result<(f64, DVector<f64>), Error> {
     let k = m.nrows();
-    let start = balanced(m);
+    let start = balancing_exponents(m);
     let first = Scaled::new(m, &start)?;
     if k == 1 || first.norm <= enough {
         return Ok((first.norm, start));
@@ -85,13 +84,14 @@ pub(super) fn scaled_norm_above(
     Ok(best)
 }
 
-/// [`scaled_norm`] of the balanced matrix without a search: an upper bound.
+/// An upper bound of [`scaled_norm`]: the largest singular value of the balanced matrix, without a search.
 pub(super) fn balanced_norm(m: &DMatrix<Complex<f64>>) -> Result<f64, Error> {
-    Ok(Scaled::new(m, &balanced(m))?.norm)
+    Ok(Scaled::new(m, &balancing_exponents(m))?.norm)
 }
 
-/// The logarithms of the D for which rows and columns of D M D^-1 have equal norms (Osborne 1960).
-fn balanced(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
+/// The logarithms of the D, the last one 0, for which rows and columns of D M D^-1 have about equal norms (Osborne
+/// 1960).
+fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
     let k = m.nrows();
     let mut exponents = DVector::<f64>::zeros(k);
     for _ in 0..BALANCINGS {

@@ -24,7 +24,7 @@ use crate::response::{continuous_equivalent, original_frequency};
 use crate::{Error, StateSpace, check};
 use cover::Cover;
 
-/// Part by which a bound is above the one whose intervals were computed, for rounding errors.
+/// The relative increase of the bound that allows for rounding errors.
 const ROUNDING: f64 = 1e-4;
 
 /// An upper bound of the structured singular value over all frequencies.
@@ -41,7 +41,7 @@ pub struct StructuredBound {
 }
 
 /// Bounds the structured singular value of a stable square system M(s) = C (s I - A)^-1 B + D over all frequencies,
-/// those between the points of a grid too.
+/// not only on a grid.
 ///
 /// For each frequency the bound is the least beta with Hermitian D > 0 and G that commute with the structure and
 ///
@@ -49,17 +49,19 @@ pub struct StructuredBound {
 /// beta^2 D - M* D M - j (G M - M* G) > 0
 /// ```
 ///
-/// G acts on the real blocks; without it they would be bounded as complex ones. `blocks`: the structure, as many channels
-/// as M has. `enough`: a bound that need not be improved, above zero. None if `ending` said true before the end; it is
-/// asked at each interval.
+/// G acts on the real blocks; without it they would be bounded as complex ones. `blocks`: the structure, with as many
+/// channels as M. `enough`: a bound that need not be improved, above zero. `ending`: called at each interval; the
+/// result is None if it returns true before the end.
 ///
-/// D and G of one frequency hold up to the next imaginary eigenvalues of a Hamiltonian matrix on both sides; what these
-/// intervals leave is treated in the same way, with a bound that rises by 0.5 % where it is exceeded, until
-/// nothing is left. So `upper` is about 1 % above the largest of the least bounds; more where these need a G above 1000 times D and M, in
-/// loops with less than about 1 % of damping. The least bounds equal mu for up to three full blocks or one real
-/// one; otherwise mu may be smaller. Method for one frequency: method of centres with Newton's method. Cost, for r channels
-/// with v scales, 2 r if no real block is repeated, and n states: r^3 + v^3 in a Newton step, some hundred of them and
-/// 200 (2 n)^3 for each of some 1 to 100 intervals.
+/// D and G of one frequency hold up to the next imaginary eigenvalues of a Hamiltonian matrix on both sides; the
+/// frequencies outside these intervals are treated in the same way, with a bound that rises by 0.5 % where it is
+/// exceeded, until the intervals cover all frequencies. So `upper` is about 1 % above the largest of the least bounds;
+/// more where these need a G above 1000 times D and M, in loops with less than about 1 % of damping. The least bounds
+/// equal mu for up to three full blocks or one real one; otherwise mu may be smaller.
+///
+/// Method for one frequency: method of centres with Newton's method. Cost, for r channels with v scales, 2 r if no
+/// real block is repeated, and n states: r^3 + v^3 in a Newton step, some hundred of them and 200 (2 n)^3 for each of
+/// some 1 to 100 intervals.
 ///
 /// In sampled time z = (1 + s) / (1 - s) makes the system continuous.
 ///

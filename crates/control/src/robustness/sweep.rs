@@ -1,11 +1,11 @@
 //! Frequencies at which margins are searched.
 
-use super::crossing::{Evaluation, narrowed};
+use super::crossing::{Evaluation, narrow};
 use crate::Error;
 use crate::response::KnownResponse;
 use nalgebra::{Complex, DMatrix};
 
-/// A frequency response on a grid that has the resonances of the system.
+/// A frequency response on a grid that includes the resonances of the system.
 pub(super) struct Sweep<'a> {
     pub(super) response: &'a KnownResponse,
     /// Ascending, in rad per unit of time.
@@ -22,20 +22,21 @@ impl<'a> Sweep<'a> {
         Ok(Self { response, frequencies, values })
     }
 
-    /// The frequencies at which the real function `of` of G changes its sign.
+    /// The frequencies at which a real function of G changes its sign.
     pub(super) fn crossings(
         &self,
-        of: impl Fn(&DMatrix<Complex<f64>>) -> f64,
+        function: impl Fn(&DMatrix<Complex<f64>>) -> f64,
     ) -> Result<Vec<f64>, Error> {
-        let values: Vec<f64> = self.values.iter().map(&of).collect();
-        self.crossings_of(&values, |response| Ok(of(response)))
+        let values: Vec<f64> = self.values.iter().map(&function).collect();
+        self.crossings_of(&values, |response| Ok(function(response)))
     }
 
-    /// The same for a function whose `values` on the grid are known, and whose evaluation may fail.
+    /// Same as [`Self::crossings`], for a function whose `values` on the grid are known, and whose evaluation may
+    /// fail. An interval with NaN at one end has no crossing.
     pub(super) fn crossings_of(
         &self,
         values: &[f64],
-        of: impl Fn(&DMatrix<Complex<f64>>) -> Result<f64, Error>,
+        function: impl Fn(&DMatrix<Complex<f64>>) -> Result<f64, Error>,
     ) -> Result<Vec<f64>, Error> {
         let mut crossings = Vec::new();
         for at in 1..values.len() {
@@ -46,7 +47,7 @@ impl<'a> Sweep<'a> {
             let low = Evaluation { at: self.frequencies[at - 1], value: before };
             let high = Evaluation { at: self.frequencies[at], value: after };
             let (low, high) =
-                narrowed(low, high, |frequency| of(&self.response.gain(frequency)?))?;
+                narrow(low, high, |frequency| function(&self.response.gain(frequency)?))?;
             crossings.push(0.5 * (low + high));
         }
         Ok(crossings)

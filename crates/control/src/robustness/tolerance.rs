@@ -22,7 +22,7 @@ pub struct PlantEntry {
 /// The relative tolerances of the entries of A, B, C and D of a plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Of A, B, C, D, in this order: each matrix as large as the plant's; zero for an exact entry.
+    /// The tolerances of A, B, C and D: four matrices of the shapes of the plant's; zero for an exact entry.
     pub of: [DMatrix<f64>; 4],
     /// Entries that change by the same factor. An entry in none of these groups changes independently.
     pub common: Vec<Vec<PlantEntry>>,
@@ -31,14 +31,14 @@ pub struct Tolerances {
 impl Tolerances {
     /// The tolerances `relative` of A, B, C and D for all entries but zeros and those of structural rows.
     ///
-    /// A row is structural if its single entry other than 0 is 1 and says what a state or a measurement is:
+    /// A row is structural if its only entry other than 0 is 1 and the equation is a definition:
     ///
     /// ```text
     /// x_i' = x_j (j other than i): a state is the derivative of another; row i of B is zero
     /// y_i = x_j: a measurement is a state; row i of D is zero
     /// ```
     ///
-    /// Every other entry may be a parameter of the plant, 1 and -1, too.
+    /// Every other entry may be a parameter of the plant, including 1 and -1.
     #[must_use]
     pub fn unless_structural(plant: &StateSpace, relative: [f64; 4]) -> Self {
         let [in_a, in_b, in_c, in_d] = relative;
@@ -90,19 +90,19 @@ fn is_signal(
     is_one && commands.row(row).iter().all(|entry| *entry == 0.0)
 }
 
-/// What a loop does while the parameters of its plant are within their tolerances.
+/// The stability of a loop while the parameters of its plant are within their tolerances.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ToleranceTest {
     /// Number of random cases.
     pub cases: u32,
-    /// How many of them are stable.
+    /// Number of stable random cases.
     pub stable: u32,
     /// [`crate::stability::instability`] of the worst plant.
     pub worst_instability: f64,
     /// The worst plant that was found.
     pub worst: StateSpace,
-    /// Its deviations, as parts of the tolerances.
+    /// The deviations of the worst plant, as parts of the tolerances.
     pub deviations: Vec<f64>,
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
     /// stable; None if it is stable at all [`PlantFamily::multiples`].
@@ -121,7 +121,8 @@ pub struct ToleranceTest {
 ///
 /// # Errors
 ///
-/// Those of the family; same as [`super::Loop::new`], [`crate::hold::zero_order_hold`] and [`crate::stability::instability`].
+/// The errors of the family; same as [`super::Loop::new`], [`super::held_plant`] and
+/// [`crate::stability::instability`].
 pub fn tolerance_test<F: PlantFamily>(
     family: &F,
     controller: &StateSpace,
@@ -151,7 +152,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         random_deviations(self.family.count(), cases, seed)
     }
 
-    /// The plant of the family with these deviations, in the loop.
+    /// Computes the instability of the loop with the plant of these deviations.
     ///
     /// # Errors
     ///
@@ -187,7 +188,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     ///
     /// # Errors
     ///
-    /// Same as [`tolerance_test`].
+    /// Same as [`tolerance_test`]; [`Error::NotConverged`] if `climbed` is empty.
     pub fn result(
         &self,
         cases: &[ToleranceCase],
@@ -224,7 +225,7 @@ pub fn random_deviations(count: usize, cases: u32, seed: u64) -> Vec<Vec<f64>> {
     (0..cases).map(|_| case()).collect()
 }
 
-/// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), in 0 to 1.
+/// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), from 0 to below 1.
 pub(crate) fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
@@ -255,7 +256,8 @@ impl<'a> EntryFamily<'a> {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for tolerances that do not fit; [`Error::OutOfRange`] for a negative one.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad tolerances; [`Error::OutOfRange`] for a
+    /// negative one.
     pub fn new(plant: &'a StateSpace, tolerances: &Tolerances) -> Result<Self, Error> {
         let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c), ("D", &plant.d)];
         for ((name, values), of) in named.into_iter().zip(&tolerances.of) {

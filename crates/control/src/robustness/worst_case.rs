@@ -12,8 +12,8 @@ type Vector = DVector<Complex<f64>>;
 const ROUNDS: usize = 12;
 /// Number of eigenvalues whose directions are tried from each start.
 const MODES: usize = 6;
-/// Each trial that fails moves this part of the parameters of the one before; of a controller with more than
-/// `LARGE` states a smaller one, as each trial costs its eigenvalues.
+/// After a trial that fails, the next one moves the number of parameters divided by this; with a controller of more
+/// than `LARGE` states divided by `FEWER_IF_LARGE`, as each trial costs the eigenvalues of the loop.
 const FEWER: usize = 2;
 const FEWER_IF_LARGE: usize = 8;
 const LARGE: usize = 50;
@@ -28,7 +28,7 @@ pub(super) fn climb<F: PlantFamily>(
     let mut worst = start;
     let large = loops.controller.a.nrows() > LARGE;
     for round in 0..ROUNDS {
-        // A plant beyond the range of the numbers has no gradient, and nothing is worse.
+        // No case is worse than a plant beyond the range of double precision, and it has no gradient.
         if worst.instability.is_infinite() {
             break;
         }
@@ -60,8 +60,8 @@ pub(super) fn climb<F: PlantFamily>(
     Ok(worst)
 }
 
-/// The derivatives of [`Domain::excess`] of the eigenvalues nearest to instability with respect to
-/// the deviations.
+/// The derivatives, with respect to the deviations, of [`Domain::excess`] of the `count` eigenvalues nearest to
+/// instability; eigenvalues without eigenvectors are left out.
 fn gradients<F: PlantFamily>(
     loops: &Loops<'_, F>,
     deviations: &[f64],
@@ -92,36 +92,35 @@ fn gradients<F: PlantFamily>(
             continue;
         };
         let x: Vector = right.rows(0, n).into();
-        // A held plant with a direct term has the commands before among its states.
+        // A held plant with a direct term has the previous commands among its states.
         let first = dynamics.nrows() - controller.a.nrows();
         let before: Vector = right.rows(n, first - n).into();
         let fed_back = &command * right.rows(first, controller.a.nrows());
         let through_d = if first > n { &before } else { &fed_back };
         let y = to_complex(&plant.c) * &x + to_complex(&plant.d) * through_d;
         let u = &fed_back + &direct * &y;
-        // d lambda = of_plant [dA, dB] [x; u] + of_output [dC, dD] [x; u], u before in a held plant.
+        // d lambda = of_plant [dA, dB] [x; u] + of_output [dC, dD] [x; u], the previous u with D in a held plant.
         let mut of_plant: Vector = left.rows(0, n).into();
-        let sensed = to_complex(&plant.b);
         let mut input: Vector = DVector::zeros(n + m);
         input.rows_mut(0, n).copy_from(&x);
         input.rows_mut(n, m).copy_from(&u);
-        let mut through = sensed.tr_mul(&of_plant);
+        let mut through = to_complex(&plant.b).tr_mul(&of_plant);
         if let Some((half, period)) = &half {
             let whole = half * half;
             through = whole.view((0, n), (n, m)).tr_mul(&of_plant);
             input = half * input;
-            let before = half.view((0, 0), (n, n)).tr_mul(&of_plant);
-            of_plant = before * Complex::new(*period, 0.0);
+            let product = half.view((0, 0), (n, n)).tr_mul(&of_plant);
+            of_plant = product * Complex::new(*period, 0.0);
         }
         let of_output = direct.tr_mul(&through)
             + to_complex(&controller.b).tr_mul(&left.rows(first, controller.a.nrows()));
-        let turn = match domain {
+        let phase = match domain {
             Domain::Continuous => Complex::new(1.0, 0.0),
             Domain::Sampled { .. } => mode.conj() / mode.norm().max(f64::MIN_POSITIVE),
         };
         let outer = |effect: &Vector, by: &[Complex<f64>]| {
             DMatrix::from_fn(effect.nrows(), by.len(), |row, column| {
-                (turn * effect[row] * by[column]).re
+                (phase * effect[row] * by[column]).re
             })
         };
         let (of_x, of_u) = input.as_slice().split_at(n);
