@@ -11,7 +11,7 @@ use std::iter::successors;
 /// inverse counts as real.
 const LARGEST_G: f64 = 1e3;
 const NEWTON_STEPS: usize = 40;
-/// Newton decrement at which the centre is near enough.
+/// The Newton decrement below which a point is near enough to the centre.
 const NEAR: f64 = 0.3;
 const HALVINGS: usize = 20;
 const RIDGE: f64 = 1e-13;
@@ -32,15 +32,18 @@ pub(super) struct Point {
     pub(super) g: ComplexMatrix,
 }
 
-/// A linear matrix inequality N* W N > 0 at a point, as K = N (its inverse) N*; and whether K is block diagonal.
+/// A linear matrix inequality F = N* W N > 0 at a point.
 struct Inequality {
+    /// K = N F^-1 N*.
     k: ComplexMatrix,
+    /// Whether K is block diagonal.
     diagonal: bool,
     /// The entries of W for each direction.
     weights: Vec<Vec<SparseEntry>>,
 }
 
 impl<'a> Barrier<'a> {
+    /// `size`: the size of M, to which the largest G is relative.
     pub(super) fn new(m: &'a ComplexMatrix, blocks: &[Block], size: f64) -> Self {
         Self { m, directions: directions(blocks), largest_g: LARGEST_G * size }
     }
@@ -67,8 +70,8 @@ impl<'a> Barrier<'a> {
         point
     }
 
-    /// The factors of the four inequalities: of the bound, of D and G, of G from the other side, of the size of D; None
-    /// if one does not hold.
+    /// The factors of the four inequalities, with c the largest G: [`form`] > 0, c D + G > 0, c D - G > 0, I - D > 0;
+    /// None if one does not hold.
     fn factors(&self, at: &Point, bound: f64) -> Option<[ComplexMatrix; 4]> {
         let Point { d, g, .. } = at;
         if d.diagonal().iter().any(|x| x.re <= 0.0) {
@@ -139,7 +142,7 @@ impl<'a> Barrier<'a> {
                 break;
             }
             let mut length = if decrement < 0.25 { 1.0 } else { 1.0 / (1.0 + decrement) };
-            // Of a self-concordant function twice the safe step is often better.
+            // Twice the safe step of a self-concordant function is often better.
             if decrement > 1.0 {
                 length *= 2.0;
             }
@@ -159,7 +162,7 @@ impl<'a> Barrier<'a> {
         Some(point)
     }
 
-    /// Gradient and Hessian of the barrier, `tr(-W_a K)` and `tr(W_a K W_b K)`.
+    /// Gradient and Hessian of the barrier, -`tr(W_a K)` and `tr(W_a K W_b K)`, added over the inequalities.
     fn derivatives(&self, inequalities: &[Inequality; 4]) -> (DVector<f64>, DMatrix<f64>) {
         let count = self.directions.len();
         let mut gradient = DVector::zeros(count);

@@ -8,11 +8,12 @@ use nalgebra::{Complex, DMatrix};
 pub enum Block {
     /// delta I with one real number delta, on this many channels.
     Real(usize),
-    /// Any complex matrix with the 2-norm |delta|, on this many channels.
+    /// Any complex matrix, on this many channels; its size is the 2-norm.
     Full(usize),
 }
 
 impl Block {
+    /// The number of channels.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Real(size) | Self::Full(size) => size,
@@ -20,7 +21,7 @@ impl Block {
     }
 }
 
-/// The first channel of each block.
+/// The first channel of each block, and the block.
 pub(super) fn places(blocks: &[Block]) -> impl Iterator<Item = (usize, Block)> + '_ {
     let mut first = 0;
     blocks.iter().map(move |block| {
@@ -35,7 +36,7 @@ pub(super) type SparseEntry = (usize, usize, Complex<f64>);
 
 /// A direction in which the scales D and G change.
 pub(super) struct Direction {
-    /// The block.
+    /// The index of the block.
     pub(super) block: usize,
     /// Whether it changes G; otherwise D.
     pub(super) of_g: bool,
@@ -43,7 +44,7 @@ pub(super) struct Direction {
     pub(super) entries: Vec<SparseEntry>,
 }
 
-/// The Hermitian matrices D and G that commute with every perturbation of the structure.
+/// A basis of the Hermitian matrices D and G that commute with every perturbation of the structure.
 pub(super) fn directions(blocks: &[Block]) -> Vec<Direction> {
     let mut all = Vec::new();
     for (block, (first, kind)) in places(blocks).enumerate() {
@@ -75,9 +76,9 @@ pub(super) fn directions(blocks: &[Block]) -> Vec<Direction> {
 
 /// The logarithms of a diagonal scaling that commutes with the structure and for which rows and columns of D M D^-1
 /// have about equal norms (Osborne 1960).
-pub(super) fn balanced(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
+pub(super) fn balancing_exponents(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
     const ROUNDS: usize = 20;
-    // Groups that act in one direction only would be scaled without end.
+    // Without a limit, the scaling of a coupling in one direction only would grow in each round.
     const MOST_SCALED: f64 = 100.0;
     let mut exponents = vec![0.0; m.nrows()];
     let groups: Vec<(usize, usize)> = places(blocks)

@@ -1,6 +1,6 @@
 //! The frequency axis, covered by intervals in which scales bound the structured singular value.
 
-use super::blocks::{Block, balanced, scaled};
+use super::blocks::{Block, balancing_exponents, scaled};
 use super::interval::{Interval, Response};
 use super::scales::Scales;
 use crate::eigen::eigenvalues;
@@ -8,14 +8,13 @@ use crate::response::grid;
 use crate::svd::ComplexSvd;
 use crate::{Error, StateSpace};
 
-/// Frequencies for each decade at which scales are sought first.
+/// Frequencies for each decade at which scales are searched first.
 const PER_DECADE: u32 = 6;
-/// Relative width of the bound: where scales for it do not exist, or hold on a short interval only, it is raised by
-/// this part.
+/// The relative increase of the bound where no scales for it exist, or scales hold on a short interval only.
 const RAISE: f64 = 5e-3;
 /// Relative width of an interval below which the bound is raised.
 const SHORT: f64 = 1e-3;
-/// Part of the slowest frequency below which scales for zero itself are sought.
+/// Part of the slowest frequency below which scales for zero itself are searched.
 const NEAR_ZERO: f64 = 1e-4;
 const ROUNDS: usize = 3000;
 
@@ -28,7 +27,7 @@ pub(super) struct Cover<'a> {
     pub(super) frequency: f64,
     pub(super) intervals: usize,
     gaps: Vec<Interval>,
-    /// Frequencies at which scales are sought next, the last one first.
+    /// Frequencies at which scales are searched next, the last one first.
     candidates: Vec<f64>,
     /// The frequencies between which the response changes most.
     slowest: f64,
@@ -36,7 +35,7 @@ pub(super) struct Cover<'a> {
 }
 
 impl<'a> Cover<'a> {
-    /// `system`: in continuous time, stable.
+    /// Nothing is covered yet; the bound is `enough`. `system`: in continuous time, stable.
     pub(super) fn new(
         system: &StateSpace,
         blocks: &'a [Block],
@@ -49,13 +48,13 @@ impl<'a> Cover<'a> {
         all.extend(modes.iter().flat_map(|mode| [mode.im.abs(), mode.norm()]));
         all.retain(|frequency| *frequency > 0.0);
         let slowest = all.iter().copied().fold(fastest, f64::min);
-        let mut sized = Vec::with_capacity(all.len());
+        let mut candidates = Vec::with_capacity(all.len());
         for frequency in all {
             let m = response.at(frequency)?;
-            let size = ComplexSvd::new(&scaled(&m, &balanced(&m, blocks)))?.values()[0];
-            sized.push((size, frequency));
+            let balanced = scaled(&m, &balancing_exponents(&m, blocks));
+            candidates.push((ComplexSvd::new(&balanced)?.values()[0], frequency));
         }
-        sized.sort_by(|x, y| x.0.total_cmp(&y.0));
+        candidates.sort_by(|x, y| x.0.total_cmp(&y.0));
         Ok(Self {
             response,
             blocks,
@@ -63,13 +62,13 @@ impl<'a> Cover<'a> {
             frequency: 0.0,
             intervals: 0,
             gaps: vec![Interval { from: 0.0, to: f64::INFINITY }],
-            candidates: sized.into_iter().map(|(_, frequency)| frequency).collect(),
+            candidates: candidates.into_iter().map(|(_, frequency)| frequency).collect(),
             slowest,
             fastest,
         })
     }
 
-    /// Covers the whole axis; false if `ending` came first.
+    /// Covers the whole axis; false if `ending` returned true before.
     pub(super) fn complete(&mut self, ending: &dyn Fn() -> bool) -> Result<bool, Error> {
         for _ in 0..ROUNDS {
             let Some(frequency) = self.next_frequency() else { return Ok(true) };
@@ -81,7 +80,7 @@ impl<'a> Cover<'a> {
         Err(Error::NotConverged { what: "the structured singular value", iterations: ROUNDS })
     }
 
-    /// The next frequency that is not covered.
+    /// The next frequency that is not covered; None if all are covered.
     fn next_frequency(&mut self) -> Option<f64> {
         let gap = *self.gaps.last()?;
         while let Some(frequency) = self.candidates.pop() {
@@ -91,7 +90,7 @@ impl<'a> Cover<'a> {
             }
         }
         Some(match (gap.from, gap.to) {
-            // At zero M is real, and a part of it often zero, so that scales that are made for it hold nowhere else.
+            // At zero M is real, and a part of it is often zero, so that scales for zero hold nowhere else.
             (0.0, to) if to > NEAR_ZERO * self.slowest => (0.1 * to).min(self.slowest),
             (0.0, _) => 0.0,
             (from, f64::INFINITY) if from < 1e9 * self.fastest => 10.0 * from.max(self.fastest),
@@ -108,7 +107,7 @@ impl<'a> Cover<'a> {
         loop {
             let mut scales = Scales::search(&m, self.blocks, self.bound)?;
             if scales.bound > self.bound {
-                // They hold for a larger bound too.
+                // The scales hold for every larger bound too.
                 scales.bound *= 1.0 + RAISE;
                 self.raise(scales.bound, frequency)?;
             }
@@ -126,6 +125,7 @@ impl<'a> Cover<'a> {
         }
     }
 
+    /// Sets a larger bound; an infinite one is an error.
     fn raise(&mut self, bound: f64, frequency: f64) -> Result<(), Error> {
         (self.bound, self.frequency) = (bound, frequency);
         if bound.is_finite() {
@@ -134,6 +134,7 @@ impl<'a> Cover<'a> {
         Err(Error::Overflow { what: "the structured singular value" })
     }
 
+    /// Removes an interval from the gaps.
     fn remove(&mut self, covered: Interval) {
         let rest = |gap: &Interval| {
             if covered.to <= gap.from || covered.from >= gap.to {

@@ -20,7 +20,7 @@ pub(super) fn form(
     d.scale(bound * bound) - times(&left, m) + times(&adjoint, &turned)
 }
 
-/// The sizes of the sums that are the diagonal of [`form`], which its rounding errors are relative to.
+/// The sums of the moduli of the terms in each diagonal entry of [`form`]: its rounding errors are relative to them.
 pub(super) fn form_size(
     m: &ComplexMatrix,
     d: &ComplexMatrix,

@@ -1,4 +1,4 @@
-//! A held plant whose entries vary, as a linear fractional function of their deviations.
+//! The Gauss method, whose step for a plant whose entries vary is a linear fractional function of their deviations.
 
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
@@ -41,8 +41,7 @@ impl Gauss {
         }
     }
 
-    /// One step of xi' = Z xi + L w, z = R' xi with a value of w for each stage: how xi at its start and w act on z of
-    /// all stages, and how w acts on xi at its end.
+    /// One step of xi' = Z xi + L w, z = R' xi with a value of w for each stage.
     pub(super) fn step(
         &self,
         z: &DMatrix<f64>,
@@ -73,7 +72,8 @@ impl Gauss {
     }
 }
 
-/// The end is (that without w) + B w, z = C xi + D w.
+/// A step of the Gauss method: z of all stages is C xi + D w, with xi at the start of the step, and w adds B w to xi at
+/// its end.
 pub(super) struct Step {
     pub(super) b: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,

@@ -2,7 +2,7 @@
 
 use super::blocks::Block;
 use super::gauss::{Gauss, Step};
-use super::opened::{Channels, Opened};
+use super::generalised_plant::{Channels, GeneralisedPlant};
 use super::remainder::remainder;
 use crate::balance::Balance;
 use crate::blocks::beside;
@@ -21,8 +21,9 @@ const LEAST: f64 = 1e-4;
 pub(super) struct HeldFamily<'a> {
     controller: &'a StateSpace,
     period: f64,
-    /// [A, B; 0, 0] of the plant, and the changes of it.
+    /// [A, B; 0, 0] of the plant.
     z: DMatrix<f64>,
+    /// The changes of [A, B; 0, 0].
     on_states: Channels,
     /// The changes of [C, D].
     on_outputs: Channels,
@@ -35,13 +36,13 @@ pub(super) struct HeldFamily<'a> {
     states: usize,
 }
 
-/// M and its blocks.
+/// The system M in feedback with the perturbation, and its blocks.
 pub(super) struct HeldLoop {
     pub(super) system: StateSpace,
     pub(super) blocks: Vec<Block>,
     /// The fraction of the tolerances up to which the error of the Gauss method is bounded.
     pub(super) fraction: f64,
-    /// Whether that error is small.
+    /// Whether this error is small, relative to the effect of the tolerances.
     pub(super) precise: bool,
 }
 
@@ -55,7 +56,7 @@ struct GaussError {
 }
 
 impl<'a> HeldFamily<'a> {
-    /// `changes`: of [A, B; C, D] by each deviation.
+    /// `changes`: the change of [A, B; C, D] by each deviation.
     pub(super) fn new(
         plant: &StateSpace,
         changes: &[DMatrix<f64>],
@@ -85,22 +86,22 @@ impl<'a> HeldFamily<'a> {
         })
     }
 
-    /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which the error of the
-    /// Gauss method has a bound; None if there is none.
+    /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which the error of
+    /// the Gauss method has a bound; None if there is none.
     pub(super) fn system(&self, assumed: f64) -> Result<Option<HeldLoop>, Error> {
         let Some(error) = self.error(assumed) else { return Ok(None) };
         let (n, inner) = (self.states, self.z.nrows());
         let Channels { left, right, .. } = &self.on_states;
         let Step { b, c, d } =
             Gauss::new(error.stages).step(&self.z, [left, right], self.period)?;
-        let [of_error, seen_by_error] = self.weights(&error)?;
+        let [error_input, error_output] = self.weights(&error)?;
         // Channels: the stages of the changes of [A, B], the changes of [C, D], the error.
         let (staged, outputs) = (d.nrows(), self.on_outputs.left.ncols());
         let channels = staged + outputs + inner;
         let order = self.held.a.nrows();
         let mut b1 = DMatrix::zeros(order, channels);
         b1.view_mut((0, 0), (n, staged)).copy_from(&b.rows(0, n));
-        b1.view_mut((0, staged + outputs), (n, n)).copy_from(&of_error);
+        b1.view_mut((0, staged + outputs), (n, n)).copy_from(&error_input);
         // The states [x; v] of the held plant, and the command u of this sample, are parts of [x; u].
         let held = order.min(inner);
         let mut c1 = DMatrix::zeros(channels, order);
@@ -110,17 +111,23 @@ impl<'a> HeldFamily<'a> {
         let read = self.on_outputs.right.rows(0, held).transpose();
         c1.view_mut((staged, 0), (outputs, held)).copy_from(&read);
         let first = staged + outputs;
-        c1.view_mut((first, 0), (inner, n)).copy_from(&seen_by_error.columns(0, n));
+        c1.view_mut((first, 0), (inner, n)).copy_from(&error_output.columns(0, n));
         d12.view_mut((first, 0), (inner, inner - n))
-            .copy_from(&seen_by_error.columns(n, inner - n));
+            .copy_from(&error_output.columns(n, inner - n));
         let mut d11 = DMatrix::zeros(channels, channels);
         d11.view_mut((0, 0), (staged, staged)).copy_from(&d);
         let mut d21 = DMatrix::zeros(self.held.c.nrows(), channels);
         d21.columns_mut(staged, outputs).copy_from(&self.on_outputs.left);
         let StateSpace { a, b, c, d, domain } = self.held.clone();
-        let opened = Opened { a, b: [b1, b], c: [c1, c], d: [[d11, d12], [d21, d]], domain };
+        let plant = GeneralisedPlant {
+            a,
+            b: [b1, b],
+            c: [c1, c],
+            d: [[d11, d12], [d21, d]],
+            domain,
+        };
         let (places, blocks) = self.places(error.stages);
-        let system = opened.closed(self.controller);
+        let system = plant.with_controller(self.controller);
         let system = StateSpace {
             b: system.b.select_columns(&places),
             c: system.c.select_rows(&places),
@@ -131,7 +138,8 @@ impl<'a> HeldFamily<'a> {
         Ok(Some(HeldLoop { system, blocks, fraction, precise }))
     }
 
-    /// The Gauss method with the fewest stages that is precise, and its error.
+    /// The error of the Gauss method with the fewest stages that make it precise, or with the most stages that have a
+    /// bound. The fraction is `assumed`, halved until there is a bound; None if there is none above 1e-4.
     fn error(&self, assumed: f64) -> Option<GaussError> {
         let (x, y) = (self.z.abs() * self.period, &self.size * self.period);
         let mut fraction = assumed;
@@ -157,8 +165,8 @@ impl<'a> HeldFamily<'a> {
         None
     }
 
-    /// V and W such that every matrix within the bound of the error is V Delta W with a norm of Delta up to one: how
-    /// Delta acts on the states, and what it sees of [x; u].
+    /// V and W such that every matrix within the bound of the error is V Delta W with a norm of Delta up to one: V from
+    /// the output of Delta to the states, W from [x; u] to its input.
     fn weights(&self, error: &GaussError) -> Result<[DMatrix<f64>; 2], Error> {
         let mut relative = error.bound.clone();
         for (mut row, unit) in relative.row_iter_mut().zip(&self.units) {
@@ -170,7 +178,7 @@ impl<'a> HeldFamily<'a> {
                 column.unscale_mut(*size);
             }
         }
-        // The norm of a matrix is at most that of its entries' sizes.
+        // The norm of a matrix is at most the norm of the moduli of its entries.
         let norm = norm_2(&relative.transpose())?;
         Ok([
             DMatrix::from_diagonal(&(&self.units * norm)),
@@ -178,7 +186,8 @@ impl<'a> HeldFamily<'a> {
         ])
     }
 
-    /// The channels in the order of the blocks: all of a deviation together, the error at the end.
+    /// The channels in the order of the blocks, and the blocks: all channels of a deviation together, then those of
+    /// the error.
     fn places(&self, stages: usize) -> (Vec<usize>, Vec<Block>) {
         let (of_states, of_outputs) = (&self.on_states.ranks, &self.on_outputs.ranks);
         let (all, outputs) = (self.on_states.left.ncols(), self.on_outputs.left.ncols());

@@ -16,7 +16,7 @@ pub(super) struct Response {
     transfer: Transfer,
 }
 
-/// An open interval of frequencies; a lower end below zero contains zero, an infinite upper end infinity.
+/// An open interval of frequencies. It contains zero if `from` is below zero, and infinity if `to` is infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interval {
     pub(super) from: f64,
@@ -42,7 +42,8 @@ impl Response {
         Ok(if frequency < 0.0 { m.map(|x| x.conj()) } else { m })
     }
 
-    /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not there.
+    /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not hold there,
+    /// or the Hamiltonian matrix does not exist.
     ///
     /// F, see [`super::form::form`], is positive definite at `frequency` and singular at the imaginary eigenvalues
     /// of a Hamiltonian matrix only, so that it is definite up to the first of them on each side. It need
@@ -65,7 +66,7 @@ impl Response {
         let above: Vec<f64> = places.iter().copied().filter(|place| *place > frequency).collect();
         let below: Vec<f64> =
             places.iter().rev().copied().filter(|place| *place <= frequency).collect();
-        // The first of `places` that is negative or about which the scales do not hold; `last` is beyond them.
+        // The first of `places` that is negative, or at or after which the scales do not hold; `last` is beyond all.
         let end = |places: &[f64], last: f64| {
             for (at, &place) in places.iter().enumerate() {
                 let middle = places.get(at + 1).map_or(last, |next| 0.5 * (place + next));
@@ -91,7 +92,7 @@ impl Response {
     /// Q = C' D C,  S = C' (D M_oo - j G),  W = (F at infinite frequency)^-1
     /// ```
     ///
-    /// None if F at infinite frequency is singular.
+    /// None if F at infinite frequency is singular, or an entry is not finite.
     fn hamiltonian(&self, scales: &Scales) -> Option<ComplexMatrix> {
         let [a, b, c, direct] =
             [&self.system.a, &self.system.b, &self.system.c, &self.system.d].map(to_complex);

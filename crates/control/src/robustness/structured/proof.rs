@@ -1,29 +1,30 @@
-//! The part of the tolerances of a plant within which a loop is stable for certain.
+//! The fraction of the tolerances of a plant within which a loop is proven stable.
 
 use super::blocks::Block;
+use super::generalised_plant::{Channels, GeneralisedPlant};
 use super::held::HeldFamily;
-use super::opened::{Channels, Opened};
 use super::structured_bound;
 use crate::robustness::tolerance::EntryFamily;
 use crate::robustness::{Loop, held_plant};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// The most channels of the perturbation, and the most states of the loop.
+/// The largest number of channels of the perturbation, and of states of the loop.
 const LARGEST: usize = 100;
-/// A proven fraction within this part of that for which the error of the Gauss method was bounded ends the search;
-/// otherwise the error is bounded again for a fraction a little above the proven one.
+/// The search ends if the proven fraction is at least this part of the one for which the error of the Gauss method was
+/// bounded.
 const NEAR: f64 = 0.97;
+/// Otherwise the error is bounded again for the proven fraction times this.
 const FURTHER: f64 = 1.02;
 const ROUNDS: usize = 4;
 
-/// What is proven about a loop whose plant varies.
+/// The proven stability of a loop whose plant varies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ProvenTolerance {
     /// The loop is stable for every plant whose deviations are below this fraction of the tolerances.
     pub fraction: f64,
-    /// The frequency that limits the fraction, in rad per unit of time.
+    /// The frequency that determines the fraction, in rad per unit of time.
     pub frequency: f64,
     /// Number of independent deviations.
     pub deviations: usize,
@@ -34,22 +35,22 @@ pub struct ProvenTolerance {
     pub intervals: usize,
 }
 
-/// Why nothing is proven.
+/// The reason why nothing is proven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unproven {
     /// The perturbation has too many channels, or the loop too many states.
     Large {
-        /// Channels.
+        /// Number of channels of the perturbation.
         channels: usize,
-        /// States.
+        /// Number of states of the loop.
         states: usize,
-        /// The most of each.
+        /// The largest number of each.
         most: usize,
     },
-    /// The sample time is long against the time constants of the plant.
+    /// The sample time is too long, compared with the time constants of the plant.
     LongSampleTime,
-    /// The time was over.
+    /// `ending` returned true before anything was proven.
     Ended,
 }
 
@@ -57,12 +58,15 @@ pub enum Unproven {
 ///
 /// Each deviation d adds d L R' to [A, B; C, D], so that the loop is M in feedback with the diagonal matrix of the
 /// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
-/// `most`: the largest fraction of interest; one at which instability was found ends the search.
+///
+/// `most`: the largest fraction of interest, above zero, for example one at which instability was found; no larger one
+/// is proven. `ending`: called at each interval; true ends the search. The inner result is the reason why nothing is
+/// proven.
 ///
 /// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that
 /// of the nominal plant plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
-/// channels for each, plus the change of the error of that method. The last part is bounded entry by entry by its
-/// power series and is one more block, of any matrix. It is small if the sample time is short against the time
+/// channels for each, plus the change of the error of that method. This error is bounded entry by entry by its
+/// power series and is one more block, a full one. It is small if the sample time is short compared with the time
 /// constants of the plant.
 ///
 /// # Errors
@@ -75,7 +79,7 @@ pub fn proven_tolerance(
     ending: &dyn Fn() -> bool,
 ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
     let changes = family.changes();
-    let perturbed = Perturbed { plant: family.nominal(), changes, controller };
+    let perturbed = PerturbedLoop { plant: family.nominal(), changes, controller };
     match (controller.domain, perturbed.plant.domain) {
         (Domain::Sampled { period }, Domain::Continuous) => {
             perturbed.sampled_fraction(period, most, ending)
@@ -84,7 +88,7 @@ pub fn proven_tolerance(
             let held = held_plant(perturbed.plant, period)?;
             let changes = perturbed.changes.iter().map(|change| held_change(change, &held));
             let changes = changes.collect();
-            Perturbed { plant: &held, changes, ..perturbed }.fraction(most, ending)
+            PerturbedLoop { plant: &held, changes, ..perturbed }.fraction(most, ending)
         }
         (Domain::Continuous, _) => perturbed.fraction(most, ending),
     }
@@ -97,7 +101,7 @@ fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
     if states == n {
         return change.clone();
     }
-    // The states are [x; v], and D is the part of C of the command before, v.
+    // The states are [x; v], v the previous command, and D is the part of C for v.
     let mut held_change = DMatrix::zeros(n + p, n + m);
     let mut copy = |to: (usize, usize), from: (usize, usize), size: (usize, usize)| {
         held_change.view_mut(to, size).copy_from(&change.view(from, size));
@@ -108,15 +112,17 @@ fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
     held_change
 }
 
-struct Perturbed<'a> {
+/// The loop of a plant whose matrices change with deviations.
+struct PerturbedLoop<'a> {
     plant: &'a StateSpace,
     /// The change of [A, B; C, D] for each deviation.
     changes: Vec<DMatrix<f64>>,
     controller: &'a StateSpace,
 }
 
-impl Perturbed<'_> {
-    fn bounded(
+impl PerturbedLoop<'_> {
+    /// The proof for M = `system` in feedback with `blocks`.
+    fn prove(
         &self,
         system: &StateSpace,
         blocks: &[Block],
@@ -151,7 +157,7 @@ impl Perturbed<'_> {
         let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
         let Channels { left, right, ranks } = Channels::of(&self.changes, (n + p, n + m));
         let r = left.ncols();
-        let opened = Opened {
+        let plant = GeneralisedPlant {
             a: a.clone(),
             b: [left.rows(0, n).into(), b.clone()],
             c: [right.rows(0, n).transpose(), c.clone()],
@@ -163,7 +169,7 @@ impl Perturbed<'_> {
         };
         let ranks = ranks.into_iter().filter(|rank| *rank > 0);
         let blocks: Vec<_> = ranks.map(Block::Real).collect();
-        self.bounded(&opened.closed(self.controller), &blocks, most, ending)
+        self.prove(&plant.with_controller(self.controller), &blocks, most, ending)
     }
 
     /// The largest fraction for which the error of the Gauss method is as small as assumed.
@@ -178,7 +184,7 @@ impl Perturbed<'_> {
         let mut best: Option<ProvenTolerance> = None;
         for _ in 0..ROUNDS {
             let Some(loops) = held.system(assumed)? else { break };
-            let bound = match self.bounded(&loops.system, &loops.blocks, loops.fraction, ending)? {
+            let bound = match self.prove(&loops.system, &loops.blocks, loops.fraction, ending)? {
                 Ok(bound) => bound,
                 Err(reason) => return Ok(best.ok_or(reason)),
             };
@@ -189,7 +195,7 @@ impl Perturbed<'_> {
             if loops.precise || bound.fraction >= NEAR * loops.fraction {
                 break;
             }
-            // The error for a smaller fraction is smaller, relative to it too.
+            // For a smaller fraction the error is smaller, also relative to the fraction.
             assumed = bound.fraction * FURTHER;
         }
         Ok(best.ok_or(Unproven::LongSampleTime))

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 const TERMS: usize = 300;
 /// Relative size of a term at which the series ends.
 const NEGLIGIBLE: f64 = 1e-16;
-/// Added to the bound for the rounding errors of the series.
+/// The relative increase of the bound that allows for rounding errors of the series.
 const ROUNDING: f64 = 1e-6;
 
 /// Entrywise bound of |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, with E(Z) = e^Z - (its diagonal Padé

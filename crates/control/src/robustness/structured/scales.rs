@@ -1,14 +1,14 @@
 //! Scales D and G that bound the structured singular value of one complex matrix.
 
 use super::barrier::{Barrier, Point};
-use super::blocks::{Block, balanced, scaled};
+use super::blocks::{Block, balancing_exponents, scaled};
 use super::form::{form, form_size};
 use super::hermitian::{factor, forward, largest_eigenvalue, times};
 use crate::Error;
 use crate::blocks::ComplexMatrix;
 
-/// Part of the distance to the bound of the present scales that a step keeps, so that they stay inside.
-const KEPT: f64 = 0.1;
+/// Part of the distance from the least bound of the present scales that a step leaves, so that the scales stay inside.
+const DISTANCE: f64 = 0.1;
 const STEPS: usize = 60;
 /// Relative progress of a step below which the bound counts as the least one.
 const STALLED: f64 = 5e-4;
@@ -26,11 +26,11 @@ impl Scales {
     /// The scales of `m` for the bound `goal`, near their analytic centre; if there are none, those for the least
     /// bound that the method of centres reaches.
     ///
-    /// Each step halves, about, the distance from the least bound, at which the centre for the bound before is
-    /// still inside. Source: S. Boyd and L. El Ghaoui, Method of centers for minimizing generalized eigenvalues,
-    /// Linear Algebra and its Applications 188 (1993).
+    /// Each step moves the bound to near the least bound of the present scales, for which these are still inside, and
+    /// the scales to the centre for the new bound. Source: S. Boyd and L. El Ghaoui, Method of centers for minimizing
+    /// generalized eigenvalues, Linear Algebra and its Applications 188 (1993).
     pub(super) fn search(m: &ComplexMatrix, blocks: &[Block], goal: f64) -> Result<Self, Error> {
-        let exponents = balanced(m, blocks);
+        let exponents = balancing_exponents(m, blocks);
         let m = scaled(m, &exponents);
         let first = largest_eigenvalue(&times(&m.adjoint(), &m))?.max(0.0).sqrt();
         let barrier = Barrier::new(&m, blocks, goal.max(first));
@@ -46,7 +46,7 @@ impl Scales {
             let next = if least < goal * (1.0 - 1e-9) {
                 goal
             } else {
-                (least + KEPT * (bound - least)).max(goal)
+                (least + DISTANCE * (bound - least)).max(goal)
             };
             if next > goal && bound - next < STALLED * bound {
                 break;
@@ -95,8 +95,8 @@ mod tests {
         ComplexMatrix::from_fn(count, count, |i, j| entry(i, 1.7) * entry(j, 2.9))
     }
 
-    /// The structured singular value of a matrix of rank one with the diagonal c for complex numbers: the sum of |c|. For
-    /// real ones, by the duality of linear programs, the least sum of |Re c + g Im c| over g; at one of its kinks.
+    /// The structured singular value of a matrix of rank one with the diagonal c is the sum of |c| for complex numbers.
+    /// For real ones it is, by the duality of linear programs, the least sum of |Re c + g Im c| over g, at a kink.
     /// Both are equal to their bounds: P. M. Young, The rank one mixed mu problem and "Kharitonov-type" analysis,
     /// Automatica 30 (1994).
     #[test]
@@ -130,8 +130,8 @@ mod tests {
         }
     }
 
-    /// One real number on all channels: it cannot make I - delta M singular beyond the largest real eigenvalue of M, which
-    /// no scaling by numbers alone shows.
+    /// For one real number delta on all channels the structured singular value is the largest real eigenvalue of M; no
+    /// diagonal scaling proves this bound.
     #[test]
     fn a_repeated_real_number_is_bounded_by_the_real_eigenvalues() {
         let t = ComplexMatrix::from_fn(3, 3, |i, j| {

@@ -1,14 +1,15 @@
-//! A plant with the channels of its perturbations, and the loop of a controller around it.
+//! A plant with the channels of its perturbations, and its loop with a controller.
 
 use crate::blocks::{beside, block_2x2, stacked};
 use crate::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
-/// Entrywise rounding, relative to the sum of the sizes that were subtracted.
+/// Rounding error of an entry, relative to the sum of the sizes of the numbers that were subtracted.
 const ROUNDING: f64 = 1e-14;
 
-/// x' = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u.
-pub(super) struct Opened {
+/// The plant x' = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u, with the channels w and z of
+/// the perturbation.
+pub(super) struct GeneralisedPlant {
     pub(super) a: DMatrix<f64>,
     pub(super) b: [DMatrix<f64>; 2],
     pub(super) c: [DMatrix<f64>; 2],
@@ -16,9 +17,9 @@ pub(super) struct Opened {
     pub(super) domain: Domain,
 }
 
-impl Opened {
+impl GeneralisedPlant {
     /// M, from w to z, with u = K y; D of the controller or D22 is zero.
-    pub(super) fn closed(&self, controller: &StateSpace) -> StateSpace {
+    pub(super) fn with_controller(&self, controller: &StateSpace) -> StateSpace {
         let Self { a, b: [b1, b2], c: [c1, c2], d: [[d11, d12], [d21, d22]], domain } = self;
         let StateSpace { a: a_k, b: b_k, c: c_k, d: d_k, .. } = controller;
         let fed_back = b2 * d_k;
@@ -36,7 +37,8 @@ impl Opened {
     }
 }
 
-/// The channels of all deviations: their changes are `L_i R_i'`, side by side.
+/// The channels of all deviations: deviation i changes a matrix by `L_i R_i'`; the `L_i` are side by side, as are the
+/// `R_i`.
 pub(super) struct Channels {
     pub(super) left: DMatrix<f64>,
     pub(super) right: DMatrix<f64>,
@@ -58,7 +60,7 @@ impl Channels {
     }
 }
 
-/// L and R of the least common inner size with P = L R', by elimination with complete pivoting.
+/// L and R with P = L R' and as many columns as the rank of P, by elimination with complete pivoting.
 fn factors(p: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let (mut rest, mut size) = (p.clone(), p.abs());
     let (mut left, mut right) = (Vec::new(), Vec::new());
