@@ -1,4 +1,4 @@
-//! Laws that estimate faults, beside the augmented state observer of [`crate::aso`].
+//! Laws that estimate faults: alternatives to the augmented state observer of [`crate::aso`].
 //!
 //! With e = y - C `x_hat` every law has a form that [`crate::aso::Gains`], the controller and all analyses
 //! of this crate know. For constant faults, without the feedback:
@@ -32,10 +32,10 @@ use crate::gains::{Estimator, Gains};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// The most decay of an error in one sample that [`mean_rate`] counts: 1.8 % are left.
+/// The largest decay of an error in one sample that [`mean_rate`] counts: to e^-4, 1.8 %.
 const FASTEST: f64 = 4.0;
 
-/// A law whose estimate has a model of its own.
+/// A law in which another model takes the place of the fault model.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct OwnModel {
@@ -48,7 +48,7 @@ pub struct OwnModel {
 /// The rate in 1/s at which the errors of an observer decay: the geometric mean of |lambda| over the
 /// eigenvalues, in sampled time of |ln lambda| / T, at most 4 / T each.
 ///
-/// `dynamics`: of the estimation error, stable.
+/// `dynamics`: the matrix of the estimation error, stable.
 ///
 /// # Errors
 ///
@@ -73,8 +73,8 @@ pub(crate) fn eigenvalue(rate: f64, domain: Domain) -> f64 {
     }
 }
 
-/// (I - C `L_x`)^-1 of a current estimator, I of a prediction estimator: e before the correction from e
-/// after it.
+/// The matrix from e after the correction to e before it: (I - C `L_x`)^-1 of a current estimator, I of a prediction
+/// estimator.
 fn before_correction(plant: &FaultyPlant, gains: &Gains) -> Result<DMatrix<f64>, Error> {
     let p = plant.c.nrows();
     let identity = DMatrix::identity(p, p);

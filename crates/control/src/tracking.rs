@@ -82,8 +82,8 @@ impl TrackingRank {
 /// each r there are x and u with A x + B u = 0 and H C x = r. This needs at least as many commands as
 /// references, independent references, and no invariant zero at s = 0. With (A, B) stabilisable it is the
 /// condition for the pair of [`extended_pair`] to be stabilisable: its modes at s = 0 are those of the
-/// integrals. For a sampled plant the condition is the same unless the sample time hides a mode, as [A
-/// (T) - I, B(T)] is an invertible matrix times [A, B].
+/// integrals. For a sampled plant the condition is the same unless the sample time hides a mode, as
+/// [`A_T` - I, `B_T`] of the samples is an invertible matrix times [A, B].
 ///
 /// Rows and columns are scaled to length one; singular values below 1e-12 of the largest count as zero.
 ///
@@ -166,12 +166,14 @@ pub(crate) fn integration(domain: Domain) -> (f64, f64) {
 ///
 /// `a`, `b`, `output`: as in [`extended_pair`]; `k_x`: m x n, such that A + B `K_x` is stable. G^+ is the
 /// pseudoinverse: of several `N_r` (more commands than references) the one of least norm in the given
-/// units. It exists when [`tracking_rank`] is full. One step of iterative refinement follows.
+/// units. It exists if [`tracking_rank`] is full. Method: singular value decomposition of G and one step of
+/// iterative refinement.
 ///
 /// # Errors
 ///
 /// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable A + B `K_x`;
-/// [`Error::ResidualTooLarge`] when G `N_r` differs from I by more than 1e-9.
+/// [`Error::ResidualTooLarge`] if G `N_r` differs from I by more than 1e-9; [`Error::Overflow`],
+/// [`Error::NotConverged`].
 pub fn feedforward(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -195,12 +197,12 @@ pub fn feedforward(
         states.map(|states| output * states).ok_or(Error::Overflow { what: "the gain at s = 0" })
     };
     let whole = gain(&DMatrix::identity(m, m))?;
-    let inverse = Svd::new(&whole.transpose())?;
-    let rank = inverse.rank(TOLERANCE);
+    let svd = Svd::new(&whole.transpose())?;
+    let rank = svd.rank(TOLERANCE);
     // (G')^+ = (G^+)'.
     let solve = |r: &DMatrix<f64>| {
-        let left = inverse.left.columns(0, rank);
-        left * inverse.whitening(rank).transpose() * r
+        let left = svd.left.columns(0, rank);
+        left * svd.whitening(rank).transpose() * r
     };
     let identity = DMatrix::identity(t, t);
     let first = solve(&identity);
@@ -209,7 +211,7 @@ pub fn feedforward(
     Ok(n_r)
 }
 
-/// Refuses a residual above `allowed`, or one that is no number.
+/// Refuses a residual above `allowed`, and NaN.
 fn require_residual(equation: &'static str, residual: f64, allowed: f64) -> Result<(), Error> {
     if residual <= allowed {
         return Ok(());
@@ -241,21 +243,21 @@ pub fn reference_system(
     let m = b.ncols();
     check::shape("B", b, (n, m))?;
     check::shape("K_x", k_x, (m, n))?;
-    let (a_e, b_e, k, into, direct) = match action {
+    let (a_e, b_e, k, entry, direct) = match action {
         Action::Integral { output, gain, feedforward } => {
             let t = output.nrows();
             check::shape("K_i", gain, (m, t))?;
             let (a_e, b_e) = extended_pair(a, b, output, domain)?;
             let k = beside(k_x, gain);
-            let mut into = DMatrix::zeros(n + t, t);
-            into.rows_mut(n, t).fill_diagonal(integration(domain).0);
+            let mut entry = DMatrix::zeros(n + t, t);
+            entry.rows_mut(n, t).fill_diagonal(integration(domain).0);
             let mut direct = DMatrix::zeros(m, t);
             if let Some(feedforward) = feedforward {
                 check::shape("N_r", feedforward, (m, t))?;
-                into.rows_mut(0, n).copy_from(&(b * *feedforward));
+                entry.rows_mut(0, n).copy_from(&(b * *feedforward));
                 direct.copy_from(feedforward);
             }
-            (a_e, b_e, k, into, direct)
+            (a_e, b_e, k, entry, direct)
         }
         Action::Feedforward(gain) => {
             check::shape("N_r", gain, (m, gain.ncols()))?;
@@ -266,14 +268,14 @@ pub fn reference_system(
     let t = direct.ncols();
     Ok(StateSpace {
         a: a_e + b_e * &k,
-        b: into,
+        b: entry,
         c: stacked(&states, &k),
         d: stacked(&DMatrix::zeros(n, t), &direct),
         domain,
     })
 }
 
-/// How references act.
+/// The way in which references act on the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action<'a> {
     /// By integrals.

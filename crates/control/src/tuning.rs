@@ -35,7 +35,7 @@ pub enum Transfer {
     Sensitivity(Point),
     /// T = I - S.
     Complementary(Point),
-    /// K S: from what is added to the measurements to the commands.
+    /// K S: from a signal that is added to the measurements to the commands.
     Effort,
     /// The tracking error: from references r to r - H y.
     Tracking,
@@ -50,24 +50,24 @@ pub struct Term {
     pub weight: Weight,
 }
 
-/// A controller of given structure whose parameters are tuned.
+/// A problem of tuning: a plant, a controller of given structure, and what is minimised.
 pub struct Tuning<'a> {
     /// G, with D = 0, in the domain of the controller and in units in which its channels are comparable.
     pub plant: StateSpace,
     /// K(theta), in the same units, from the measurements, followed by the references. Derivatives are central
     /// differences of its matrices, which are exact for entries of second degree in theta.
     pub controller: &'a (dyn Fn(&DVector<f64>) -> Result<StateSpace, Error> + Sync),
-    /// H, t x p: what follows the references; no rows without references.
+    /// H, t x p: H y follows the references; no rows without references.
     pub references: DMatrix<f64>,
-    /// What is weighted.
+    /// The weighted transfer functions, whose largest value is minimised.
     pub terms: Vec<Term>,
-    /// The largest instability of the loop, negative, see [`crate::stability::instability`].
+    /// The largest allowed instability of the loop, negative, see [`crate::stability::instability`].
     pub instability: f64,
-    /// Whether the search may go to these parameters, whatever gamma is there.
+    /// Whether the search may use these parameters.
     pub is_allowed: &'a (dyn Fn(&DVector<f64>) -> bool + Sync),
-    /// The bandwidth in rad/s, about which frequencies are examined.
+    /// The bandwidth in rad/s: frequencies from a thousandth to a thousand times it are examined.
     pub rate: f64,
-    /// Whether the search must end.
+    /// Whether the search must end; it is asked after each step.
     pub is_over: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -78,7 +78,7 @@ pub struct WeightedPeak {
     pub gamma: f64,
     /// The index of the term.
     pub term: usize,
-    /// In rad/s.
+    /// The frequency of the peak, in rad/s.
     pub frequency: f64,
 }
 
@@ -92,12 +92,12 @@ pub struct Tuned {
 }
 
 impl Tuning<'_> {
-    /// Returns the H-infinity norm of the terms at `parameters`, by [`h_infinity`].
+    /// Returns the largest H-infinity norm of the terms at `parameters`, by [`h_infinity`]; 0 without terms.
     ///
     /// # Errors
     ///
-    /// Same as [`h_infinity`] and [`Loop::new`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that
-    /// is not stable.
+    /// Same as the controller, [`h_infinity`] and [`Loop::new`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop
+    /// that is not stable.
     pub fn peak(&self, parameters: &DVector<f64>) -> Result<WeightedPeak, Error> {
         let controller = (self.controller)(parameters)?;
         let closed = Loop::new(self.plant.clone(), self.measured(&controller))?;
@@ -155,11 +155,11 @@ impl Term {
                 let (plant, t) = (closed.plant(), references.nrows());
                 let (n, p) = (plant.a.nrows(), plant.c.nrows());
                 let of_references = |m: &DMatrix<f64>| m.columns(p, t).into_owned();
-                let enters = &plant.b * of_references(&controller.d);
+                let input = &plant.b * of_references(&controller.d);
                 let measured = -(references * &plant.c);
                 StateSpace {
                     a: closed.dynamics(),
-                    b: stacked(&enters, &of_references(&controller.b)),
+                    b: stacked(&input, &of_references(&controller.b)),
                     c: measured.resize_horizontally(n + controller.a.nrows(), 0.0),
                     d: DMatrix::identity(t, t),
                     domain: plant.domain,
@@ -215,6 +215,8 @@ mod tests {
             rate: 1.0,
             is_over: &|| false,
         };
+        let refused = tuning.tuned(&DVector::zeros(1), &DVector::zeros(2));
+        assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
         // k / (k - 1) = k / 4.
         let tuned = tuning.tuned(&DVector::from_element(1, 2.0), &DVector::from_element(1, 2.0))?;
         assert!((tuned.parameters[0] - 5.0).abs() < 0.02, "{tuned:?}");

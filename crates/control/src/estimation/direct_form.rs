@@ -86,12 +86,13 @@ impl DirectForm {
         if unstable.is_empty() { Ok(form) } else { Err(Error::UnstableZeros { zeros: unstable }) }
     }
 
-    /// `A_22`.
+    /// `A_22`, (n - q) x (n - q).
     fn rest(&self) -> DMatrix<f64> {
         let (n, q) = (self.a.nrows(), self.m_1.nrows());
         self.a.view((q, q), (n - q, n - q)).into()
     }
 
+    /// The eigenvalues of `A_22` that `C_2` does not show.
     fn invariant_zeros(&self) -> Result<Vec<Complex<f64>>, Error> {
         let a_22 = self.rest();
         if a_22.is_empty() {
@@ -107,22 +108,22 @@ impl DirectForm {
     /// `L_x`, n x p, with A - `L_x` C = [`pole` I, \*; 0, `A_22` - `L_w` `C_2`] in these coordinates.
     ///
     /// The zeros are eigenvalues of the last block; the others are placed with rates from `rate` to twice
-    /// `rate`, in 1/s. \* is the part of `A_12` that `y_2` cannot cancel. With P = `T'` diag(I, p `P_w`) T, T = [`M_1` C; N],
-    /// `P_w` of the Lyapunov equation of the last block and p large enough, P (A - `L_x` C) is negative definite
-    /// (symmetric part) and `F_a`' P = `M_1` C: the strictly-positive-real condition.
+    /// `rate`, in 1/s. \* is the part of `A_12` that `y_2` cannot cancel. With P = `T'` diag(I, p `P_w`) T,
+    /// T = [`M_1` C; N], `P_w` of the Lyapunov equation of the last block and p large enough, the symmetric part of
+    /// P (A - `L_x` C) is negative definite and `F_a`' P = `M_1` C: the strictly-positive-real condition.
     ///
     /// # Errors
     ///
-    /// Same as [`place_balanced`], in sampled time as [`place_estimator`].
+    /// Same as [`controllable_part`] and [`place_balanced`], in sampled time [`place_estimator`].
     pub fn observer_gain(&self, pole: f64, rate: f64) -> Result<DMatrix<f64>, Error> {
         let (n, q) = (self.a.nrows(), self.m_1.nrows());
-        let of_faults = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
-        let of_rest = self.a.view((q, 0), (n - q, q)) * &self.m_1;
-        let mut gain = stacked(&(of_faults * &self.m_1), &of_rest);
+        let shifted = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
+        let a_21 = self.a.view((q, 0), (n - q, q));
+        let mut gain = stacked(&(shifted * &self.m_1), &(a_21 * &self.m_1));
         if !self.c_2.is_empty() {
-            let shown = Svd::new(&self.c_2.transpose())?;
+            let svd = Svd::new(&self.c_2.transpose())?;
             let coupling = self.a.view((0, q), (q, n - q)).transpose();
-            let l_12 = shown.least_squares(&coupling, shown.rank(TOLERANCE)).transpose();
+            let l_12 = svd.least_squares(&coupling, svd.rank(TOLERANCE)).transpose();
             let mut rows = gain.rows_mut(0, q);
             rows += l_12 * &self.m_2;
             let mut rows = gain.rows_mut(q, n - q);
@@ -131,7 +132,7 @@ impl DirectForm {
         Ok(&self.from * gain)
     }
 
-    /// `L_w`, (n - q) x (p - q).
+    /// `L_w`, (n - q) x (p - q), which places the eigenvalues of `A_22` - `L_w` `C_2` other than the zeros.
     fn rest_gain(&self, rate: f64) -> Result<DMatrix<f64>, Error> {
         let (a, c) = (self.rest().transpose(), self.c_2.transpose());
         let part = controllable_part(&a, &c)?;

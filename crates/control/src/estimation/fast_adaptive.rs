@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct FastAdaptive {
     /// sigma in 1/s.
     pub sigma: f64,
-    /// The diagonal of Gamma in 1/s, one number for each fault: the rate at which its estimate follows.
+    /// The diagonal of Gamma in 1/s, one number for each fault: the rate at which its estimate follows the fault.
     pub gamma: Vec<f64>,
 }
 
@@ -22,25 +22,27 @@ pub struct FastAdaptive {
 /// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = f_hat_i + Gamma F e,  f_hat_i' = sigma Gamma F e
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and `L_x` has A - `L_x` C = [-sigma I, \*; 0, ..], so that the error eps =
-/// `f_hat` - f obeys eps' = -Gamma eps + Gamma \* w - f': each estimate is the fault behind a first-order lag of rate
-/// gamma, disturbed only by w, the error of the states that no fault enters, which no fault excites. In
-/// sampled time (current estimator) e^(-sigma T) and e^(-gamma T) take the places of the eigenvalues.
-/// `gains`: for `K_x`, `K_f` and the estimator; `rate`: of the other errors, in 1/s, see
-/// [`DirectForm::observer_gain`], whose P proves the stability for every Gamma and sigma above zero in continuous time.
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and `L_x` has A - `L_x` C = [-sigma I, \*; 0, ..], so that the error
+/// eps = `f_hat` - f obeys eps' = -Gamma eps + Gamma \* w - f': each estimate is the fault after a first-order lag of
+/// rate gamma, disturbed only by w, the error of the states that no fault enters, which no fault excites. In
+/// sampled time (current estimator) the eigenvalues are e^(-sigma T) and e^(-gamma T).
+/// `gains`: for `K_x`, `K_f` and the estimator; `rate`: the rate of the other errors, in 1/s, see
+/// [`DirectForm::observer_gain`], whose P proves the stability for every Gamma and sigma above zero in continuous
+/// time.
 ///
-/// The result is in the form of [`Gains`], where `F_a` `f_hat_i` takes the place of `F_a` `f_hat`: its `L_x` has the
-/// `F_a` Gamma F in addition.
+/// The result is in the form of [`Gains`], where `F_a` `f_hat_i` takes the place of `F_a` `f_hat`: its `L_x` is the
+/// one above plus `F_a` Gamma F.
 ///
 /// Source: K. Zhang, B. Jiang and V. Cocquempot, Adaptive observer-based fast fault estimation, Int. J. Control,
-/// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y, theorem 1 with
-/// E'P = F C. Their P and `L_x` solve linear matrix inequalities; here they follow from the form. The law for sampled
+/// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y, theorem 1
+/// with E'P = F C. Their P and `L_x` solve linear matrix inequalities; here they follow from the form. The law for sampled
 /// controllers is our own.
 ///
 /// # Errors
 ///
 /// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is not
-/// above zero, for faults that are not modelled as constant, or for a sampled prediction estimator.
+/// above zero, for faults that are not modelled as constant, or for a sampled prediction estimator;
+/// [`Error::Overflow`] if a sampled A or I - C `L_x` is singular.
 pub fn fast_adaptive(
     plant: &FaultyPlant,
     form: &DirectForm,
@@ -68,8 +70,8 @@ pub fn fast_adaptive(
     let rule = "a current estimator: f_hat uses the newest measurement";
     check::that(is_current, "the estimator", f64::NAN, rule)?;
     // L = A_aug M with A_aug = [A, F_a; 0, I]: M_f = L_f, A M_x = L_x - F_a L_f.
-    let of_states = &l_x - &plant.f_a * &l_f;
-    let m_x = plant.a.clone().lu().solve(&of_states).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
+    let product = &l_x - &plant.f_a * &l_f;
+    let m_x = plant.a.clone().lu().solve(&product).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
     let mut gains = Gains { l_x: m_x, l_f, p_f: None, ..gains.clone() };
     let p_f = (direct - &gains.l_f) * before_correction(plant, &gains)?;
     gains.p_f = Some(check::in_range("P_f", p_f)?);

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 /// The parameters of the law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learning {
-    /// `K_1`: the part of the last estimate that is kept, above 0 and at most 1.
+    /// `K_1`: the factor of the previous estimate, above 0 and at most 1.
     pub kept: f64,
 }
 
@@ -21,22 +21,25 @@ pub struct Learning {
 /// s[k+1] = lambda s[k] + f[k] - v[k] + * w,  s = F e
 /// ```
 ///
-/// `K_2` = g F with F = `M_1` of [`DirectForm`], and L gives s the eigenvalue lambda; * w is what the error of the other
-/// states adds. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v; lambda = p^2 / `K_1` and
-/// g = lambda + `K_1` - 2 p make it (z - p)^2, p = e^(-rate T): stable for every `K_1` above p^2. Of a constant fault the part
-/// (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) is left; none with `K_1` = 1, which is an integrator.
+/// `K_2` = g F with F = `M_1` of [`DirectForm`], and L gives s the eigenvalue lambda; * w is the effect of the error of
+/// the other states. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v;
+/// lambda = p^2 / `K_1` and g = lambda + `K_1` - 2 p make it (z - p)^2, p = e^(-rate T): stable for every `K_1` above
+/// p^2. The estimate of a constant fault lacks the part
+/// (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) of it; nothing with `K_1` = 1, which is an integrator.
 /// The gains have M with A M = L as the gain of the correction.
 ///
 /// Source: W. Chen and M. Saif, An iterative learning observer-based approach to fault detection and accommodation in
-/// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and An iterative learning observer for fault
-/// detection and accommodation in nonlinear time-delay systems, Int. J. Robust and Nonlinear Control 16 (2006); Q. Jia, W. Chen, Y. Zhang and H. Li, Fault reconstruction and fault-tolerant control via
-/// learning observers in Takagi-Sugeno fuzzy descriptor systems with time delays, IEEE Transactions on Industrial
-/// Electronics 62 (2015): v(t) = `K_1` v(t - tau) + `K_2` (y - C `x_hat`). The gains by pole placement with tau = T are our own.
+/// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and An iterative learning observer for
+/// fault detection and accommodation in nonlinear time-delay systems, Int. J. Robust and Nonlinear Control 16 (2006);
+/// Q. Jia, W. Chen, Y. Zhang and H. Li, Fault reconstruction and fault-tolerant control via learning observers in
+/// Takagi-Sugeno fuzzy descriptor systems with time delays, IEEE Transactions on Industrial Electronics 62 (2015):
+/// v(t) = `K_1` v(t - tau) + `K_2` (y - C `x_hat`). The gains by pole placement with tau = T are our own.
 ///
 /// # Errors
 ///
 /// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a `K_1` outside of its range,
-/// a continuous plant or a prediction estimator; [`Error::NotSchur`] if `K_1` is at most p^2.
+/// faults that are not modelled as constant, a continuous plant or a prediction estimator; [`Error::NotSchur`] if
+/// `K_1` is at most p^2; [`Error::Overflow`] if A is singular.
 pub fn learning(
     plant: &FaultyPlant,
     form: &DirectForm,

@@ -14,11 +14,11 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// The lag of `f_hat_i` behind a fault whose rate is constant (for a ramp model: whose second derivative is
-/// constant) is T times that rate; for constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that `f_hat` = `f_hat_i` + part T `f_hat_i`'. With
-/// `part` = 1 the lag is gone: for constant fault models a ramp leaves no lasting error. `part` = 0 is the augmented
-/// observer. `gains`: of that observer; its error dynamics must be stable. In sampled time
-/// with a current estimator `P_f` (y - C `x_hat`) reads the corrected estimates. It exists whenever the augmented
-/// observer does.
+/// constant) is T times this rate; for constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that
+/// `f_hat` = `f_hat_i` + part T `f_hat_i`'. `part` = 1 removes the lag: for constant fault models a ramp leaves no
+/// lasting error. `part` = 0 gives the augmented observer. `gains`: those of the augmented observer; its error dynamics
+/// must be stable. In sampled time with a current estimator, `x_hat` in the first equation is the corrected estimate.
+/// The law exists whenever the augmented observer does.
 ///
 /// The price is noise: in continuous time `P_f` passes measurement noise of any frequency to `f_hat`.
 ///
@@ -32,7 +32,8 @@ use nalgebra::DMatrix;
 /// # Errors
 ///
 /// Same as [`Gains::check`]; [`Error::OutOfRange`] for a `part` that is not a finite number of at least zero;
-/// [`Error::Overflow`] if the error dynamics have an eigenvalue 0 (1 in sampled time).
+/// [`Error::Overflow`] if the error dynamics have an eigenvalue 0 (1 in sampled time), or I - C `L_x` of a current
+/// estimator is singular.
 pub fn proportional_integral(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -43,17 +44,17 @@ pub fn proportional_integral(
     let holds = part.is_finite() && part >= 0.0;
     check::that(holds, "proportional", part, "a finite number of at least 0")?;
     let (n, q) = plant.f_a.shape();
-    // The last states of the fault models: f' = 0 there.
-    let develops = &plant.a_f - DMatrix::identity(q, q) * domain.constant();
-    let last: Vec<usize> = (0..q).filter(|&j| develops.row(j).amax() <= 0.0).collect();
-    let mut rates = DMatrix::zeros(n + q, last.len());
-    for (column, &row) in last.iter().enumerate() {
+    // The states of the fault models with f' = 0: the last one of each model.
+    let change = &plant.a_f - DMatrix::identity(q, q) * domain.constant();
+    let constant: Vec<usize> = (0..q).filter(|&j| change.row(j).amax() <= 0.0).collect();
+    let mut rates = DMatrix::zeros(n + q, constant.len());
+    for (column, &row) in constant.iter().enumerate() {
         rates[(n + row, column)] = 1.0;
     }
     let dynamics = gains.error_dynamics(plant);
-    let still = dynamics - DMatrix::identity(n + q, n + q) * domain.constant();
-    let lasting = still.lu().solve(&rates).ok_or(Error::Overflow { what: "the lag of f_hat" })?;
-    let lag = -lasting.rows(n, q);
-    let p_f = lag * gains.l_f.select_rows(&last) * before_correction(plant, gains)? * part;
+    let change = dynamics - DMatrix::identity(n + q, n + q) * domain.constant();
+    let steady = change.lu().solve(&rates).ok_or(Error::Overflow { what: "the lag of f_hat" })?;
+    let lag = -steady.rows(n, q);
+    let p_f = lag * gains.l_f.select_rows(&constant) * before_correction(plant, gains)? * part;
     Ok(Gains { p_f: Some(check::in_range("P_f", p_f)?), ..gains.clone() })
 }

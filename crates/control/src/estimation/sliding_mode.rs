@@ -6,7 +6,7 @@ use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The part of a constant fault, small against rho, that the boundary layer leaves.
+/// The part of a constant fault, small compared with rho, that the estimate lacks because of the boundary layer.
 const LEFT: f64 = 0.01;
 
 /// The parameters of the law, one number for each fault, in its unit.
@@ -15,11 +15,11 @@ pub struct SlidingMode {
     /// rho, above the largest fault.
     pub rho: Vec<f64>,
     /// delta, the half-width of the boundary layer; None for the width at which small errors decay with the
-    /// rate that [`sliding_mode`] is given.
+    /// argument `rate` of [`sliding_mode`].
     pub delta: Option<Vec<f64>>,
 }
 
-/// Designs a sliding-mode observer with a boundary layer; returns it with its linearisation, and delta.
+/// Designs a sliding-mode observer with a boundary layer; returns its linearisation and delta.
 ///
 /// ```text
 /// f_hat[k] = nu[k],  nu_i = rho_i s_i / (|s_i| + delta_i),  s = F e[k],  e[k] = y[k] - C x_hat[k|k-1]
@@ -27,11 +27,11 @@ pub struct SlidingMode {
 /// s[k+1] = lambda s[k] + f[k] - nu[k] + * w
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is what the error of the other
-/// states adds. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho / delta.
-/// The default of delta makes this e^(-rate T); lambda = 1 - 0.01 (1 - e^(-rate T)) then leaves 1 % of a small constant
-/// fault, and rho / (rho - |f|) times as much of a larger one. The result has M with A M = L as the
-/// gain of the correction of `x_hat`; its `L_f` is (rho / delta) F; the observer itself uses F and the
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is the effect of the error
+/// of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with
+/// lambda - rho / delta. The default of delta makes this e^(-rate T); with lambda = 1 - 0.01 (1 - e^(-rate T)) the
+/// estimate then lacks 1 % of a small constant fault, and rho / (rho - |f|) times as much of a larger one. The result
+/// has M with A M = L as the gain of the correction of `x_hat`; its `L_f` is (rho / delta) F; the observer itself uses F and the
 /// nonlinear function.
 ///
 /// The estimate is bounded by rho whatever the measurements are. The error stays bounded if every |`f_i`| is
@@ -39,14 +39,15 @@ pub struct SlidingMode {
 ///
 /// Source: C. Edwards, S. K. Spurgeon and R. J. Patton, Sliding mode observers for fault detection and isolation,
 /// Automatica 36 (2000): injection rho P e / (|P e| + delta) and reconstruction by its equivalent value. There the
-/// injection is a unit vector in continuous time; here it acts element by element, so that faults may have different units,
-/// and in sampled time.
+/// injection is a unit vector in continuous time; here it acts element by element, so that faults may have different
+/// units, and in sampled time.
 ///
 /// # Errors
 ///
 /// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is
-/// not above zero, a continuous plant or a prediction estimator; [`Error::NotSchur`] for a delta so small that the
-/// samples oscillate about s = 0.
+/// not above zero, faults that are not modelled as constant, a continuous plant or a prediction estimator;
+/// [`Error::NotSchur`] for a delta so small that the samples oscillate about s = 0; [`Error::Overflow`] if A is
+/// singular.
 pub fn sliding_mode(
     plant: &FaultyPlant,
     form: &DirectForm,

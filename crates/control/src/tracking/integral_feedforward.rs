@@ -25,18 +25,17 @@ pub struct IntegralFeedforward {
 /// ```
 ///
 /// S has the t slowest eigenvalues that the feedback moves, by real part or, sampled, by modulus; the
-/// uncontrollable modes of A have no part in the answer to references and are left out first. With this `N_r` the signal s
-/// = W' `x_e` obeys s' = S s whatever the references do: it stays zero after every change of them, and only
-/// disturbances, faults and errors of the model move it. So references are answered by the other n
-/// modes, which are faster, and H y reaches a
-/// constant r for every plant for which the loop is stable, because the integrals are part of it. Faults
-/// and disturbances are answered as without `N_r`: the feedback K is the same.
+/// uncontrollable modes of A, which references do not excite, are left out first. With this `N_r` the signal
+/// s = W' `x_e` obeys s' = S s for all references: they do not move it, only disturbances, faults and errors of
+/// the model do. So references excite only the other n modes, which are faster, and H y reaches a constant r for
+/// every plant for which the loop is stable, because the integrals are part of it. The response to faults and
+/// disturbances is that without `N_r`: the feedback K is the same.
 ///
 /// `a`, `b`, `output`: as in [`extended_pair`]; `k`: K = [`K_x`, `K_i`], m x (n + t), such that `A_e` + `B_e` K
 /// is stable. W is the left null space of the polynomial of `A_e` + `B_e` K with these t roots, from a singular
 /// value decomposition. Of several `N_r` (more commands than references) it is the one of least
-/// norm in the given units. The inner result is the reason why there is none: the t slowest
-/// eigenvalues end with half of a complex pair; `W_x'` B has a rank below t.
+/// norm in the given units. The inner error is the reason why there is none: the t slowest eigenvalues end with
+/// half of a complex pair, or `W_x'` B has a rank below t.
 ///
 /// For one reference it is the zero of the classical set-point weight, which cancels the slowest pole: K. J.
 /// Åström and T. Hägglund, PID controllers, 2nd edition (1995), section 3.4; G. F. Franklin, J. D. Powell and
@@ -60,11 +59,11 @@ pub fn integral_feedforward(
     if part.fixed.is_empty() {
         return of_controllable(a, b, output, k, domain);
     }
-    let (n, t, reached) = (a.nrows(), output.nrows(), part.a.nrows());
-    let mut of_part = DMatrix::zeros(b.ncols(), reached + t);
-    of_part.columns_mut(0, reached).copy_from(&(k.columns(0, n) * &part.basis));
-    of_part.columns_mut(reached, t).copy_from(&k.columns(n, t));
-    of_controllable(&part.a, &part.b, &(output * &part.basis), &of_part, domain)
+    let (n, t, order) = (a.nrows(), output.nrows(), part.a.nrows());
+    let mut gain = DMatrix::zeros(b.ncols(), order + t);
+    gain.columns_mut(0, order).copy_from(&(k.columns(0, n) * &part.basis));
+    gain.columns_mut(order, t).copy_from(&k.columns(n, t));
+    of_controllable(&part.a, &part.b, &(output * &part.basis), &gain, domain)
 }
 
 /// `A_e` + `B_e` K.
@@ -80,7 +79,7 @@ fn closed_loop(
     Ok(a_e + b_e * k)
 }
 
-/// [`integral_feedforward`] of a controllable (A, B).
+/// Same as [`integral_feedforward`], for a controllable (A, B).
 fn of_controllable(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -101,8 +100,8 @@ fn of_controllable(
     let residual =
         (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
     require_residual("W' (A_e + B_e K) = S W'", residual, 1e-8)?;
-    let acting = w.rows(0, n).transpose() * b;
-    let svd = Svd::new(&acting.transpose())?;
+    let input = w.rows(0, n).transpose() * b;
+    let svd = Svd::new(&input.transpose())?;
     if svd.rank(1e-9) < t {
         return Ok(Err(
             "the commands act on the slowest modes of the feedback in fewer independent ways than there \
@@ -113,15 +112,15 @@ fn of_controllable(
     // (W_x' B)^+ = (B' W_x)^+ transposed.
     let left = svd.left.columns(0, t);
     let gain = left * svd.whitening(t).transpose() * &required;
-    let residual = (&acting * &gain - &required).norm() / required.norm();
+    let residual = (&input * &gain - &required).norm() / required.norm();
     require_residual("W' [B N_r; I] = 0", residual, 1e-9)?;
     Ok(Ok(IntegralFeedforward { gain, silent }))
 }
 
-/// The `count` slowest eigenvalues; None if half of a complex pair is the last of them.
+/// The `count` slowest eigenvalues; None if half of a complex pair is the last of them, or there are fewer.
 fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
     let mut upper: Vec<_> = values.iter().filter(|value| value.im >= 0.0).copied().collect();
-    // Of equally slow ones a real one is before a pair.
+    // Among equally slow eigenvalues a real one precedes a pair.
     upper.sort_by(|x, y| {
         domain.excess(*y).total_cmp(&domain.excess(*x)).then(x.im.total_cmp(&y.im))
     });
@@ -138,7 +137,8 @@ fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<
     (slow.len() == count).then_some(slow)
 }
 
-/// An orthonormal basis W of the left invariant subspace of `a` for some eigenvalues, pairs together.
+/// An orthonormal basis W of the left invariant subspace of `a` for the eigenvalues `values`, which contain both
+/// halves of each complex pair.
 fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f64>, Error> {
     let n = a.nrows();
     let identity = DMatrix::<f64>::identity(n, n);

@@ -12,35 +12,35 @@ const COMMANDS: usize = 10;
 const BISECTIONS: usize = 12;
 /// Directions of the commands that are shorter than this, relative to the longest, do not count.
 const TOLERANCE: f64 = 1e-9;
-/// An eigenvalue this far beyond the stability limit, relative to the rate in continuous time, is on it, with
-/// rounding errors.
+/// An eigenvalue up to this distance from the stability limit, in continuous time relative to the largest entry of
+/// the coefficients, may be on it but for rounding errors.
 const NEUTRAL: f64 = 1e-9;
 /// Distance of a norm from 1, or of a decay from 0, that exceeds its rounding errors.
 const MARGIN: f64 = 1e-10;
 
-/// What is known of an interpolated back-calculation.
+/// Whether an interpolated back-calculation is stable, by [`interpolated_windup`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterpolatedWindup {
     /// It is stable for every constant value between the points and every set of commands at their limits.
     Stable,
-    /// It is not.
+    /// It is unstable at one value for one set of commands.
     Unstable {
-        /// The part of the way from the first point to the second.
+        /// s, from 0 at the first point to 1 at the second.
         part: f64,
         /// The indices, from 0, of the commands at their limits.
         limited: Vec<usize>,
-        /// The instability there: the largest modulus of the eigenvalues less 1; in continuous time the largest
+        /// The instability at `part`: the largest modulus of the eigenvalues less 1; in continuous time the largest
         /// real part.
         instability: f64,
     },
     /// Neither was shown for these commands at their limits.
     Undecided {
-        /// Their indices, from 0.
+        /// The indices, from 0, of the commands at their limits.
         limited: Vec<usize>,
     },
 }
 
-/// Whether a back-calculation is stable while it is interpolated between two points.
+/// Examines whether a back-calculation is stable when it is interpolated between two points.
 ///
 /// ```text
 /// x_i[k+1] = (I - L_w(s) S K_i(s)) x_i[k] + ...,   K_i(s) = (1 - s) K_i0 + s K_i1,   L_w(s) the same
@@ -48,25 +48,25 @@ pub enum InterpolatedWindup {
 /// ```
 ///
 /// S selects commands at their limits. At the points `L_w` = (1 - e^(-rate T)) `K_i`^+, or rate `K_i`^+, by
-/// [`super::windup_gain`], so that the eigenvalues are between 0 and 1, or -rate and 0, for every S; between them the product
-/// has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. A result [`InterpolatedWindup::Stable`] is a proof up to
-/// rounding, for each constant s from 0 to 1 and each constant S: no eigenvalue but those at 1, or 0, of
+/// [`super::windup_gain`], so that the eigenvalues are between 0 and 1, or -rate and 0, for every S; between the
+/// points the product has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. A result [`InterpolatedWindup::Stable`] is a
+/// proof up to rounding, for each constant s from 0 to 1 and each constant S: no eigenvalue but those at 1, or 0, of
 /// integrals on which the commands of S do not act is on or beyond the stability limit. It says nothing of
 /// a moving s while commands are at their limits.
 ///
 /// `k_i`: `K_i`, m x t, at the two points; `l_w`: `L_w`, t x m; `ranges`: as in [`super::windup_gain`].
 ///
-/// Method: for each set S the matrix M(s) = I - N(s), or -N(s), on the directions that count, N = Q' `K_i` `L_w` Q with Q
-/// an orthonormal basis of the columns of S `K_i0` and S `K_i1` in units of the ranges, or N = `L_w` S `K_i` where that
+/// Method: for each set S the matrix M(s) = I - N(s), or -N(s) in continuous time, with N = Q' `K_i` `L_w` Q, Q an
+/// orthonormal basis of the columns of S `K_i0` and S `K_i1` in units of the ranges, or N = `L_w` S `K_i` where that
 /// is smaller; both have the eigenvalues of `L_w` S `K_i` other than 0. M(s) is a polynomial of degree 2, a
 /// convex combination of its Bernstein coefficients; a Lyapunov matrix P of its middle for which all
-/// three have a P norm below 1, or decrease x' P x, proves the interval. Otherwise the interval is bisected, up to 12 times. More
-/// than 10 commands with limits are not examined.
+/// three have a P norm below 1, or decrease x' P x, proves the interval. Otherwise the interval is bisected, up to
+/// 12 times. With more than 10 commands with limits the result is [`InterpolatedWindup::Undecided`].
 ///
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bad
-/// range or period; [`Error::NotConverged`]; the errors of [`discrete_lyapunov`].
+/// range or period; [`Error::NotConverged`]; the errors of [`discrete_lyapunov`] and [`lyapunov`].
 pub fn interpolated_windup(
     k_i: [&DMatrix<f64>; 2],
     l_w: [&DMatrix<f64>; 2],
@@ -98,7 +98,7 @@ pub fn interpolated_windup(
         match examine(&bernstein(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain, &at_limit)? {
             InterpolatedWindup::Stable => {}
             unstable @ InterpolatedWindup::Unstable { .. } => return Ok(unstable),
-            open @ InterpolatedWindup::Undecided { .. } => undecided = undecided.or(Some(open)),
+            other @ InterpolatedWindup::Undecided { .. } => undecided = undecided.or(Some(other)),
         }
     }
     Ok(undecided.unwrap_or(InterpolatedWindup::Stable))
@@ -180,13 +180,14 @@ fn examine(
         match examine(&coefficients, ends, bisections - 1, domain, limited)? {
             InterpolatedWindup::Stable => {}
             unstable @ InterpolatedWindup::Unstable { .. } => return Ok(unstable),
-            open @ InterpolatedWindup::Undecided { .. } => outcome = open,
+            undecided @ InterpolatedWindup::Undecided { .. } => outcome = undecided,
         }
     }
     Ok(outcome)
 }
 
-/// Whether all of `matrices` have a P norm below 1 for P with M' P M - P = -I, M = `middle`.
+/// Whether all of `matrices` have a P norm below 1 for P with M' P M - P = -I, M = `middle`, by more than rounding
+/// errors.
 fn contracts(middle: &DMatrix<f64>, matrices: &[DMatrix<f64>]) -> Result<bool, Error> {
     let identity = DMatrix::identity(middle.nrows(), middle.nrows());
     let p = discrete_lyapunov(middle, &identity)?.p;

@@ -9,12 +9,12 @@ use nalgebra::{DMatrix, DVector};
 /// Largest numbers of steps between two verifications, and of verifications.
 const STEPS: usize = 150;
 const ROUNDS: usize = 12;
-/// Terms and frequencies in a step: with a value above this part of the largest one.
+/// A step uses the terms and frequencies with a value from this part of the largest one on, and at most this number.
 const ACTIVE: f64 = 0.85;
 const MOST_ACTIVE: usize = 40;
 /// Step of the differences, relative to the size of a parameter.
 const DIFFERENCE: f64 = 1e-3;
-/// Halvings of a step; the part of the predicted decrease that it must reach.
+/// The largest number of lengths of a step that are tried, and the part of the predicted decrease that it must reach.
 const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
 /// A search ends at the second step that decreases gamma by less than this part.
@@ -25,7 +25,7 @@ const PROGRESS: f64 = 1e-3;
 const BETWEEN: f64 = 2e-3;
 
 impl Tuning<'_> {
-    /// Tunes the parameters from `start`, whose sizes are `scales`.
+    /// Tunes the parameters from `start`; `scales`: the size of each parameter.
     ///
     /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid
     /// of frequencies, with a BFGS matrix of the sum of their multipliers; frequencies at which the
@@ -40,6 +40,7 @@ impl Tuning<'_> {
     /// [`Error::OutOfRange`] for a rate that is not above zero.
     pub fn tuned(&self, start: &DVector<f64>, scales: &DVector<f64>) -> Result<Tuned, Error> {
         check::positive("the rate", self.rate)?;
+        check::length("scales", scales.as_slice(), start.len())?;
         let mut best = Tuned { parameters: start.clone(), peak: self.peak(start)? };
         let mut search = Search { grid: Grid::new(self)?, scales, at: start.clone() };
         search.grid.add(best.peak.frequency)?;
@@ -61,9 +62,11 @@ impl Tuning<'_> {
     }
 }
 
+/// The search on the frequencies of a grid.
 struct Search<'a> {
     grid: Grid<'a>,
     scales: &'a DVector<f64>,
+    /// The present parameters.
     at: DVector<f64>,
 }
 
@@ -92,11 +95,11 @@ impl Search<'_> {
             let Some(cuts) = self.cuts(&iterate, &self.at, &places) else { break };
             if is_fresh {
                 // The first step changes the parameters by a twentieth of their sizes.
-                let size = cuts.iter().map(|(_, gradient)| gradient.norm()).fold(0.0, f64::max);
+                let size = cuts.iter().map(|cut| cut.gradient.norm()).fold(0.0, f64::max);
                 inverse = DMatrix::identity(count, count) * (0.05 / size.max(f64::MIN_POSITIVE));
             }
             let descent = direction(&cuts, &inverse);
-            let next = self.line(&descent.step, value, descent.decrease);
+            let next = self.line_search(&descent.step, value, descent.decrease);
             let Some((parameters, next)) = next else {
                 if is_fresh || (self.grid.tuning.is_over)() {
                     break;
@@ -107,8 +110,8 @@ impl Search<'_> {
             is_fresh = false;
             let change = self.cuts(&next, &parameters, &places).map(|after| {
                 let each = after.iter().zip(&cuts).zip(&descent.multipliers);
-                each.fold(DVector::zeros(count), |sum, (((_, new), (_, old)), part)| {
-                    sum + (new - old) * *part
+                each.fold(DVector::zeros(count), |sum, ((new, old), part)| {
+                    sum + (&new.gradient - &old.gradient) * *part
                 })
             });
             if let Some(change) = change {
@@ -131,6 +134,7 @@ impl Search<'_> {
         iterate.largest()
     }
 
+    /// The controller and its values at `parameters`; None if these are not allowed, or the loop is not stable enough.
     fn iterate(&self, parameters: &DVector<f64>) -> Option<Iterate> {
         if !(self.grid.tuning.is_allowed)(parameters) {
             return None;
@@ -140,8 +144,8 @@ impl Search<'_> {
         Some(Iterate { controller, values })
     }
 
-    /// The longest of the halved steps with enough decrease.
-    fn line(
+    /// The parameters and values after the longest of the halved steps with enough decrease; None if no step has it.
+    fn line_search(
         &self,
         step: &DVector<f64>,
         value: f64,
@@ -172,7 +176,7 @@ impl Search<'_> {
         places.iter().map(cut).collect()
     }
 
-    /// The derivatives of the controller's matrices.
+    /// The derivatives of the controller's matrices with respect to each parameter, in units of `scales`.
     fn differences(&self, at: &DVector<f64>) -> Option<Vec<StateSpace>> {
         let one = |index: usize| {
             let moved = |sign: f64| {
@@ -195,7 +199,8 @@ impl Search<'_> {
     }
 }
 
-/// The local maxima above `least`, and some of the frequencies beside them where the values are flat.
+/// The places with values from `least` on at local maxima and at every third frequency: the largest 40, in descending
+/// order.
 fn active(values: &[Vec<f64>], least: f64) -> Vec<Place> {
     let mut places = Vec::new();
     for (term, values) in values.iter().enumerate() {

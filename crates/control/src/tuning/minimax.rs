@@ -6,45 +6,50 @@ const SWEEPS: usize = 400;
 /// Relative precision of the multipliers' conditions.
 const PRECISION: f64 = 1e-9;
 
-/// A value and its gradient.
-pub(super) type Cut = (f64, DVector<f64>);
+/// The value and the gradient of a function.
+pub(super) struct Cut {
+    pub(super) value: f64,
+    pub(super) gradient: DVector<f64>,
+}
 
-/// The least of the model max over i of `(f_i + g_i d)` + d' W^-1 d / 2.
+/// The minimum of the model max over i of `(f_i + g_i' d)` + d' W^-1 d / 2.
 pub(super) struct Direction {
     /// d.
     pub(super) step: DVector<f64>,
     /// The multipliers: not negative, with the sum 1.
     pub(super) multipliers: Vec<f64>,
-    /// The largest of the values, less that of the model.
+    /// The largest of the values less the largest of `f_i + g_i' d`.
     pub(super) decrease: f64,
 }
 
-/// Solves for the direction, by its dual: the least of `l' G' W G l / 2 - f' l` over l >= 0, sum l = 1.
+/// Computes the direction from its dual: the least of `l' G' W G l / 2 - f' l` over l >= 0, sum l = 1.
 ///
 /// Method: exchange between the pair of multipliers that violates the conditions most (J. Platt 1998).
 pub(super) fn direction(cuts: &[Cut], inverse: &DMatrix<f64>) -> Direction {
     let count = cuts.len();
-    let columns: Vec<_> = cuts.iter().map(|(_, gradient)| gradient.clone()).collect();
+    let columns: Vec<_> = cuts.iter().map(|cut| cut.gradient.clone()).collect();
     let g = DMatrix::from_columns(&columns);
     let gram = g.tr_mul(&(inverse * &g));
-    let values = DVector::from_iterator(count, cuts.iter().map(|(value, _)| *value));
+    let values = DVector::from_iterator(count, cuts.iter().map(|cut| cut.value));
     let first = values.imax();
     let mut multipliers = DVector::zeros(count);
     multipliers[first] = 1.0;
     let mut slope = gram.column(first) - &values;
     for _ in 0..SWEEPS * count {
-        let gains = slope.imin();
-        let used = (0..count).filter(|&at| multipliers[at] > 0.0);
-        let Some(loses) = used.max_by(|&i, &j| slope[i].total_cmp(&slope[j])) else { break };
-        let violation = slope[loses] - slope[gains];
+        let target = slope.imin();
+        let positive = (0..count).filter(|&at| multipliers[at] > 0.0);
+        let source = positive.max_by(|&i, &j| slope[i].total_cmp(&slope[j]));
+        let Some(source) = source else { break };
+        let violation = slope[source] - slope[target];
         if violation <= PRECISION * values[first].abs() {
             break;
         }
-        let curvature = gram[(gains, gains)] + gram[(loses, loses)] - 2.0 * gram[(gains, loses)];
-        let amount = (violation / curvature.max(f64::MIN_POSITIVE)).min(multipliers[loses]);
-        multipliers[gains] += amount;
-        multipliers[loses] -= amount;
-        slope += (gram.column(gains) - gram.column(loses)) * amount;
+        let curvature =
+            gram[(target, target)] + gram[(source, source)] - 2.0 * gram[(target, source)];
+        let amount = (violation / curvature.max(f64::MIN_POSITIVE)).min(multipliers[source]);
+        multipliers[target] += amount;
+        multipliers[source] -= amount;
+        slope += (gram.column(target) - gram.column(source)) * amount;
     }
     let step = -(inverse * (&g * &multipliers));
     let model = &values + g.tr_mul(&step);
@@ -52,7 +57,8 @@ pub(super) fn direction(cuts: &[Cut], inverse: &DMatrix<f64>) -> Direction {
     Direction { step, multipliers: multipliers.iter().copied().collect(), decrease }
 }
 
-/// Updates the inverse Hessian matrix for a step and the change of the gradient along it (BFGS).
+/// Updates the inverse Hessian matrix for a step and the change of the gradient (BFGS); leaves it without positive
+/// curvature.
 pub(super) fn update(inverse: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<f64>) {
     let curvature = step.dot(change);
     if curvature <= 1e-10 * step.norm() * change.norm() {
@@ -71,7 +77,7 @@ mod tests {
     #[test]
     fn the_maximum_of_two_lines_and_a_parabola_has_the_step_of_its_closed_form() {
         // max(1 + d, 1 - d) + d^2 / 2 is least at d = 0; max(2 + d, 1 - d) + d^2 / 2 at d = -1/2.
-        let line = |value, slope| (value, DVector::from_element(1, slope));
+        let line = |value, slope| Cut { value, gradient: DVector::from_element(1, slope) };
         let unit = DMatrix::identity(1, 1);
         let even = direction(&[line(1.0, 1.0), line(1.0, -1.0)], &unit);
         assert!(even.step[0].abs() < 1e-9 && (even.multipliers[0] - 0.5).abs() < 1e-9);

@@ -1,5 +1,6 @@
 //! The weighted singular values of a loop on a grid of frequencies, and their derivatives.
 
+use super::minimax::Cut;
 use super::{Transfer, Tuning};
 use crate::blocks::{ComplexMatrix, to_complex};
 use crate::response;
@@ -14,7 +15,7 @@ use std::f64::consts::PI;
 const PER_DECADE: i32 = 30;
 const DECADES: i32 = 3;
 
-/// The frequencies that are examined, with what does not depend on the parameters.
+/// The examined frequencies, ascending, with the response of the plant and the weights.
 pub(super) struct Grid<'a> {
     pub(super) tuning: &'a Tuning<'a>,
     nodes: Vec<Node>,
@@ -23,7 +24,7 @@ pub(super) struct Grid<'a> {
 struct Node {
     frequency: f64,
     plant: ComplexMatrix,
-    /// Of each term.
+    /// The magnitude of the weight of each term.
     weights: Vec<f64>,
 }
 
@@ -34,16 +35,17 @@ pub(super) struct Place {
     pub(super) node: usize,
 }
 
-/// K and S at a frequency.
-struct Closed {
-    /// From the measurements.
+/// K, S and H G at a frequency.
+struct ClosedLoop {
+    /// K, from the measurements.
     k: ComplexMatrix,
-    /// From the references.
+    /// `K_r`, from the references.
     k_r: ComplexMatrix,
+    /// S at the commands.
     at_input: ComplexMatrix,
+    /// S at the measurements.
     at_output: ComplexMatrix,
-    /// H G.
-    followed: ComplexMatrix,
+    h_g: ComplexMatrix,
 }
 
 impl<'a> Grid<'a> {
@@ -55,7 +57,8 @@ impl<'a> Grid<'a> {
         Ok(grid)
     }
 
-    /// Adds a frequency; one beyond half the sampling rate is the last one below it.
+    /// Adds a frequency, limited to six decades on both sides of the bandwidth, and in sampled time to just below half
+    /// of the sampling rate.
     pub(super) fn add(&mut self, frequency: f64) -> Result<(), Error> {
         let Tuning { plant, terms, rate, .. } = self.tuning;
         let lowest = rate * 10_f64.powi(-2 * DECADES);
@@ -75,7 +78,7 @@ impl<'a> Grid<'a> {
         Ok(())
     }
 
-    /// The weighted singular values of all terms, term by term; None where the loop is not stable enough.
+    /// The weighted singular values on the grid, term by term; None if the loop is not stable enough.
     pub(super) fn values(&self, controller: &StateSpace) -> Option<Vec<Vec<f64>>> {
         let Tuning { plant, terms, instability: limit, .. } = self.tuning;
         let closed = Loop::new(plant.clone(), self.tuning.measured(controller)).ok()?;
@@ -86,7 +89,7 @@ impl<'a> Grid<'a> {
         let mut values = vec![Vec::with_capacity(self.nodes.len()); terms.len()];
         for node in &self.nodes {
             let gain = transfer.gain(node.frequency).ok()?;
-            let closed = Closed::new(&gain, &node.plant, &self.tuning.references)?;
+            let closed = ClosedLoop::new(&gain, &node.plant, &self.tuning.references)?;
             for (at, term) in terms.iter().enumerate() {
                 let x = closed.transfer(term.transfer);
                 values[at].push(node.weights[at] * norm(&x)?);
@@ -98,14 +101,14 @@ impl<'a> Grid<'a> {
     /// The value at `place`, and its derivatives with respect to the parameters.
     ///
     /// With X v = sigma u: d sigma = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
-    /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S. Of the references,
-    /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v] for [K, `K_r`].
+    /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S. For the tracking error
+    /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v], with d[K, `K_r`] in place of dK; T has the opposite sign of S.
     pub(super) fn gradient(
         &self,
         controller: &StateSpace,
         differences: &[StateSpace],
         place: Place,
-    ) -> Option<(f64, DVector<f64>)> {
+    ) -> Option<Cut> {
         let Node { frequency, plant, weights } = &self.nodes[place.node];
         let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
         let (order, s) = (controller.a.nrows(), controller.domain.point(*frequency));
@@ -114,7 +117,7 @@ impl<'a> Grid<'a> {
         let (forward, backward) = (pencil.clone().lu(), pencil.transpose().lu());
         let k = &c * forward.solve(&b)? + to_complex(&controller.d);
         let (t, p) = self.tuning.references.shape();
-        let closed = Closed::new(&k, plant, &self.tuning.references)?;
+        let closed = ClosedLoop::new(&k, plant, &self.tuning.references)?;
         let (sigma, u, v) = largest(&closed.transfer(transfer))?;
         let (left, right) = match transfer {
             Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
@@ -125,7 +128,7 @@ impl<'a> Grid<'a> {
             }
             Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
             Transfer::Tracking => {
-                let left = -(u.adjoint() * &closed.followed * &closed.at_input);
+                let left = -(u.adjoint() * &closed.h_g * &closed.at_input);
                 let measured = plant * &closed.at_input * &closed.k_r * &v;
                 let mut right = measured.resize_vertically(p + t, Complex::from(0.0));
                 right.rows_mut(p, t).copy_from(&v);
@@ -141,29 +144,31 @@ impl<'a> Grid<'a> {
         // Re(row M column) is the sum of the entries of M' and Re(column row).
         let [of_a, of_b, of_c, of_d] =
             [real(&y, &x), real(&y, &right), real(&left, &x), real(&left, &right)];
-        let along = |one: &StateSpace| {
+        let slope = |one: &StateSpace| {
             of_a.dot(&one.a.transpose())
                 + of_b.dot(&one.b.transpose())
                 + of_c.dot(&one.c.transpose())
                 + of_d.dot(&one.d.transpose())
         };
-        let slopes = differences.iter().map(|one| sign * weight * along(one));
-        Some((weight * sigma, DVector::from_iterator(differences.len(), slopes)))
+        let slopes = differences.iter().map(|one| sign * weight * slope(one));
+        let gradient = DVector::from_iterator(differences.len(), slopes);
+        Some(Cut { value: weight * sigma, gradient })
     }
 }
 
-impl Closed {
+impl ClosedLoop {
     /// `gain`: [K, `K_r`]; `references`: H.
     fn new(gain: &ComplexMatrix, plant: &ComplexMatrix, references: &DMatrix<f64>) -> Option<Self> {
         let (p, m) = plant.shape();
         let k = gain.columns(0, p).into_owned();
         let k_r = gain.columns(p, references.nrows()).into_owned();
-        let followed = to_complex(references) * plant;
+        let h_g = to_complex(references) * plant;
         let at_input = (ComplexMatrix::identity(m, m) - &k * plant).try_inverse()?;
         let at_output = (ComplexMatrix::identity(p, p) - plant * &k).try_inverse()?;
-        Some(Self { k, k_r, at_input, at_output, followed })
+        Some(Self { k, k_r, at_input, at_output, h_g })
     }
 
+    /// X at the frequency.
     fn transfer(&self, transfer: Transfer) -> ComplexMatrix {
         let complement = |s: &ComplexMatrix| ComplexMatrix::identity(s.nrows(), s.ncols()) - s;
         match transfer {
@@ -172,12 +177,12 @@ impl Closed {
             Transfer::Complementary(Point::Input) => complement(&self.at_input),
             Transfer::Complementary(Point::Output) => complement(&self.at_output),
             Transfer::Effort => &self.k * &self.at_output,
-            Transfer::Tracking => complement(&(&self.followed * &self.at_input * &self.k_r)),
+            Transfer::Tracking => complement(&(&self.h_g * &self.at_input * &self.k_r)),
         }
     }
 }
 
-/// The largest singular value.
+/// The largest singular value; None if an entry is not finite.
 fn norm(x: &ComplexMatrix) -> Option<f64> {
     if x.ncols() == 1 || x.nrows() == 1 {
         return Some(x.norm()).filter(|value| value.is_finite());
@@ -284,11 +289,11 @@ mod tests {
             };
             let differences: Vec<_> = (0..start.len()).map(slope).collect();
             let nominal = controller(&start, domain);
-            let values = |own: &StateSpace| grid.values(own).ok_or(Error::Overflow { what: "S" });
+            let values = |k: &StateSpace| grid.values(k).ok_or(Error::Overflow { what: "S" });
             for term in 0..transfers.len() {
                 let node = 80;
                 let place = Place { term, node };
-                let (value, gradient) =
+                let Cut { value, gradient } =
                     grid.gradient(&nominal, &differences, place).expect("a gradient");
                 assert!((value - values(&nominal)?[term][node]).abs() < 1e-8 * value);
                 for at in 0..start.len() {

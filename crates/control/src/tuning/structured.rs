@@ -1,4 +1,4 @@
-//! State feedbacks some of whose entries are zero: those of PI and PID controllers, of low order or decentralised.
+//! State feedbacks with entries that must be zero: PI and PID controllers, low order, decentralised control.
 
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
 use crate::robustness::uniform;
@@ -6,15 +6,15 @@ use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// Steps of the search, and of those without success after which it ends.
+/// The largest number of steps of the search, and of successive steps without success.
 const STEPS: usize = 4000;
 const IDLE: usize = 400;
-/// Factors of the length of a step after success and without: one success in five keeps it.
+/// Factors of the length of a step after a success and after a failure; with one success in five steps it is constant.
 const LONGER: f64 = 1.5;
 const SHORTER: f64 = 0.903_602;
 /// Singular values of the signals' correlation below this part of the largest are rounding.
 const ROUNDING: f64 = 1e-10;
-/// Parts of the start that are tried first: a stable plant stays stable with small gains of the right signs.
+/// Multiples of the start that are tried first: a stable plant stays stable with small gains of the right signs.
 const SCALES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 const SEED: u64 = 1;
 
@@ -27,12 +27,13 @@ pub struct Structure<'a> {
     pub b: &'a DMatrix<f64>,
     /// The rows and columns, from zero, of the entries of K, m x n.
     pub free: &'a [(usize, usize)],
-    /// Of A and B.
+    /// The time domain of A and B.
     pub domain: Domain,
 }
 
 impl Structure<'_> {
-    /// The feedback of this structure whose commands are nearest to those of u = K x, while noise enters with the commands:
+    /// The feedback of this structure whose commands are nearest to those of u = K x, with white noise added to the
+    /// commands:
     ///
     /// ```text
     /// k_s = k X S' (S X S')^+,   (A + B K) X + X (A + B K)' + B B' = 0
@@ -70,8 +71,8 @@ impl Structure<'_> {
             let correlation = DMatrix::from_fn(count, count, |i, j| {
                 covariance[(columns[i], columns[j])] / (sizes[i] * sizes[j])
             });
-            let of_command = k.row(row) * covariance.select_columns(&columns);
-            let target = DMatrix::from_fn(count, 1, |i, _| of_command[i] / sizes[i]);
+            let cross = k.row(row) * covariance.select_columns(&columns);
+            let target = DMatrix::from_fn(count, 1, |i, _| cross[i] / sizes[i]);
             let svd = correlation.svd(true, true);
             let least = ROUNDING * svd.singular_values.max();
             let overflow = |_| Error::Overflow { what: "the correlation of the signals" };
@@ -83,13 +84,15 @@ impl Structure<'_> {
         Ok(projected)
     }
 
-    /// A feedback of this structure that decays at least as fast as `decay` asks for, or the best that was found, with its
-    /// instability, see [`instability`]. It is `start` if that decays fast enough.
+    /// Searches a feedback of this structure whose loop has at most the instability `decay`, see [`instability`];
+    /// returns the best feedback and its instability, `start` if that is sufficient.
     ///
-    /// `decay`: the instability that ends the search, negative; `is_over`: whether it must end with what there is. Method: an evolution strategy with one parent and one
-    /// child, whose steps are in the sizes of the entries of `start`, or of the best part of it; the same start gives the same result. The largest real part of
-    /// eigenvalues has no derivative where two of them meet, which minima like; the search needs none. It proves nothing where it
-    /// finds no stable feedback.
+    /// `decay`: negative; `is_over`: asked before each step, true ends the search. The result may be unstable, which
+    /// does not prove that no stable feedback exists.
+    ///
+    /// Method: an evolution strategy with one parent and one child, whose steps are relative to the entries of the
+    /// parent; the first parent is the best multiple of `start`. The same start gives the same result. The search needs
+    /// no derivative: the largest real part of eigenvalues has none where two of them meet, as they often do at minima.
     ///
     /// Source: H.-G. Beyer, H.-P. Schwefel, Evolution strategies, Natural Computing 1 (2002).
     ///
@@ -106,13 +109,13 @@ impl Structure<'_> {
         let n = check::square("A", a)?;
         check::shape("B", b, (n, b.ncols()))?;
         check::shape("K", start, (b.ncols(), n))?;
-        let of = |k: &DMatrix<f64>| instability(&(a + b * k), domain);
+        let value_of = |k: &DMatrix<f64>| instability(&(a + b * k), domain);
         let largest = free.iter().map(|at| start[*at].abs()).fold(0.0, f64::max);
         let least = if largest > 0.0 { 1e-3 * largest } else { 1.0 };
-        let (mut best, mut value) = (start.clone(), of(start)?);
+        let (mut best, mut value) = (start.clone(), value_of(start)?);
         for scale in SCALES {
             let scaled = start * scale;
-            let scaled_value = of(&scaled)?;
+            let scaled_value = value_of(&scaled)?;
             if value > decay && scaled_value < value {
                 (best, value) = (scaled, scaled_value);
             }
@@ -127,8 +130,8 @@ impl Structure<'_> {
                 let size = best[*at].abs().max(least);
                 next[*at] += length * size * normal(&mut random);
             }
-            // An overflow of a long step is no success.
-            let next_value = of(&next).unwrap_or(f64::INFINITY);
+            // A step that overflows is no success.
+            let next_value = value_of(&next).unwrap_or(f64::INFINITY);
             if next_value < value {
                 (best, value, idle) = (next, next_value, 0);
                 length = (length * LONGER).min(3.0);
@@ -172,8 +175,8 @@ mod tests {
         Ok(())
     }
 
-    /// x'' = u with u = -2 x - 3 x': white noise in u makes position and speed uncorrelated, so that the best use of the
-    /// position alone is its gain.
+    /// x'' = u with u = -2 x - 3 x': with white noise in u, position and speed are uncorrelated, so that the best gain
+    /// of the position alone is its gain in K.
     #[test]
     fn states_that_are_not_correlated_keep_their_gains() -> Result<(), Error> {
         let (a, b) = double_integrator();
