@@ -34,9 +34,9 @@ pub struct FastAdaptive {
 /// one above plus `F_a` Gamma F.
 ///
 /// Source: K. Zhang, B. Jiang and V. Cocquempot, Adaptive observer-based fast fault estimation, Int. J. Control,
-/// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y, theorem
-/// 1 with E'P = F C. Their P and `L_x` solve linear matrix inequalities; here they follow from the form. The law
-/// for sampled controllers is our own.
+/// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y,
+/// theorem 1 with E'P = F C. Their P and `L_x` solve linear matrix inequalities; here they follow from the form. The
+/// law for sampled controllers is our own.
 ///
 /// # Errors
 ///

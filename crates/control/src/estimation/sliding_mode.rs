@@ -28,8 +28,8 @@ pub struct SlidingMode {
 /// ```
 ///
 /// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is the effect of the
-/// error of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda
-/// - rho / delta. The default of delta makes this e^(-rate T); with lambda = 1 - 0.01 (1 - e^(-rate T)) the
+/// error of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with
+/// lambda - rho / delta. The default of delta makes this e^(-rate T); with lambda = 1 - 0.01 (1 - e^(-rate T)) the
 /// estimate then lacks 1 % of a small constant fault, and rho / (rho - |f|) times as much of a larger one. The
 /// result has M with A M = L as the gain of the correction of `x_hat`; its `L_f` is (rho / delta) F; the observer
 /// itself uses F and the nonlinear function.

@@ -112,20 +112,14 @@ impl<'a> HeldFamily<'a> {
         c1.view_mut((staged, 0), (outputs, held)).copy_from(&read);
         let first = staged + outputs;
         c1.view_mut((first, 0), (inner, n)).copy_from(&error_output.columns(0, n));
-        d12.view_mut((first, 0), (inner, inner - n))
-            .copy_from(&error_output.columns(n, inner - n));
+        d12.view_mut((first, 0), (inner, inner - n)).copy_from(&error_output.columns(n, inner - n));
         let mut d11 = DMatrix::zeros(channels, channels);
         d11.view_mut((0, 0), (staged, staged)).copy_from(&d);
         let mut d21 = DMatrix::zeros(self.held.c.nrows(), channels);
         d21.columns_mut(staged, outputs).copy_from(&self.on_outputs.left);
         let StateSpace { a, b, c, d, domain } = self.held.clone();
-        let plant = GeneralisedPlant {
-            a,
-            b: [b1, b],
-            c: [c1, c],
-            d: [[d11, d12], [d21, d]],
-            domain,
-        };
+        let plant =
+            GeneralisedPlant { a, b: [b1, b], c: [c1, c], d: [[d11, d12], [d21, d]], domain };
         let (places, blocks) = self.places(error.stages);
         let system = plant.with_controller(self.controller);
         let system = StateSpace {
