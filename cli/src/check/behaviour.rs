@@ -12,7 +12,7 @@ use super::answer::TrialResult;
 use super::finding::Severity::{Error, Note, Warning};
 use super::finding::{Finding, Findings, Part, Tool};
 use super::messages::MessageRecorder;
-use super::values::{Value, distance, get, outputs, start, stated_values, unknown_reference};
+use super::values::{Value, distance, get, outputs, start, start_variables, unknown_reference};
 
 /// Number of steps of a trial.
 const STEPS: u32 = 10;
@@ -128,8 +128,10 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     fn differ(&mut self, first: &Trajectory, second: &Trajectory) {
-        let point = first.iter().zip(second).position(|(one, other)| one != other);
-        let what = format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
+        let step = first.iter().zip(second).position(|(one, other)| one != other);
+        // Without a difference, one of the two ends earlier.
+        let step = step.unwrap_or(first.len().min(second.len()));
+        let what = format!("a second instance has other outputs, from step {step}");
         let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
         self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
@@ -300,7 +302,7 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Compares the start values with the description; `None` if the process of the FMU ended.
     fn start_values(&mut self, slave: &mut S) -> Option<()> {
-        for variable in stated_values(self.description).take(LOOKED_AT) {
+        for variable in start_variables(self.description).take(LOOKED_AT) {
             let Some(stated) = start(variable) else { continue };
             let difference = match get(slave, variable) {
                 Ok(value) if value.agrees(&stated) => continue,

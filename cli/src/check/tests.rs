@@ -28,6 +28,7 @@ enum Fault {
     NoEnd,
     Nan,
     EachOtherwise,
+    SecondEndsEarlier,
     LostState,
     RoundedState,
     NoState,
@@ -91,6 +92,9 @@ impl Slave for Sum {
     fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         if self.fault == Fault::Step && time > 0.5 {
             return Err(refused("fmi2DoStep", "tired"));
+        }
+        if self.fault == Fault::SecondEndsEarlier && self.number == 2 && time >= 0.5 {
+            return Ok(StepResult::Part { reached: time, terminated: false });
         }
         if time + size > self.end && self.fault != Fault::NoEnd {
             return Err(refused("fmi2DoStep", "past the end"));
@@ -172,6 +176,7 @@ fn each_fault_is_found_with_its_section() {
         (Fault::NoEnd, Warning, "fmi2DoStep", "past a stopTime", "2.1.6"),
         (Fault::Nan, Warning, "variable y", "no finite number after 1 steps", "2.2.7"),
         (Fault::EachOtherwise, Warning, "fmi2DoStep", "has other outputs, from step 1", "2.1"),
+        (Fault::SecondEndsEarlier, Warning, "fmi2DoStep", "other outputs, from step 5", "2.1"),
         (Fault::LostState, Error, "fmi2SetFMUstate", "differ from those before", "2.1.8"),
         (Fault::LostState, Error, "fmi2DeSerializeFMUstate", "differ", "2.1.8"),
         (Fault::RoundedState, Warning, "fmi2SetFMUstate", "by 1.0e-9 of their size", "2.1.8"),

@@ -27,18 +27,22 @@ impl std::fmt::Display for Value {
 }
 
 impl Value {
-    /// Whether the value equals the number in the XML, whose last digit may be rounded.
+    /// Whether the value equals the value in the XML; the last digit of a real number may be rounded.
     pub(super) fn agrees(&self, stated: &Value) -> bool {
         match (&self.0, &stated.0) {
+            _ if self == stated => true,
             (Real(actual), Real(stated)) => {
-                (actual - stated).abs() <= 1e-14 * stated.abs().max(actual.abs())
+                let difference = (actual - stated).abs();
+                let rounded = difference <= 1e-14 * stated.abs().max(actual.abs());
+                rounded && difference.is_finite() || actual.is_nan() && stated.is_nan()
             }
-            _ => self == stated,
+            _ => false,
         }
     }
 
-    /// Returns the difference relative to the larger of the two.
-    fn apart(&self, other: &Value) -> f64 {
+    /// Returns the difference relative to the larger of two real numbers; 0 for equal values, infinite for others
+    /// that are not finite real numbers.
+    fn difference(&self, other: &Value) -> f64 {
         match (&self.0, &other.0) {
             _ if self == other => 0.0,
             (Real(one), Real(other)) => {
@@ -60,13 +64,13 @@ impl Value {
 }
 
 /// Returns the largest difference between two trajectories of outputs, relative to the size of the
-/// values; infinite if the lengths or values other than numbers differ.
+/// values; infinite if the lengths differ, or values that are not finite real numbers.
 pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     if one.len() != other.len() {
         return f64::INFINITY;
     }
     let pairs = one.iter().flatten().zip(other.iter().flatten());
-    pairs.map(|(one, other)| one.apart(other)).fold(0.0, f64::max)
+    pairs.map(|(one, other)| one.difference(other)).fold(0.0, f64::max)
 }
 
 /// Reads one variable.
@@ -74,7 +78,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
     master::read_value(slave, variable.value_reference, ValueType::of(&variable.kind)).map(Value)
 }
 
-/// Returns the start value in the XML.
+/// Returns the start value in the XML; `None` if it states none.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     let start = match &variable.kind {
         Kind::String(start) => start.clone().map(master::Value::String),
@@ -86,7 +90,7 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
 
 /// Returns the variables that keep their start value during the initialization: parameters, inputs,
 /// constants.
-pub(super) fn stated_values(
+pub(super) fn start_variables(
     description: &ModelDescription,
 ) -> impl Iterator<Item = &ScalarVariable> {
     description.variables.iter().filter(|variable| {
@@ -105,4 +109,28 @@ pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
     let used: std::collections::HashSet<u32> =
         description.variables.iter().map(|variable| variable.value_reference).collect();
     (0..=u32::MAX).rev().find(|reference| !used.contains(reference)).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn start_values_agree_to_the_last_digit_and_infinite_ones_only_if_they_are_equal() {
+        let (inf, nan) = (f64::INFINITY, f64::NAN);
+        for (actual, stated, agrees) in [
+            (0.1 + 0.2, 0.3, true),
+            (1.0, 1.001, false),
+            (0.0, -0.0, true),
+            (inf, inf, true),
+            (inf, -inf, false),
+            (1.0, inf, false),
+            (inf, 1.0, false),
+            (nan, -nan, true),
+            (nan, 1.0, false),
+        ] {
+            let [value, start] = [actual, stated].map(|number| Value(Real(number)));
+            assert_eq!(value.agrees(&start), agrees, "{actual} {stated}");
+        }
+    }
 }
