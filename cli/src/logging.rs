@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use fmu_description::number::seconds;
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use report::Message;
 use study::LogFields;
 use tracing::{Event, Level, Subscriber};
@@ -20,7 +20,8 @@ use crate::output;
 /// `target` of the events for messages of FMUs.
 const FMU: &str = "fmu";
 
-/// Starts logging: warnings; with `verbose` 1, information; with 2, everything.
+/// Starts logging: errors and warnings; with `verbose` 1, also information; from 2 on, everything. `json` writes each
+/// message as a JSON object. Only the first call has an effect.
 pub(crate) fn start(verbose: u8, json: bool) {
     let level = match verbose {
         0 => LevelFilter::WARN,
@@ -29,7 +30,7 @@ pub(crate) fn start(verbose: u8, json: bool) {
     };
     let text = tracing_subscriber::fmt::layer().with_writer(|| StandardError);
     let registry = tracing_subscriber::registry().with(level).with(Collector);
-    // A second call keeps the existing subscriber.
+    // Fails at a second call.
     let _ = if json {
         tracing::subscriber::set_global_default(registry.with(text.json().flatten_event(true)))
     } else {
@@ -37,28 +38,38 @@ pub(crate) fn start(verbose: u8, json: bool) {
     };
 }
 
-/// Uses the memory of this thread that a message uses, without showing one.
+/// Formats a message and discards it, so that this thread has the memory of its own that later messages use.
 pub(crate) fn use_memory_of_thread() {
     let layer = tracing_subscriber::fmt::layer().with_writer(io::sink).event_format(Sentence);
     let nowhere = tracing_subscriber::registry().with(layer);
     tracing::subscriber::with_default(nowhere, || tracing::error!("nothing"));
 }
 
-/// Largest number of messages that are kept; the rest is counted.
-const KEPT: usize = 1000;
+/// Largest number of messages that are kept; further ones are only counted.
+const LARGEST_KEPT: usize = 1000;
 
-/// The warnings and errors so far, and the number of all of them, if they are kept.
-static COLLECTED: Mutex<Option<(Vec<Message>, usize)>> = Mutex::new(None);
+/// Warnings and errors.
+#[derive(Clone, Default)]
+struct Collection {
+    /// The first [`LARGEST_KEPT`] messages.
+    messages: Vec<Message>,
+    /// Number of all messages.
+    count: usize,
+}
+
+/// The warnings and errors since [`collect`]; `None` before.
+static COLLECTION: Mutex<Option<Collection>> = Mutex::new(None);
 
 /// Keeps warnings and errors from now on.
 pub(crate) fn collect() {
-    *COLLECTED.lock().unwrap_or_else(PoisonError::into_inner) = Some((Vec::new(), 0));
+    *COLLECTION.lock().unwrap_or_else(PoisonError::into_inner) = Some(Collection::default());
 }
 
-/// Returns the warnings and errors since [`collect`].
+/// Returns the first [`LARGEST_KEPT`] warnings and errors since [`collect`], and a line with the number of further
+/// ones; nothing without a call of `collect`.
 pub(crate) fn collected() -> Vec<Message> {
-    let collected = COLLECTED.lock().unwrap_or_else(PoisonError::into_inner);
-    let (mut messages, count) = collected.clone().unwrap_or_default();
+    let collection = COLLECTION.lock().unwrap_or_else(PoisonError::into_inner);
+    let Collection { mut messages, count } = collection.clone().unwrap_or_default();
     if count > messages.len() {
         let text = format!("and {} more", count - messages.len());
         messages.push(Message { time: None, text });
@@ -66,16 +77,16 @@ pub(crate) fn collected() -> Vec<Message> {
     messages
 }
 
-/// The way of messages to a live view, if there is one.
+/// The channel of messages to the live view, if there is one.
 static FORWARDED: OnceLock<live::Messages> = OnceLock::new();
 
-/// Passes messages to a live view from now on.
+/// Passes errors, warnings and information that are logged to a live view from now on.
 pub(crate) fn forward(messages: live::Messages) {
-    // There is one run in a process, and one view of it.
+    // There is one run in a process, and one view of it: this is called once.
     let _ = FORWARDED.set(messages);
 }
 
-/// Keeps warnings and errors for a report, and forwards messages to a live view.
+/// Keeps warnings and errors for a report after [`collect`], and passes messages to a live view after [`forward`].
 struct Collector;
 
 impl<S: Subscriber> Layer<S> for Collector {
@@ -89,10 +100,10 @@ impl<S: Subscriber> Layer<S> for Collector {
         if *event.metadata().level() > Level::WARN {
             return;
         }
-        let mut collected = COLLECTED.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((messages, count)) = collected.as_mut() {
+        let mut collection = COLLECTION.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(Collection { messages, count }) = collection.as_mut() {
             *count += 1;
-            if messages.len() < KEPT {
+            if messages.len() < LARGEST_KEPT {
                 messages.push(Message { time: fields(event).time, text: sentence(event) });
             }
         }
@@ -105,14 +116,21 @@ fn bars() -> &'static MultiProgress {
     BARS.get_or_init(MultiProgress::new)
 }
 
-/// Shows a progress bar of this length.
+/// Returns a progress bar of this length, which is shown.
 pub(crate) fn bar(template: &str, length: u64) -> ProgressBar {
     let style = ProgressStyle::with_template(template);
     let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
-    bars().add(ProgressBar::new(length).with_style(style))
+    bars().add(ProgressBar::new(length).with_style(style.with_key("percent", percent)))
 }
 
-/// A writer to standard error that hides the progress bar while it writes.
+/// Writes the percentage that is done; it is rounded down, so that 100 % is the end.
+fn percent(state: &ProgressState, text: &mut dyn fmt::Write) {
+    let percent = 100 * state.pos() / state.len().unwrap_or(1).max(1);
+    // A text takes every write.
+    let _ = write!(text, "{percent}");
+}
+
+/// A writer to standard error that hides progress bars while it writes.
 struct StandardError;
 
 impl Write for StandardError {
@@ -126,7 +144,7 @@ impl Write for StandardError {
     }
 }
 
-/// Formats a message as text: `warning: plant, t = 0.5 s, logStatusWarning: ...`.
+/// Formats a message as text: `warning: ...`, of an FMU `warning: plant, t = 0.5 s, logStatusWarning: ...`.
 struct Sentence;
 
 impl<S, N> FormatEvent<S, N> for Sentence
@@ -169,8 +187,8 @@ fn sentence(event: &Event<'_>) -> String {
     format!("{word}: {}{time}{category}: {}{others}", plain(&instance), plain(&message))
 }
 
-/// Makes a message of an FMU a single line without control characters, so that it cannot move the
-/// cursor of a terminal.
+/// Replaces control characters in a text of an FMU by spaces, so that it is a single line and cannot move the cursor of
+/// a terminal.
 fn plain(text: &str) -> String {
     let text = text.trim_end();
     text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()

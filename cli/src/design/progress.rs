@@ -13,20 +13,21 @@ use crate::logging;
 
 /// Number of parts of the bar.
 const PARTS: f64 = 1000.0;
-/// Interval at which the elapsed time is drawn again.
-const REDRAWN: Duration = Duration::from_millis(200);
+/// Interval at which the bar is drawn again with the elapsed time.
+const REDRAW: Duration = Duration::from_millis(200);
 /// Interval between two lines where standard error is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// Shows the steps of a design: a bar on a terminal, which is removed when the reporter is dropped, and a line every
-/// 10 s elsewhere.
+/// Shows the steps of a design: on a terminal by a bar, which is removed when the reporter is dropped, elsewhere by a
+/// line every 10 s.
 pub(super) enum Reporter {
     Bar(ProgressBar),
     Lines(Lines),
 }
 
-/// The step that the next line names. Dropping the sender ends the thread that prints.
+/// The thread that prints a line every 10 s. Dropping the sender ends it.
 pub(super) struct Lines {
+    /// The step that the next line names; `None` before the first one.
     latest: Arc<Mutex<Option<Progress>>>,
     _end: Sender<()>,
 }
@@ -38,11 +39,11 @@ impl Reporter {
         }
         let template = "{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}";
         let bar = logging::bar(template, parts(1.0));
-        bar.enable_steady_tick(REDRAWN);
+        bar.enable_steady_tick(REDRAW);
         Self::Bar(bar)
     }
 
-    /// Shows the step that begins.
+    /// Shows the step that starts; the lines name the step that is the latest one when they are printed.
     pub(super) fn show(&self, progress: Progress) {
         match self {
             Self::Bar(bar) => {
@@ -66,7 +67,7 @@ impl Lines {
                 let latest = *shown.lock().unwrap_or_else(PoisonError::into_inner);
                 if let Some(Progress { step, done, .. }) = latest {
                     let seconds = start.elapsed().as_secs();
-                    eprintln!("{seconds} s, {:.0} %: {step}", 100.0 * done);
+                    eprintln!("{seconds} s, {:.0} %: {step}", (100.0 * done).floor());
                 }
             }
         };

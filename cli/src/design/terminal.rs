@@ -10,13 +10,15 @@ use design::report::schedule::ScheduleReport;
 use design::report::{CommandPeak, Loop, Matrix, PidController, ReferenceStep};
 use design::{Comparison, Report};
 
-/// The most rows or columns of a gain that are printed; the design file has all.
+/// Largest number of rows or columns of a gain, of eigenvalues and of commands that are printed.
 const LARGEST_SHOWN: usize = 16;
 
-/// Entries of a gain that are smaller than this part of its largest one are printed as 0.
+/// Entries of a gain that are smaller than this part of its largest one are printed as 0, as are steady-state errors
+/// below it.
 const ROUNDING: f64 = 1e-14;
 
-/// Prints gains, eigenvalues, the three figures that matter, and the verdict.
+/// Prints the summary: gains, eigenvalues, robustness, families and schedules, detection, losses, checks that fail,
+/// warnings, and the verdict with its reasons and remedies.
 pub(crate) fn summarise(report: &Report) {
     report.gains.iter().for_each(print_gain);
     report.pid.iter().for_each(print_pid);
@@ -72,10 +74,11 @@ pub(crate) fn summarise(report: &Report) {
         println!("warning: {warning}");
     }
     println!("verdict: {}", report.verdict.level.word());
-    let checked = |reason: &&String| !reason.starts_with("does not hold: ");
+    // Checks that fail are printed above.
+    let is_new = |reason: &&String| !reason.starts_with("does not hold: ");
     // One change may remove several reasons.
     let mut stated = "";
-    for reason in report.verdict.reasons.iter().filter(checked) {
+    for reason in report.verdict.reasons.iter().filter(is_new) {
         println!("    {reason}");
         let remedies = report.verdict.remedies.iter();
         for remedy in remedies.filter(|remedy| remedy.reason == *reason) {
@@ -92,7 +95,7 @@ pub(crate) fn summarise(report: &Report) {
     }
 }
 
-/// Prints the gains of a controller of low order; times, where all gains act in the same direction.
+/// Prints the gains of a controller of low order, and its times `T_i` and `T_d` if its gains have the same sign.
 fn print_pid(controller: &PidController) {
     let PidController { command, measurement, proportional, integral, .. } = controller;
     let mut gains =
@@ -138,7 +141,8 @@ fn print_tolerance(tolerance: &ToleranceResult) {
     println!("    {}, {worst}", stable_cases(tolerance));
 }
 
-/// Prints the fraction of the tolerances for which stability is proven, or why there is none.
+/// Prints the fraction of the tolerances for which stability is proven, or why there is none; prints nothing if nothing
+/// varies.
 fn print_proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) {
     match proof {
         _ if !tested.is_examined() => {}
@@ -150,14 +154,19 @@ fn print_proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>)
     }
 }
 
-/// The percentage of random cases that are stable.
+/// Formats the percentage of random cases that are stable.
 fn stable_cases(tolerance: &ToleranceResult) -> String {
     tolerance.stable.map_or("no random cases".to_owned(), |part| {
-        format!("{} % of {} random cases are stable", number(100.0 * part), tolerance.cases)
+        format!("{} % of {} random cases are stable", percentage(part), tolerance.cases)
     })
 }
 
-/// Prints what the controller does without actuators.
+/// Formats a part of a whole as a percentage, which is 100 only for the whole.
+fn percentage(part: f64) -> String {
+    number(if part < 1.0 { (100.0 * part).min(99.999) } else { 100.0 * part })
+}
+
+/// Prints the controller for the loss of each actuator, and of several ones, or why there is none.
 fn print_reconfigurations(reconfiguration: &ReconfigurationReport) {
     let single = reconfiguration.without.iter().map(|loss| (loss.actuator.clone(), &loss.outcome));
     let several =
@@ -178,7 +187,7 @@ fn print_reconfigurations(reconfiguration: &ReconfigurationReport) {
     }
 }
 
-/// Prints decay and price of the fall-back in each case.
+/// Prints the decay and the largest noise on the commands with the fall-back, for each case.
 fn print_fallback(fallback: &FallbackReport) {
     let compensates = if fallback.compensates { "compensated" } else { "not compensated" };
     println!("fall-back: {} Estimated faults are {compensates}.", fallback.method);
@@ -198,7 +207,7 @@ fn print_fallback(fallback: &FallbackReport) {
     }
 }
 
-/// Prints peaks of S and tolerances with each plant.
+/// Prints the peaks of S and the stable cases within the tolerances of each plant.
 fn print_members(kind: &str, members: &[&MemberReport]) {
     for member in members {
         let Some(margins) = &member.margins else {
@@ -245,7 +254,8 @@ fn print_schedule(schedule: &ScheduleReport) {
     );
 }
 
-/// Prints thresholds and predictions of the detection.
+/// Prints delay and least detectable size of each fault, and for each test its threshold and the faults to which it
+/// reacts.
 fn print_detection(detection: &Detection) {
     println!(
         "detection ({}) every {} s: a false alarm every {} s on average",
@@ -298,7 +308,7 @@ fn print_losses(loss: &LossLoop) {
     println!("    constant losses: {stable} {}", described(&limit.losses));
 }
 
-/// Prints a row for each law and fault, and why the other laws do not exist.
+/// Prints a table with a row for each law and fault, and the reason for each law that does not exist.
 pub(crate) fn compare(comparison: &Comparison) {
     let heads = [
         "law",
@@ -348,7 +358,7 @@ pub(crate) fn compare(comparison: &Comparison) {
     }
 }
 
-/// Prints a gain, or only its size and its norm if it would fill more than a screen.
+/// Prints a gain; of a gain with more than [`LARGEST_SHOWN`] rows or columns only the size and the largest entry.
 fn print_gain(matrix: &Matrix) {
     let Matrix { name, meaning, values, .. } = matrix;
     let (rows, columns) = (values.len(), values.first().map_or(0, Vec::len));
@@ -413,7 +423,7 @@ fn print_loop(feedback_loop: &Loop) {
     }
 }
 
-/// Five digits.
+/// Formats a number with about five digits.
 fn number(value: f64) -> String {
     if value.is_infinite() {
         return if value > 0.0 { "no limit".to_owned() } else { "-infinite".to_owned() };
@@ -431,5 +441,18 @@ fn number(value: f64) -> String {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
         format!("{value:.4e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_percentage_is_100_only_if_no_case_is_missing() {
+        assert_eq!(percentage(1.0), "100");
+        assert_eq!(percentage(299_999.0 / 300_000.0), "99.999");
+        assert_eq!(percentage(0.875), "87.5");
+        assert_eq!(percentage(0.0), "0");
     }
 }

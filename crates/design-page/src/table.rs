@@ -3,12 +3,14 @@
 use design_report::number::rounded;
 use maud::{Markup, html};
 
-use super::number::{complex, exact};
+use super::number::{complex, exact, rounded_part};
 
 /// The content of a cell.
 pub(super) enum Cell {
     Text(String),
     Number(f64),
+    /// A percentage of a whole.
+    Percentage(f64),
     Complex([f64; 2]),
     Holds(bool),
     Missing,
@@ -57,6 +59,9 @@ impl Cell {
             Self::Number(value) => {
                 html! { td.number title=(exact(*value)) { (rounded(*value)) } }
             }
+            Self::Percentage(value) => {
+                html! { td.number title=(exact(*value)) { (rounded_part(*value, 100.0)) } }
+            }
             Self::Complex(value) => {
                 html! { td.number title=(complex(*value, exact)) { (complex(*value, rounded)) } }
             }
@@ -71,7 +76,8 @@ impl Cell {
 /// rows is empty.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
-    let is_number = |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Complex(_));
+    let is_number =
+        |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Percentage(_) | Cell::Complex(_));
     let numeric = |column: usize| rows.iter().any(|row| is_number(&row[column]));
     let columns: Vec<usize> =
         (0..heads.len()).filter(|column| *column == 0 || filled(*column)).collect();
