@@ -6,13 +6,12 @@ mod terminal;
 
 use std::ffi::OsString;
 use std::fs;
-use std::io::Write as _;
 use std::iter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::models;
-use crate::outputs::{Outputs, check_own};
+use crate::outputs::{Outputs, check_identity};
 use anyhow::Context;
 use design::{Design, Language, LogOptions, Precision, TimeLimits};
 use files::check_distinct;
@@ -144,7 +143,7 @@ pub(crate) struct Options {
 }
 
 /// Designs the controller and writes the requested files, all or none; returns whether all checks
-/// hold and the verdict is not red.
+/// hold and the verdict is not red. With `--init` and `--compare`, returns true.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     if options.init {
         return init(options).map(|()| true);
@@ -152,7 +151,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     if options.compare {
         return compare(options).map(|()| true);
     }
-    let (out, report) = names(options);
+    let (out, report) = output_paths(options);
     let from = options.from()?;
     let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
@@ -161,7 +160,10 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
     let filter = options.kalman_fmu.as_ref().map(|_| models::default_fmu(models::FILTER));
     let filter = filter.transpose()?;
-    check_distinct(&inputs(options, from.as_deref(), None), &outputs)?;
+    let mut inputs: Vec<(&str, &Path)> = vec![("the plant file", &options.plant)];
+    inputs.extend(from.as_deref().map(|path| ("--from", path)));
+    inputs.extend(filter.as_deref().map(|path| ("the packed Kalman filter", path)));
+    check_distinct(&inputs, &outputs)?;
     options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let mut design = {
         let progress = Reporter::new();
@@ -173,15 +175,14 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         design::design_within(&options.plant, &limits, &|step| progress.show(step))?
     };
     let code = code(options, &design)?;
-    for (option, path, _) in &code.files {
-        outputs.push((option, path));
-    }
-    check_distinct(&inputs(options, from.as_deref(), design.model.as_deref()), &outputs)?;
+    outputs.extend(code.files.iter().map(|file| (file.option, file.path.as_path())));
+    inputs.extend(design.model.as_deref().map(|path| ("the plant's FMU", path)));
+    check_distinct(&inputs, &outputs)?;
     if !options.force {
         for (_, path) in
-            outputs.iter().filter(|(_, path)| !code.has_runtime(path, &design.identity))
+            outputs.iter().filter(|(_, path)| !code.is_runtime(path, &design.identity))
         {
-            check_own(path, &design.identity)?;
+            check_identity(path, &design.identity)?;
         }
     }
     let mut fmus = Vec::new();
@@ -201,8 +202,8 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     for (path, fmu) in fmus {
         staged.stage(path, |path| fmu.write(path, &page))?;
     }
-    for (_, path, text) in &code.files {
-        staged.stage(path, |path| fs::write(path, text))?;
+    for file in &code.files {
+        staged.stage(&file.path, |path| fs::write(path, &file.text))?;
     }
     if let Some(path) = &options.worst_case {
         let text = design.worst_case.as_ref();
@@ -227,18 +228,25 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     Ok(design.holds())
 }
 
-/// The source code of the controller: the option that asks for each file, its path, its content.
+/// The source code of the controller.
 #[derive(Default)]
 struct CodeFiles {
-    files: Vec<(&'static str, PathBuf, String)>,
+    files: Vec<CodeFile>,
     warnings: Vec<String>,
 }
 
+struct CodeFile {
+    /// The option that requests the file.
+    option: &'static str,
+    path: PathBuf,
+    text: String,
+}
+
 impl CodeFiles {
-    /// Whether at `path` is a file that is the same for each design, and so does not name the `identity` of one: its first
-    /// line says what it is.
-    fn has_runtime(&self, path: &Path, identity: &str) -> bool {
-        let text = self.files.iter().find(|(_, file, _)| file == path).map(|(.., text)| text);
+    /// Whether the file at `path` is a runtime file, which is the same for every design and does not contain the
+    /// `identity` of one. Such a file starts with the first line of the runtime file that is written.
+    fn is_runtime(&self, path: &Path, identity: &str) -> bool {
+        let text = self.files.iter().find(|file| file.path == path).map(|file| &file.text);
         let start =
             text.filter(|text| !text.contains(identity)).and_then(|text| text.lines().next());
         start
@@ -246,6 +254,7 @@ impl CodeFiles {
     }
 }
 
+/// Returns the source code in the requested languages; no files if none is requested.
 fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {
     let precision = if options.float { Precision::Single } else { Precision::Double };
     let mut all = CodeFiles::default();
@@ -256,14 +265,14 @@ fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {
         let code = design
             .code(language, precision)
             .with_context(|| format!("{option}: no code for {}", options.plant.display()))?;
-        let files = code.files.into_iter();
-        all.files.extend(files.map(|(path, text)| (option, folder.join(path), text)));
+        let file = |(path, text)| CodeFile { option, path: folder.join(path), text };
+        all.files.extend(code.files.into_iter().map(file));
         all.warnings = code.warnings;
     }
     Ok(all)
 }
 
-/// Writes a plant file for an FMU, for matrices or for logs.
+/// Writes a plant file for an FMU, for matrices or for logs; prints its warnings and its path.
 fn init(options: &Options) -> anyhow::Result<()> {
     let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
     let out = options.out.clone().unwrap_or_else(|| format!("{stem}.toml").into());
@@ -306,12 +315,14 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     let page = || PathBuf::from(format!("{stem}-comparison.html"));
     let path = options.report.clone().unwrap_or_else(page);
     let outputs = [("--report", path.as_path())];
-    check_distinct(&inputs(options, None, None), &outputs)?;
+    let mut inputs: Vec<(&str, &Path)> = vec![("the plant file", &options.plant)];
+    check_distinct(&inputs, &outputs)?;
     options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let comparison = design::compare(&options.plant)?;
-    check_distinct(&inputs(options, None, comparison.model.as_deref()), &outputs)?;
+    inputs.extend(comparison.model.as_deref().map(|path| ("the plant's FMU", path)));
+    check_distinct(&inputs, &outputs)?;
     if !options.force {
-        check_own(&path, &comparison.identity)?;
+        check_identity(&path, &comparison.identity)?;
     }
     let text = design::comparison_page(&comparison);
     let mut staged = Outputs::default();
@@ -326,12 +337,11 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints a value as JSON; an error says `what` it is.
+/// Prints a value, which an error calls `what`, as JSON.
 fn print_json(value: &impl Serialize, what: &str) -> anyhow::Result<()> {
-    let mut output = std::io::stdout().lock();
-    let printed = serde_json::to_writer_pretty(&mut output, value);
-    printed.with_context(|| format!("cannot print {what}"))?;
-    Ok(writeln!(output)?)
+    let text = serde_json::to_string_pretty(value);
+    println!("{}", text.with_context(|| format!("cannot print {what}"))?);
+    Ok(())
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
@@ -339,8 +349,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
     seconds.ok_or_else(|| format!("expected a time in s, 0 or more, found {text}"))
 }
 
-/// The paths of design and report.
-fn names(options: &Options) -> (PathBuf, PathBuf) {
+/// Returns the paths of design file and report.
+fn output_paths(options: &Options) -> (PathBuf, PathBuf) {
     let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
     let out = options.out.clone().unwrap_or_else(|| format!("{stem}-design.toml").into());
     let beside = || out.parent().unwrap_or(Path::new("")).join(format!("{stem}-report.html"));
@@ -348,21 +358,8 @@ fn names(options: &Options) -> (PathBuf, PathBuf) {
     (out, report)
 }
 
-/// The files that the command reads: the plant file, the FMU `from` which the controller is made, and
-/// the plant's FMU.
-fn inputs<'a>(
-    options: &'a Options,
-    from: Option<&'a Path>,
-    model: Option<&'a Path>,
-) -> Vec<(&'a str, &'a Path)> {
-    let mut all: Vec<(&str, &Path)> = vec![("the plant file", &options.plant)];
-    all.extend(from.map(|path| ("--from", path)));
-    all.extend(model.map(|path| ("the plant's FMU", path)));
-    all
-}
-
 impl Options {
-    /// Returns the FMU from which the controller FMUs are made, if one is requested.
+    /// Returns the FMU from which the controller FMUs are made; `None` if no controller FMU is requested.
     fn from(&self) -> anyhow::Result<Option<PathBuf>> {
         let default = || models::default_fmu(models::FMUS[1].1);
         let path = || self.from.clone().map_or_else(default, Ok);

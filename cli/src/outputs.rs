@@ -1,4 +1,4 @@
-//! The files that a command writes: over the files of others only on request, all or none.
+//! Writes the files of a command, all or none, and finds out whether an existing file is of the same design or results.
 
 use std::ffi::OsString;
 use std::io::Read as _;
@@ -23,7 +23,8 @@ struct Staged {
 }
 
 impl Outputs {
-    /// Adds a file, whose content `write` puts at the path that it is given.
+    /// Adds a file: creates its folder, and calls `write` with the temporary path for its content. Returns an error if
+    /// `path` is a folder or if the content cannot be written.
     pub(crate) fn stage<E: Into<anyhow::Error>>(
         &mut self,
         path: &Path,
@@ -41,21 +42,21 @@ impl Outputs {
         write(&partial).map_err(Into::into).with_context(unwritten)
     }
 
-    /// Gives all files their names. If one cannot have its name, the files that were there before
-    /// get theirs back.
+    /// Renames all files to their paths. If one cannot be renamed, restores the former files and returns an error.
     pub(crate) fn commit(mut self) -> anyhow::Result<()> {
-        let mut done: Vec<Replaced> = Vec::new();
+        let mut replacements: Vec<Replacement> = Vec::new();
         for Staged { partial, path } in &self.files {
-            match Replaced::new(partial, path) {
-                Ok(replaced) => done.push(replaced),
+            match Replacement::new(partial, path) {
+                Ok(replacement) => replacements.push(replacement),
                 Err(error) => {
-                    let new: String = done.into_iter().rev().filter_map(Replaced::undo).collect();
+                    let replacements = replacements.into_iter().rev();
+                    let new: String = replacements.filter_map(Replacement::undo).collect();
                     bail!("cannot write {}: {error}{new}", path.display());
                 }
             }
         }
-        for Replaced { before, .. } in done {
-            let _ = before.map(fs::remove_file);
+        for Replacement { former, .. } in replacements {
+            let _ = former.map(fs::remove_file);
         }
         self.files.clear();
         Ok(())
@@ -71,53 +72,61 @@ impl Drop for Outputs {
     }
 }
 
-/// A file with new content, and the temporary name of the file that was there before.
-struct Replaced {
+/// A file with new content, and the temporary name of the former file, if there was one.
+struct Replacement {
     path: PathBuf,
-    before: Option<PathBuf>,
+    former: Option<PathBuf>,
 }
 
-impl Replaced {
-    /// Renames `partial` to `path`, under which there is a complete file at every instant.
+impl Replacement {
+    /// Renames `partial` to `path`; an existing file is complete at every instant.
     fn new(partial: &Path, path: &Path) -> io::Result<Self> {
-        let replaced = Self { path: path.to_owned(), before: second_name(path)? };
+        let replacement = Self { path: path.to_owned(), former: second_name(path)? };
         fs::rename(partial, path).inspect_err(|_| {
-            let _ = replaced.before.as_ref().map(fs::remove_file);
+            let _ = replacement.former.as_ref().map(fs::remove_file);
         })?;
-        Ok(replaced)
+        Ok(replacement)
     }
 
-    /// Gives the former file its name back; if that fails, returns the end of a sentence about it.
+    /// Restores the former file, or removes the new one if there was none; if that fails, returns the end of a sentence
+    /// about it.
     fn undo(self) -> Option<String> {
-        let Self { path, before } = self;
-        let undone = match &before {
-            Some(before) => fs::rename(before, &path),
+        let Self { path, former } = self;
+        let undone = match &former {
+            Some(former) => fs::rename(former, &path),
             None => fs::remove_file(&path),
         };
-        let before =
-            before.map(|before| format!(", its former content is in {}", before.display()));
-        undone.err().map(|_| format!("; {} is new{}", path.display(), before.unwrap_or_default()))
+        let former =
+            former.map(|former| format!(", its former content is in {}", former.display()));
+        undone.err().map(|_| format!("; {} is new{}", path.display(), former.unwrap_or_default()))
     }
 }
 
-/// Gives the file at `path`, if there is one, a second, temporary name: a link, or a copy where the
-/// file system has no links.
+/// Gives the file at `path` a second, temporary name, by a link, or by a copy where the file system has no links;
+/// `None` if there is no file.
 fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
-    let before = beside(path, "old");
-    match fs::hard_link(path, &before) {
-        Ok(()) => Ok(Some(before)),
+    let mut former = beside(path, "old");
+    // A killed process with the same number may have left such a name, which may be a link to this file.
+    for number in 2.. {
+        if former.symlink_metadata().is_err() {
+            break;
+        }
+        former = beside(path, &format!("old{number}"));
+    }
+    match fs::hard_link(path, &former) {
+        Ok(()) => Ok(Some(former)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(_) => match fs::copy(path, &before) {
-            Ok(_) => Ok(Some(before)),
+        Err(_) => match fs::copy(path, &former) {
+            Ok(_) => Ok(Some(former)),
             Err(error) => {
-                let _ = fs::remove_file(&before);
+                let _ = fs::remove_file(&former);
                 Err(error)
             }
         },
     }
 }
 
-/// A temporary name in the same folder, with the same extension.
+/// Returns a temporary path in the same folder, with the same extension, the number of this process and `mark`.
 fn beside(path: &Path, mark: &str) -> PathBuf {
     let mut name: OsString = path.file_stem().unwrap_or_default().to_owned();
     name.push(format!(".{}.{mark}", process::id()));
@@ -128,8 +137,9 @@ fn beside(path: &Path, mark: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Checks that an output does not exist, or contains `identity`.
-pub(crate) fn check_own(path: &Path, identity: &str) -> anyhow::Result<()> {
+/// Checks that the output `path` may be overwritten: it does not exist, or `identity` is in its first [`HEAD`] bytes or
+/// in the design in an FMU. A folder or a file that cannot be read is an error.
+pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> {
     let mut head = Vec::new();
     let file = match fs::File::open(path) {
         Ok(file) => file,
@@ -146,15 +156,43 @@ pub(crate) fn check_own(path: &Path, identity: &str) -> anyhow::Result<()> {
     }
     file.take(HEAD).read_to_end(&mut head)?;
     let head = String::from_utf8_lossy(&head);
-    if head.contains(identity) || in_archive(path).is_some_and(|text| text.contains(identity)) {
+    if head.contains(identity) || design_in_fmu(path).is_some_and(|text| text.contains(identity)) {
         return Ok(());
     }
     bail!("{} exists and was not written by {identity}; --force overwrites it", path.display())
 }
 
-/// The design in an FMU.
-fn in_archive(path: &Path) -> Option<String> {
+/// Returns the text of the design, or of the Kalman filter, in the resources of an FMU; `None` for other files.
+fn design_in_fmu(path: &Path) -> Option<String> {
     let unpacked = fmu_description::package::Unpacked::open_whole(path).ok()?;
     let names = ["design.toml", "filter.toml"];
     names.iter().find_map(|name| fs::read_to_string(unpacked.resources().join(name)).ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_name_that_a_killed_process_left_neither_empties_nor_replaces_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = ["a.toml", "b.toml"].map(|name| folder.path().join(name));
+        fs::write(&first, "former").unwrap();
+        let left = beside(&first, "old");
+        fs::hard_link(&first, &left).unwrap();
+        let mut outputs = Outputs::default();
+        for path in [&first, &second] {
+            outputs.stage(path, |path| fs::write(path, "new")).unwrap();
+        }
+        fs::create_dir(&second).unwrap();
+        outputs.commit().unwrap_err();
+        for path in [&first, &left] {
+            assert_eq!(fs::read_to_string(path).unwrap(), "former");
+        }
+        let mut outputs = Outputs::default();
+        outputs.stage(&first, |path| fs::write(path, "new")).unwrap();
+        outputs.commit().unwrap();
+        assert_eq!(fs::read_to_string(&first).unwrap(), "new");
+        assert_eq!(fs::read_to_string(&left).unwrap(), "former");
+    }
 }

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
 use files::check_distinct;
 use fmu_description::number::seconds;
 use report::{Comparison, Request, identity};
 
-use crate::outputs::check_own;
+use crate::outputs::check_identity;
 
-/// Largest number of names in a line.
+/// Largest number of names in a line about what was not compared.
 const LISTED: usize = 20;
 
 #[derive(clap::Args)]
@@ -48,7 +48,7 @@ pub(crate) struct Options {
     force: bool,
 }
 
-/// Writes the page, and prints the largest difference if there is a second file.
+/// Writes the page and prints its name; with a second file, also prints the largest difference.
 pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     let out = options.out.clone().unwrap_or_else(|| options.results.with_extension("html"));
     let ending = out.extension().unwrap_or_default().to_ascii_lowercase();
@@ -60,7 +60,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     inputs.extend(options.bus_trace.as_deref().map(|path| ("--bus-trace", path)));
     check_distinct(&inputs, &[("--out", &out)])?;
     if !options.force {
-        check_own(&out, &identity(&options.results))?;
+        check_identity(&out, &identity(&options.results))?;
     }
     let page = report::page(&Request {
         results: &options.results,
@@ -72,13 +72,13 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
         run: None,
     })?;
     if let (Some(comparison), Some(other)) = (&page.comparison, &options.against) {
-        compared(comparison, &options.results, other);
+        print_comparison(comparison, &options.results, other);
     }
     write(&out, &page.html)
 }
 
-/// Prints the largest difference, and what was not compared.
-fn compared(comparison: &Comparison, results: &Path, other: &Path) {
+/// Prints the largest difference relative to the range, or that there is none, and what was not compared.
+fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
     if let Some(largest) = comparison.differences.first().filter(|_| !comparison.is_equal()) {
         println!(
@@ -98,13 +98,13 @@ fn compared(comparison: &Comparison, results: &Path, other: &Path) {
     }
 }
 
+/// Formats a number of things, with an `s` for the plural.
 fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Writes a page and prints its name.
-pub(crate) fn write(out: &Path, html: &str) -> anyhow::Result<()> {
-    use anyhow::Context as _;
+/// Writes a page, in a folder that is created if necessary, and prints its name.
+fn write(out: &Path, html: &str) -> anyhow::Result<()> {
     let unwritten = || format!("cannot write {}", out.display());
     if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).with_context(unwritten)?;
