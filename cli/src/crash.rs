@@ -6,13 +6,14 @@ use fmu_import::crash::{self, Cause, Ending};
 
 use crate::{logging, run};
 
-/// Exit status after the first step (1) and before it (2).
+/// Exit status of a run that an FMU ended after the start of the first step, or whose results are damaged.
 pub(crate) const LOST: u8 = 1;
+/// Exit status of a run that an FMU ended before the first step.
 pub(crate) const NOT_STARTED: u8 = 2;
 pub(crate) const ADVICE: &str = "with --isolate each FMU runs in a separate process, and its crash is an error of \
                       the run";
 
-/// Installs the handler, which reports the end and keeps the results so far.
+/// Installs the handler, which reports the end and keeps the results so far; warns if that is not possible.
 pub(crate) fn watch() {
     if let Err(error) = crash::watch(ADVICE, logging::use_memory_of_thread, end) {
         tracing::warn!("crashes of FMUs cannot be reported: {error}");

@@ -32,7 +32,7 @@ pub(crate) fn completions(options: &CompletionOptions, mut command: clap::Comman
     print!("{}", String::from_utf8_lossy(&script).replace(&escaped[0], &escaped[1]));
 }
 
-/// Writes the manual pages of `command` and its verbs, or prints that of `command`.
+/// Writes the manual pages of `command` and its verbs into the folder `--out`; without it, prints that of `command`.
 pub(crate) fn man(options: &ManOptions, command: clap::Command) -> anyhow::Result<()> {
     let pages = pages(command)?;
     let Some(folder) = &options.out else {
@@ -48,7 +48,7 @@ pub(crate) fn man(options: &ManOptions, command: clap::Command) -> anyhow::Resul
     Ok(())
 }
 
-/// Returns the manual pages with their file names: that of `command`, then those of its verbs.
+/// Returns file name and text of the manual pages: first of `command`, then of its verbs that are not hidden.
 fn pages(command: clap::Command) -> std::io::Result<Vec<(String, String)>> {
     let mut command = command.disable_help_subcommand(true);
     command.build();
@@ -66,7 +66,8 @@ fn page(command: &clap::Command) -> std::io::Result<(String, String)> {
     Ok((man.get_filename(), page.trim_end().to_owned() + &section(&examples)))
 }
 
-/// Returns a text that ends a help, `Title:` and lines, as a section whose lines are kept.
+/// Converts the end of a help text, `Title:` and lines, to a section of a manual page that keeps the lines; another
+/// text to an empty line.
 fn section(text: &str) -> String {
     let Some((title, lines)) = text.split_once(":\n") else { return "\n".to_owned() };
     let lines = lines.replace('\\', r"\e").replace('-', r"\-");

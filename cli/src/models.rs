@@ -1,10 +1,10 @@
-//! Where the FMUs of the paper are: packed from a clone of this project, or beside the command.
+//! Finds the FMUs of the paper, in a clone of this project or beside the command, and their crates.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
-/// The FMUs of the paper, by the names that the instances get.
+/// The FMUs of the paper: the name of the instance, and the file.
 pub(crate) const FMUS: [(&str, &str); 2] =
     [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")];
 
@@ -14,15 +14,15 @@ pub(crate) const FILTER: &str = "KalmanFilter.fmu";
 /// The folder into which FMUs are packed if no other is stated.
 const DIST: &str = "dist";
 
-/// Folders in which an installed command searches the FMUs, from its own folder: in a folder of a
-/// release, below the prefix of an installation, in the Python package.
+/// Folders, relative to that of the command, in which it searches the FMUs: in the folder of a release, below the
+/// prefix of an installation, in the Python package.
 const BESIDE: [&str; 3] = ["fmus", "../share/aso-ftc/fmus", "../fmus"];
 
-/// The crates of the FMUs.
+/// The crates of [`FMUS`], in the same order.
 pub(crate) const CRATES: [&str; 2] = ["fmu-plant", "fmu-controller"];
 
-/// Returns the path of an FMU that is not stated: the one in `dist`, beside the command, or in `dist` of
-/// the clone that the command was built in.
+/// Returns the path of the FMU `name`: the first that exists in `dist`, in the folder of [`beside`], or in `dist` of
+/// the clone that the command was built in. Without one, returns an error that says how to pack it.
 pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
     let packed = Path::new(DIST).join(name);
     let others = [beside(), built_in().map(|root| root.join(DIST))].into_iter().flatten();
@@ -38,7 +38,7 @@ pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// Returns the clone of this project that the current folder is in or, failing that, the one that the
-/// command was built in.
+/// command was built in, which it prints. Returns an error if there is neither.
 pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     if let Some(root) = clone_upwards()? {
         return Ok(root);
@@ -56,12 +56,12 @@ pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     )
 }
 
-/// Returns the clone that the command was built in, if it is still there.
+/// Returns the clone that the command was built in, if it still exists.
 fn built_in() -> Option<PathBuf> {
     option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|folder| is_clone(folder))
 }
 
-/// Returns the clone of this project that the current folder is in.
+/// Returns the clone of this project that the current folder is in; `None` outside of a clone.
 pub(crate) fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
     let here = std::env::current_dir().context("the current folder")?;
     Ok(here.ancestors().find(|folder| is_clone(folder)).map(Path::to_path_buf))
@@ -71,12 +71,11 @@ fn is_clone(folder: &Path) -> bool {
     CRATES.iter().all(|model| folder.join(model).join("Cargo.toml").is_file())
 }
 
-/// Returns the folder with the FMUs beside the command.
+/// Returns the first of the folders [`BESIDE`] that has both FMUs of the paper; `None` if none has.
 pub(crate) fn beside() -> Option<PathBuf> {
     let command = std::env::current_exe().ok()?;
     let command = command.canonicalize().ok()?;
     let parent = command.parent()?;
-    let folders = BESIDE.map(|folder| parent.join(folder));
     let has_fmus = |folder: &PathBuf| FMUS.iter().all(|(_, name)| folder.join(name).is_file());
-    folders.into_iter().find(has_fmus)
+    BESIDE.map(|folder| parent.join(folder)).into_iter().find(has_fmus)
 }

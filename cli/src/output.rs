@@ -1,5 +1,5 @@
 //! Prints to standard output and standard error. If a reader has closed one of them, as `| head` does,
-//! the command continues without output; if it fails, as on a full disk, the exit status says so.
+//! the command continues without output; after another error, as of a full disk, the exit status is not 0.
 //!
 //! The macros replace those of the standard library, which panic in this case. The words `error:` and
 //! `warning:` at the start of a text have the colours of clap's errors, unless the stream is no
@@ -29,13 +29,13 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::output::error(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// The words that have a colour at the start of a text.
+/// The words that have a colour at the start of a text, with their styles.
 const WORDS: [(&str, Style); 2] = [
     ("error:", AnsiColor::Red.on_default().bold()),
     ("warning:", AnsiColor::Yellow.on_default().bold()),
 ];
 
-/// The first error of standard output or standard error, if it was not closed by its reader.
+/// The first error of standard output or standard error, other than that its reader closed it; [`finish`] takes it.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
 fn note(done: io::Result<()>) {
@@ -46,7 +46,8 @@ fn note(done: io::Result<()>) {
     }
 }
 
-/// Parses the arguments of the command; prints help, or what is wrong with them.
+/// Parses the arguments of the command. If they are wrong or request help, prints that, and returns the exit status as
+/// an error.
 pub(crate) fn parse<P: clap::Parser>() -> Result<P, u8> {
     P::try_parse().map_err(|error| {
         note(error.print());
@@ -54,13 +55,14 @@ pub(crate) fn parse<P: clap::Parser>() -> Result<P, u8> {
     })
 }
 
-/// Returns the exit status of the command: not 0 if a part of what it printed is lost.
+/// Returns the exit status of the command: `status`, or 1 in place of 0 if a part of what it printed is lost, which
+/// this function reports.
 pub(crate) fn finish(status: u8) -> u8 {
     note(io::stdout().flush());
-    let Some(failed) = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take() else {
+    let Some(error) = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take() else {
         return status;
     };
-    eprintln!("error: the output is not complete: {failed}");
+    eprintln!("error: the output is not complete: {error}");
     status.max(1)
 }
 
@@ -76,16 +78,16 @@ pub(crate) fn error(text: Arguments<'_>) {
     write(io::stderr(), &CHOICE, &text.to_string());
 }
 
-/// Writes `text` with colours, or without them, as `choice` says; it is made when the first text is
-/// written, because the environment cannot be read while a crash is handled.
+/// Writes `text` with or without colours. The first call decides that and keeps it in `choice`, because the environment
+/// cannot be read while a crash is handled.
 fn write(stream: impl RawStream + AsLockedWrite, choice: &OnceLock<ColorChoice>, text: &str) {
     let choice = choice.get_or_init(|| AutoStream::choice(&stream));
     note(AutoStream::new(stream, *choice).write_all(coloured(text).as_bytes()));
 }
 
 fn coloured(text: &str) -> String {
-    let start = |(word, style)| Some((word, style, text.strip_prefix(word)?));
-    match WORDS.into_iter().find_map(start) {
+    let split = |(word, style)| Some((word, style, text.strip_prefix(word)?));
+    match WORDS.into_iter().find_map(split) {
         Some((word, style, rest)) => format!("{style}{word}{style:#}{rest}"),
         None => text.to_owned(),
     }

@@ -7,13 +7,13 @@ use results::{Column, ColumnKind, Selection, Table};
 
 use figure::{Figure, Ink, Panel, Series, rasterise};
 
-/// Colours of the curves in a panel; their number is the largest number of curves.
+/// Colours of the curves in a panel; their number is the largest number of curves in a panel.
 const INKS: [Ink; 7] =
     [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
 /// Largest number of curves in a picture.
 const CURVES: usize = 64;
 
-/// A variable with its points.
+/// A variable with the points of its curve.
 struct Curve {
     label: String,
     unit: Option<String>,
@@ -21,15 +21,16 @@ struct Curve {
     values: Vec<f64>,
 }
 
-/// Draws variables of a results file, selected by name or pattern, over time: one panel for each
-/// unit. The extension of `out`, `.svg` or `.png`, selects the format. The memory used does not
-/// depend on the length of the file. `unit` returns the unit of a variable for files without units,
-/// such as CSV.
+/// Draws variables of a results file, selected by name or pattern, over time: one panel for up to seven
+/// variables with the same unit. The extension of `out`, `.svg` or `.png`, selects the format. The memory
+/// used does not depend on the length of the file. `unit` returns the unit of a variable for files without
+/// units, such as CSV.
 ///
 /// # Errors
 ///
-/// Returns an error if the extension is another one, if a name is not in the file, if a variable is
-/// a text, or if a file cannot be read or written.
+/// Returns an error if the extension is another one, if a name is not in the file, if a variable that is
+/// named is a text, if no variable or more than [`CURVES`] are selected, or if a file cannot be read or
+/// written.
 pub(crate) fn plot_with_units(
     results: &Path,
     variables: &[String],
@@ -45,7 +46,7 @@ pub(crate) fn plot_with_units(
     files::whole::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
 }
 
-/// Reads the curves.
+/// Reads the curves of the selected variables.
 fn curves(
     results: &Path,
     variables: &[String],
@@ -54,7 +55,7 @@ fn curves(
     let table = Table::open(results)?;
     let selection = Selection { include: variables.to_vec(), exclude: Vec::new() };
     let mut positions = table.choose(&selection)?;
-    // A pattern matches only variables that can be drawn.
+    // A pattern selects only variables that can be drawn, a name selects any variable.
     positions.retain(|position| {
         let column = &table.columns()[*position];
         let drawable = *position != table.time() && column.kind != ColumnKind::String;
@@ -83,7 +84,7 @@ fn stepwise(column: &Column) -> bool {
     matches!(column.kind, ColumnKind::Integer | ColumnKind::Boolean)
 }
 
-/// Converts samples to a staircase: each value holds until the next one.
+/// Converts samples to a staircase: each value is constant until the time of the next one, the last one is a point.
 fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let ends = time.iter().skip(1).chain(time.last());
     let steps = time.iter().zip(ends).zip(values);

@@ -11,8 +11,8 @@ pub(crate) enum Scenario {
     PrintedGains,
 }
 
-/// The L printed after equation (21), in thousands, row by row, with the signs of `L[3,2]` and
-/// `L[4,2]` reversed: as printed it makes A_0 - L C_0 unstable.
+/// The L printed after equation (21), in units of 1000, row by row, with the signs of `L[3,2]` and
+/// `L[4,2]` reversed: with the printed signs, A_0 - L C_0 is unstable.
 const PRINTED_L: [[f64; 2]; 5] =
     [[0.0380, -0.0048], [-0.0038, 0.0518], [0.3792, 0.1690], [-0.1297, 0.8841], [-3.3432, 0.8941]];
 
@@ -48,7 +48,7 @@ impl Scenario {
     }
 }
 
-/// Returns the printed gains. The paper prints `col(L_x, L_f)`, so the last row is L_f as in (5).
+/// Returns the settings of the printed gains. The paper prints `col(L_x, L_f)`, so the last row is L_f as in (5).
 fn printed_gains() -> Vec<(String, String)> {
     let mut settings = Vec::new();
     for (row, entries) in PRINTED_L.iter().enumerate() {

@@ -26,8 +26,9 @@ pub(crate) struct Summary<'a> {
     pub(crate) communication_step: f64,
     /// Stop time in s.
     pub(crate) stop_time: f64,
-    /// Time reached in s, and the reason if it is not the stop time.
+    /// Time reached in s.
     pub(crate) reached: f64,
+    /// The reason if the run failed or an FMU requested the end; none at the stop time and after a signal.
     pub(crate) lost: Option<&'a str>,
     /// Time in s at which the pendulum passed the horizontal.
     pub(crate) fell: Option<f64>,
@@ -75,6 +76,7 @@ struct Numbers {
     residual: f64,
     delta: f64,
     note: &'static str,
+    /// The rank, and the rank that is necessary.
     controllability_rank: [usize; 2],
     observability_rank: [usize; 2],
 }
@@ -135,7 +137,8 @@ fn numbers(certificate: &Certificate) -> Numbers {
     }
 }
 
-/// Reads the matrix parameter `name` of the controller, with elements `name[i,j]`.
+/// Reads the matrix parameter `name` of the controller, whose elements are the real variables `name[i,j]`. The first
+/// row and the first column state its size; an element that is missing then is an error.
 fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> {
     let slave = system.port(&format!("controller.{name}[1,1]"))?.slave;
     let description = system.slaves[slave].1.description();
@@ -163,7 +166,7 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
     Ok(DMatrix::from_row_slice(row_count, column_count, &values))
 }
 
-/// Writes `value` as JSON to `path`, atomically.
+/// Writes `value` as JSON to `path`, completely or not at all.
 pub(crate) fn write(value: &impl Serialize, path: &Path) -> anyhow::Result<()> {
     let text = serde_json::to_vec_pretty(value)?;
     files::whole::write(path, &text).with_context(|| format!("cannot write {}", path.display()))

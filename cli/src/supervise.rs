@@ -8,8 +8,8 @@ use fmu_import::supervise::{self, End, Ended};
 use crate::crash::{ADVICE, LOST, NOT_STARTED};
 use crate::run;
 
-/// Splits the command into two processes. Returns the exit status in the one that supervises, and `None` in the
-/// one that shall do the run.
+/// Splits the command into two processes. Returns the exit status in the process that supervises, and `None` in the
+/// process that does the run; with `--in-process`, or if the split fails, there is only the latter.
 pub(crate) fn supervise(options: &run::Options) -> Option<ExitCode> {
     if options.is_in_process() {
         return None;
@@ -31,31 +31,37 @@ pub(crate) fn supervise(options: &run::Options) -> Option<ExitCode> {
     }
 }
 
-/// Returns the exit status of the command, reports what the process of the run did not report, and completes
-/// the results.
+/// Returns the exit status of the command. Reports what the process of the run did not report: an unexpected end and,
+/// unless the process chose a status other than 0, the results file, which this function completes.
 fn judge(ended: &Ended) -> u8 {
     let status = judge_end(ended);
-    if ended.end != ended.status.map_or(End::Stuck, |status| End::Exited(status.into())) {
+    if !has_chosen_end(ended) {
         fmu_description::package::remove_abandoned_folders();
     }
-    let reported = ended.status.is_some_and(|status| status != 0);
-    let left = supervise::memory().filter(|_| !reported).and_then(results::ledger::complete);
-    let Some(left) = left else { return status };
-    let path = left.path.display();
-    if let Some(damage) = left.damage {
+    let has_reported = ended.status.is_some_and(|status| status != 0);
+    let file = supervise::memory().filter(|_| !has_reported).and_then(results::ledger::complete);
+    let Some(file) = file else { return status };
+    let path = file.path.display();
+    if let Some(damage) = file.damage {
         tracing::error!("{path}: {damage}; with --isolate no FMU reaches the files of the run");
         return status.max(LOST);
     }
-    if !left.was_complete {
+    if !file.was_complete {
         tracing::error!("the results up to this step are in {path}");
     }
     status
 }
 
+/// Whether the process ended by the exit status that the program chose, after it removed its temporary folders.
+fn has_chosen_end(ended: &Ended) -> bool {
+    ended.status.is_some_and(|status| ended.end == End::Exited(status.into()))
+}
+
+/// Returns the exit status for the end of the process, and reports an end that the program did not choose.
 fn judge_end(ended: &Ended) -> u8 {
     let end = ended.end;
     match (ended.status, end) {
-        (Some(status), End::Exited(exited)) if exited == i32::from(status) => status,
+        (Some(status), _) if has_chosen_end(ended) => status,
         (Some(status), _) => {
             tracing::error!(
                 "after the end of the run, something that an FMU has left in the process (an exit handler, a \
@@ -81,7 +87,7 @@ fn judge_end(ended: &Ended) -> u8 {
     }
 }
 
-/// The calls that had not returned.
+/// Lists the calls that had not returned; without one, names the code outside of the calls.
 fn calls(ended: &Ended) -> String {
     if ended.calls.is_empty() {
         return "outside of the calls of FMUs the program or a thread of an FMU".to_owned();
@@ -92,3 +98,23 @@ fn calls(ended: &Ended) -> String {
 
 /// SIGKILL, SIGTERM, SIGINT.
 const FROM_OUTSIDE: [i32; 3] = [9, 15, 2];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn temporary_folders_remain_after_each_end_that_the_program_did_not_choose() {
+        for (end, status, is_chosen) in [
+            (End::Exited(1), Some(1), true),
+            (End::Exited(3), Some(1), false),
+            (End::Exited(3), None, false),
+            (End::Killed(11), Some(0), false),
+            (End::Stuck, Some(0), false),
+            (End::Stuck, None, false),
+        ] {
+            let ended = Ended { end, status, calls: Vec::new(), has_begun_steps: true };
+            assert_eq!(has_chosen_end(&ended), is_chosen, "{ended:?}");
+        }
+    }
+}

@@ -1,4 +1,5 @@
-//! Ctrl-C during a design: the first one leaves out what can be left out, a second one ends the command.
+//! Signals during a design: the first Ctrl-C leaves out the rest of the optional work; a second one, or another signal
+//! that ends programs, ends the command at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -8,7 +9,7 @@ use fmu_import::crash;
 
 use crate::signals::{INTERRUPT, on_signal};
 
-/// Starts to listen; returns the flag that the first Ctrl-C sets.
+/// Starts to handle signals; returns the flag that the first Ctrl-C sets. A second call returns the same flag.
 pub(super) fn listen() -> anyhow::Result<Arc<AtomicBool>> {
     static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
     if let Some(flag) = FLAG.get() {
