@@ -1,4 +1,4 @@
-//! `aso-ftc check`: finds faults of an FMU that importers run into.
+//! `aso-ftc check`: finds faults of an FMU that cause problems in importers.
 
 mod answer;
 mod archive;
@@ -75,8 +75,8 @@ struct Report<'a> {
 /// Prints whether the FMU runs, and the findings; returns true if no finding is an error.
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     let unpacked = Unpacked::open_whole(&options.fmu)?;
-    let (here, findings) = findings(options, &unpacked)?;
-    let answer = Answer::new(here, &unpacked.description, &findings);
+    let (result, findings) = findings(options, &unpacked)?;
+    let answer = Answer::new(result, &unpacked.description, &findings);
     let count = |severity| findings.iter().filter(|finding| finding.severity == severity).count();
     let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
     let notes = count(Severity::Note);
@@ -100,8 +100,8 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     Ok(errors == 0)
 }
 
-/// Returns the result of the trial, and all findings: errors first, starting with those that stop a
-/// tool.
+/// Returns the result of the trial, and all findings, sorted by severity, errors first; of each severity, findings that
+/// stop a tool come first.
 fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
@@ -113,12 +113,12 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
     let compiled = compiled.filter(|path| *path != options.fmu);
     let compiled = compiled.map(|path| Unpacked::open(&path)).transpose()?;
     let unpacked = compiled.as_ref().unwrap_or(unpacked);
-    let here = if let Some(here) = without_trial(options, unpacked) {
-        here
+    let result = if let Some(result) = without_trial(options, unpacked) {
+        result
     } else {
-        let (mut here, mut trial_findings) = run(options, unpacked)?;
+        let (mut result, mut trial_findings) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
-        if let TrialResult::No { reason } = &mut here {
+        if let TrialResult::No { reason } = &mut result {
             *reason = sections::renamed(&reason.replace(&folder, ""), description.version());
         }
         let version = description.version();
@@ -128,13 +128,13 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
         }
         sections::renumber(&mut trial_findings, version);
         findings.extend(trial_findings);
-        here
+        result
     };
     findings.sort_by_key(|finding| (finding.severity, finding.stops.is_empty(), finding.part));
-    Ok((here, findings))
+    Ok((result, findings))
 }
 
-/// Returns the result if the FMU is not run.
+/// Returns the result for an FMU that cannot or shall not be run; `None` if it is to be run.
 fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> {
     let not_tried = |reason: String| Some(TrialResult::NotTried { reason });
     if options.no_run {
@@ -151,10 +151,10 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     if !is_simulation && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only".to_owned());
     }
-    // With its libraries, an FMU of PythonFMU needs nothing beside it.
+    // An FMU of PythonFMU states that it needs a tool, but its libraries are enough.
     let is_python = |tool: &str| tool.starts_with("PythonFMU");
-    let alone = description.generation_tool.as_deref().is_some_and(is_python);
-    if needs_tool && !alone && options.preload.is_empty() {
+    let is_complete = description.generation_tool.as_deref().is_some_and(is_python);
+    if needs_tool && !is_complete && options.preload.is_empty() {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
         return not_tried(format!("it needs {tool} beside it (needsExecutionTool)"));
     }
@@ -162,7 +162,8 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     Some(TrialResult::No { reason: refused.to_string() })
 }
 
-/// Runs the FMU; on Linux in separate processes, which may crash or hang.
+/// Runs the FMU; on Linux in separate processes, which may crash or hang. Returns an error if the time limit is not a
+/// number above 0.
 fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let seconds = options.time_limit;
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
@@ -174,8 +175,8 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
     }
     options.preload.iter().try_for_each(|library| fmu_import::preload(library))?;
     let mut fmu = None;
-    let mut make = |name: &str, before: Option<Instance>| -> anyhow::Result<Instance> {
-        drop(before);
+    let mut make = |name: &str, former: Option<Instance>| -> anyhow::Result<Instance> {
+        drop(former);
         let opened = match fmu.take() {
             Some(opened) => opened,
             None => Fmu::open(unpacked.folder())?,
@@ -195,8 +196,7 @@ fn as_stepped(description: &ModelDescription) -> ModelDescription {
     ModelDescription { co_simulation: description.stepped(), ..description.clone() }
 }
 
-/// Runs the FMU in separate processes. A failure that is not the FMU's fault is an error of the
-/// command.
+/// Runs the FMU in separate processes. Returns an error for a failure that is not the FMU's fault.
 fn isolated(
     options: &Options,
     unpacked: &Unpacked,
@@ -221,10 +221,10 @@ fn isolated(
     let description = if exchange { integrate::description_of(&stepped) } else { stepped };
     let description = &description;
     let flags = description.co_simulation.as_ref();
-    let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+    let only_once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
     let mut broken = None;
-    let mut make = |name: &str, before: Option<Isolated>| -> anyhow::Result<Isolated> {
-        let instance = match before.filter(|_| !once) {
+    let mut make = |name: &str, former: Option<Isolated>| -> anyhow::Result<Isolated> {
+        let instance = match former.filter(|_| !only_once) {
             Some(mut slave) => slave.renew(name, &options).map(|()| slave),
             None => package.instantiate(name, &options),
         };
@@ -232,18 +232,18 @@ fn isolated(
             IsolateError::Refused { reason, .. } => anyhow!(reason),
             IsolateError::Call { source, .. } => source.into(),
             other => {
-                let said = anyhow!("{other}");
+                let error = anyhow!("{other}");
                 broken = Some(other);
-                said
+                error
             }
         })
     };
-    let (here, mut findings) = behaviour::check(description, thorough, &mut make);
+    let (result, mut findings) = behaviour::check(description, thorough, &mut make);
     if exchange {
-        // The rules are those of co-simulation.
+        // Other findings are about rules of co-simulation.
         findings.retain(|finding| {
-            finding.severity == Severity::Error && matches!(here, TrialResult::No { .. })
+            finding.severity == Severity::Error && matches!(result, TrialResult::No { .. })
         });
     }
-    broken.map_or(Ok((here, findings)), |error| Err(error.into()))
+    broken.map_or(Ok((result, findings)), |error| Err(error.into()))
 }

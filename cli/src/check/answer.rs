@@ -10,14 +10,14 @@ use serde::Serialize;
 
 use super::finding::{Finding, Tool};
 
-/// Number of names shown of each type.
+/// Largest number of names shown of each type.
 const SHOWN: usize = 8;
 
 /// Result of a trial run in this master.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "runs", rename_all = "kebab-case")]
 pub(super) enum TrialResult {
-    /// It was initialised and stepped with its own start values.
+    /// The FMU was initialised and stepped with its own start values.
     Yes {
         steps: u32,
         /// Communication step in s.
@@ -26,12 +26,12 @@ pub(super) enum TrialResult {
         start: f64,
         /// The tolerance that the FMU received.
         tolerance: Option<f64>,
-        /// The reason for fewer steps than planned.
+        /// The reason for fewer steps than planned; none if all were made.
         but: Option<String>,
     },
-    /// It failed.
+    /// The FMU cannot run or failed.
     No { reason: String },
-    /// It was not run.
+    /// The FMU was not run.
     NotTried { reason: String },
 }
 
@@ -59,7 +59,7 @@ pub(super) struct ToolRefusal {
     tool: Tool,
     /// The first finding that stops the tool.
     reason: String,
-    /// Number of further findings.
+    /// Number of further findings that stop the tool.
     more: usize,
 }
 
@@ -139,8 +139,8 @@ impl Answer {
         for finding in findings {
             for &tool in &finding.stops {
                 let reason = || format!("{}: {}", finding.place, finding.what);
-                let known = tools.entry(tool).and_modify(|reason| reason.more += 1);
-                known.or_insert_with(|| ToolRefusal { tool, reason: reason(), more: 0 });
+                let entry = tools.entry(tool).and_modify(|refusal| refusal.more += 1);
+                entry.or_insert_with(|| ToolRefusal { tool, reason: reason(), more: 0 });
             }
         }
         let signals = Signals::of(description);
@@ -152,11 +152,11 @@ impl fmt::Display for Answer {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(formatter, "runs in this master: {}", self.here)?;
         write!(formatter, "{}", self.signals)?;
-        for elsewhere in &self.not_in {
-            writeln!(formatter, "does not run in {elsewhere}")?;
+        for refusal in &self.not_in {
+            writeln!(formatter, "does not run in {refusal}")?;
         }
-        let alone = self.not_in.is_empty() && !matches!(self.here, TrialResult::No { .. });
-        let other = if alone { "no" } else { "no other" };
+        let is_refused = !self.not_in.is_empty() || matches!(self.here, TrialResult::No { .. });
+        let other = if is_refused { "no other" } else { "no" };
         write!(formatter, "{other} tool is known to refuse it")
     }
 }

@@ -24,13 +24,15 @@ const TOP: [&str; 8] = [
     "extra",
     "terminalsAndIcons",
 ];
+/// Names of devices of Windows, without ports such as COM1.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 const UTF8: u16 = 1 << 11;
-/// Length of a path at which unpacking may fail: Windows allows 260 characters including the
+/// Length of a path in bytes above which unpacking may fail: Windows allows 260 characters including the
 /// importer's folder.
 const LONG: usize = 180;
 
-/// Checks an archive that can be unpacked safely, with the names of its files.
+/// Checks the archive at `path`, which can be unpacked safely and contains `names`. Returns an error if it cannot be
+/// read.
 pub(super) fn check(
     path: &Path,
     names: &[String],
@@ -61,8 +63,8 @@ pub(super) fn check(
     if description.version() == Version::V3 {
         build_description(names, &mut findings);
     }
-    if let Ok(index) = archive.by_name("model.png") {
-        picture(index, &mut findings);
+    if let Ok(file) = archive.by_name("model.png") {
+        picture(file, &mut findings);
     }
     Ok(findings.all)
 }
@@ -106,9 +108,12 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     }
 }
 
+/// Whether Windows does not allow this part of a path: it ends with a dot or a space, or is the name of a device.
 fn breaks_windows(part: &str) -> bool {
     let stem = part.split('.').next().unwrap_or(part).to_ascii_lowercase();
-    part.ends_with(['.', ' ']) || DEVICES.contains(&stem.as_str())
+    let is_port = stem.starts_with("com") || stem.starts_with("lpt");
+    let is_port = is_port && matches!(stem.as_bytes()[3..], [b'1'..=b'9']);
+    part.ends_with(['.', ' ']) || DEVICES.contains(&stem.as_str()) || is_port
 }
 
 fn case(names: &[String], findings: &mut Findings) {
@@ -179,7 +184,7 @@ fn documentation(names: &[String], findings: &mut Findings) {
     }
 }
 
-/// Checks that sources of FMI 3.0 say how they are built.
+/// Checks that sources of FMI 3.0 have a build description.
 fn build_description(names: &[String], findings: &mut Findings) {
     if has_file(names, "sources/") && !has_file(names, "sources/buildDescription.xml") {
         let what = "expected buildDescription.xml in it";
@@ -187,10 +192,10 @@ fn build_description(names: &[String], findings: &mut Findings) {
     }
 }
 
-/// Checks that the files in `SourceFiles` exist in `sources`.
+/// Checks that the files in `SourceFiles` exist in `sources`, in the same upper and lower case.
 fn sources(names: &[String], description: &ModelDescription, findings: &mut Findings) {
-    let there: HashSet<String> = names.iter().filter_map(|name| normal(name)).collect();
-    let lower: HashSet<String> = there.iter().map(|name| name.to_lowercase()).collect();
+    let paths: HashSet<String> = names.iter().filter_map(|name| normal(name)).collect();
+    let lower: HashSet<String> = paths.iter().map(|name| name.to_lowercase()).collect();
     for (interface, files) in [
         ("ModelExchange", description.model_exchange.as_ref().map(|flags| &flags.source_files)),
         ("CoSimulation", description.co_simulation.as_ref().map(|flags| &flags.source_files)),
@@ -199,8 +204,7 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
             let path = normal(&format!("sources/{file}"));
             // Some exporters include the folder in the name.
             let with_folder = normal(file).filter(|path| path.starts_with("sources/"));
-            let mut paths = path.iter().chain(&with_folder);
-            if paths.any(|path| there.contains(path)) {
+            if path.iter().chain(&with_folder).any(|path| paths.contains(path)) {
                 continue;
             }
             let path = path.filter(|path| path.starts_with("sources/"));
@@ -243,5 +247,20 @@ fn picture<R: std::io::Read>(mut file: ZipFile<'_, R>, findings: &mut Findings) 
     if file.read_exact(&mut start).is_err() || start != *b"\x89PNG\r\n\x1a\n" {
         let why = "Tools show no picture.";
         findings.add(Warning, "model.png", "expected a PNG file", why, SECTION);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_devices_and_of_ports_break_windows() {
+        for name in ["CON", "nul.txt", "com1", "LPT9.log", "end.", "end "] {
+            assert!(breaks_windows(name), "{name}");
+        }
+        for name in ["con1", "com", "com0", "com10", "lpt", "compute.c", ".git"] {
+            assert!(!breaks_windows(name), "{name}");
+        }
     }
 }

@@ -16,42 +16,43 @@ use super::values::{Value, distance, get, outputs, start, start_variables, unkno
 
 /// Number of steps of a trial.
 const STEPS: u32 = 10;
-/// Largest number of variables of one kind that are compared.
-const LOOKED_AT: usize = 1000;
-/// Relative difference that is accepted after a state is restored, because a solver restarts.
-const ROUNDED: f64 = 1e-6;
+/// Largest number of outputs, of inputs and of start values that are read.
+const VARIABLES: usize = 1000;
+/// Largest relative difference of the outputs after a state is restored that is a warning and no error: a solver
+/// restarts.
+const ROUNDING: f64 = 1e-6;
 
-/// Number of messages of a trial above which they are a warning: about 1000 for each step.
+/// Number of messages of all instances of a trial above which they are a warning.
 const FLOOD: u64 = 10_000;
 
-/// A function that creates an instance with the given name. The instance replaces the given former
-/// one, in the same process, if there is one.
+/// A function that creates an instance with the given name. The instance replaces the former one that
+/// is given, if any, in the same process where that is possible.
 pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
 /// The outputs at each communication point of a trial, including the start.
 type Trajectory = Vec<Vec<Value>>;
 
-/// Runs the FMU of `description` with instances created by `make`, if `thorough` for the time of its default
-/// experiment; returns the result and the findings.
+/// Runs the FMU of `description` with instances created by `make`: the first two for ten steps or, if `thorough`, for
+/// the time of its default experiment. Returns the result and the findings.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
     thorough: bool,
     make: &mut MakeInstance<'_, S>,
 ) -> (TrialResult, Vec<Finding>) {
-    let here = TrialResult::No { reason: String::new() };
+    let result = TrialResult::No { reason: String::new() };
     let (changes, findings) = (BTreeSet::new(), Findings::about(Part::Behaviour));
-    let mut trial = Trial { description, count: STEPS, make, here, changes, findings };
+    let mut trial = Trial { description, count: STEPS, make, result, changes, findings };
     if thorough {
         trial.count = trial.steps_of_experiment();
     }
-    let ((), told) = MessageRecorder::during(|| trial.run());
-    trial.categories(&told.categories);
-    if told.messages > FLOOD {
-        let what = format!("sends {} messages in this trial, with logging off", told.messages);
+    let ((), summary) = MessageRecorder::during(|| trial.run());
+    trial.check_categories(&summary.categories);
+    if summary.messages > FLOOD {
+        let what = format!("sends {} messages in this trial, with logging off", summary.messages);
         let why = "They slow every run down and bury what others say.";
         trial.findings.add(Warning, "logger", what, why, "2.1.5");
     }
-    (trial.here, trial.findings.all)
+    (trial.result, trial.findings.all)
 }
 
 struct Trial<'a, S> {
@@ -60,8 +61,8 @@ struct Trial<'a, S> {
     count: u32,
     make: &'a mut MakeInstance<'a, S>,
     /// Result of the first instance.
-    here: TrialResult,
-    /// What the FMU has changed in its process.
+    result: TrialResult,
+    /// What the FMU has changed in its process, as texts of findings.
     changes: BTreeSet<String>,
     findings: Findings,
 }
@@ -75,7 +76,8 @@ fn gone(error: &CallError) -> bool {
 const ENDS_IT: &str =
     "An importer that calls it in its own process ends with it, and loses its results.";
 
-/// Describes the effect of this failure on an importer.
+/// Describes the effect of the end of the process, or of a call that does not return, on an importer; `None` for other
+/// failures.
 fn harm(failure: &Failure) -> Option<&'static str> {
     match failure {
         Failure::Killed(..) | Failure::Exited(_) => Some(ENDS_IT),
@@ -92,42 +94,44 @@ impl<S: Slave> Trial<'_, S> {
         self.record_success(&first);
         if let Some((second, mut slave)) = self.trajectory("second", Some(slave)) {
             if second != first {
-                self.differ(&first, &second);
+                self.report_difference(&first, &second);
             }
             if let Err(error) = slave.free() {
-                self.failed(&error, "after fmi2Terminate", "4.2.4");
+                self.report(&error, "after fmi2Terminate", "4.2.4");
             }
         }
-        self.unknown_reference();
-        self.settings();
+        self.check_unknown_reference();
+        self.set_inputs();
         self.step_past_stop_time();
-        self.states();
+        self.check_states();
     }
 
-    /// Records that the first instance completed its steps.
+    /// Records that the first instance completed its steps, or fewer for the reason in the last note.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
-        let in_part = self.findings.all.iter().rfind(|finding| finding.severity == Note);
-        self.here = TrialResult::Yes {
+        let note = self.findings.all.iter().rfind(|finding| finding.severity == Note);
+        self.result = TrialResult::Yes {
             steps,
             step: self.step_size(),
             start: self.start_time(),
             tolerance: self.experiment().tolerance,
-            but: in_part.filter(|_| steps < self.count).map(|finding| finding.what.clone()),
+            but: note.filter(|_| steps < self.count).map(|finding| finding.what.clone()),
         };
     }
 
-    /// Records that the first instance failed; the last error is the reason.
+    /// Records that the first instance failed; the last error is the reason. An FMU that ended its process stops
+    /// importers that call it in their own.
     fn record_failure(&mut self) {
         let mut errors = self.findings.all.iter_mut().filter(|finding| finding.severity == Error);
         let Some(error) = errors.next_back() else { return };
-        self.here = TrialResult::No { reason: format!("{}: {}", error.place, error.what) };
+        self.result = TrialResult::No { reason: format!("{}: {}", error.place, error.what) };
         if error.why.as_ref().is_some_and(|why| why.starts_with(ENDS_IT)) {
             error.stops.push(Tool::InProcess);
         }
     }
 
-    fn differ(&mut self, first: &Trajectory, second: &Trajectory) {
+    /// Adds a finding for two trajectories that differ, with the first step at which they do.
+    fn report_difference(&mut self, first: &Trajectory, second: &Trajectory) {
         let step = first.iter().zip(second).position(|(one, other)| one != other);
         // Without a difference, one of the two ends earlier.
         let step = step.unwrap_or(first.len().min(second.len()));
@@ -136,12 +140,13 @@ impl<S: Slave> Trial<'_, S> {
         self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
 
-    /// Creates an instance, in place of the `former` one, and brings it to step mode; adds a finding if that fails.
-    fn initialized(&mut self, name: &str, stop_time: Option<f64>, former: Option<S>) -> Option<S> {
+    /// Creates an instance, in place of the `former` one, and initializes it. If that fails, adds a finding and returns
+    /// `None`.
+    fn initialize(&mut self, name: &str, stop_time: Option<f64>, former: Option<S>) -> Option<S> {
         let mut slave = match (self.make)(name, former) {
             Ok(slave) => slave,
             Err(error) => {
-                self.refused(&error);
+                self.report_refusal(&error);
                 return None;
             }
         };
@@ -151,23 +156,23 @@ impl<S: Slave> Trial<'_, S> {
             .setup_experiment(&experiment)
             .and_then(|()| slave.enter_initialization_mode())
             .and_then(|()| slave.exit_initialization_mode());
-        self.process(&mut slave, "up to the end of the initialization");
+        self.check_process(&mut slave, "up to the end of the initialization");
         match done {
             Ok(()) => Some(slave),
             Err(error) => {
-                self.failed(&error, "with the start values of the FMU itself", "4.2.4");
+                self.report(&error, "with the start values of the FMU itself", "4.2.4");
                 None
             }
         }
     }
 
-    /// Records that the instance could not be created.
-    fn refused(&mut self, error: &anyhow::Error) {
+    /// Adds a finding for an instance that could not be created, or whose former instance could not be freed.
+    fn report_refusal(&mut self, error: &anyhow::Error) {
         match error.downcast_ref::<CallError>() {
             Some(error) if error.function == "fmi2FreeInstance" => {
-                self.failed(error, "after fmi2Terminate", "4.2.4");
+                self.report(error, "after fmi2Terminate", "4.2.4");
             }
-            Some(error) => self.failed(error, "when an instance is made", "2.1.5"),
+            Some(error) => self.report(error, "when an instance is made", "2.1.5"),
             None => {
                 let why = "No importer can use it here.";
                 let what = format!("{error:#}");
@@ -180,7 +185,8 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    fn failed(&mut self, error: &CallError, when: &str, section: &'static str) {
+    /// Adds a finding for a failed call, and a warning if it failed without a message.
+    fn report(&mut self, error: &CallError, when: &str, section: &'static str) {
         let what = format!("{} {when}", error.failure);
         let messages = error.messages.join("; ");
         let why = match harm(&error.failure) {
@@ -214,26 +220,27 @@ impl<S: Slave> Trial<'_, S> {
         self.start_time() + f64::from(k) * self.step_size()
     }
 
-    /// Runs an instance with the name `name` from start to end; returns its outputs and the
-    /// instance.
+    /// Runs an instance with the name `name` from the start to `fmi2Terminate`; returns its outputs and the
+    /// instance. Returns `None` after a failure, other than one of `fmi2Terminate` or of the reading after it
+    /// that leaves the process usable. The start values and the outputs of the `first` instance are checked.
     fn trajectory(&mut self, name: &str, former: Option<S>) -> Option<(Trajectory, S)> {
-        let mut slave = self.initialized(name, None, former)?;
+        let mut slave = self.initialize(name, None, former)?;
         if name == "first" {
-            self.start_values(&mut slave)?;
+            self.check_start_values(&mut slave)?;
         }
         let trajectory = self.steps(&mut slave, 0, self.count);
-        self.process(&mut slave, "in its steps");
+        self.check_process(&mut slave, "in its steps");
         let trajectory = trajectory?;
         if name == "first" {
-            self.numbers(&trajectory);
+            self.check_finite(&trajectory);
         }
         if let Err(error) = slave.terminate() {
-            self.failed(&error, "after the last step", "4.2.4");
+            self.report(&error, "after the last step", "4.2.4");
             return (!gone(&error)).then_some((trajectory, slave));
         }
         match outputs(self.description).next().map(|output| get(&mut slave, output)) {
             Some(Err(error)) if gone(&error) => {
-                self.failed(&error, "after fmi2Terminate", "4.2.4");
+                self.report(&error, "after fmi2Terminate", "4.2.4");
                 return None;
             }
             Some(Err(error)) if name == "first" => {
@@ -246,7 +253,8 @@ impl<S: Slave> Trial<'_, S> {
         Some((trajectory, slave))
     }
 
-    /// Returns the number of steps from the start to the stop time of the default experiment.
+    /// Returns the number of steps from the start to the stop time of the default experiment, at least 1; [`STEPS`]
+    /// without a stop time.
     fn steps_of_experiment(&self) -> u32 {
         let stop = self.experiment().stop_time;
         let count = stop.map(|stop| ((stop - self.start_time()) / self.step_size()).round());
@@ -254,8 +262,8 @@ impl<S: Slave> Trial<'_, S> {
         count.map_or(STEPS, |count| (count as u32).max(1))
     }
 
-    /// Adds a finding for each thing that the FMU has changed for its whole process.
-    fn process(&mut self, slave: &mut S, when: &str) {
+    /// Adds a finding for each setting of its whole process that the FMU has changed, once.
+    fn check_process(&mut self, slave: &mut S, when: &str) {
         for change in slave.process_changes().unwrap_or_default() {
             if self.changes.insert(change.clone()) {
                 let why = "In the process of an importer it changes this for all others.";
@@ -265,13 +273,14 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Returns the outputs now and after each of `count` steps from communication point `from`.
+    /// Returns the outputs now and after each of `count` steps from communication point `from`. A partial step ends the
+    /// steps with a note; after a failure, returns `None`.
     fn steps(&mut self, slave: &mut S, from: u32, count: u32) -> Option<Trajectory> {
-        let mut trajectory = vec![self.read(slave)?];
+        let mut trajectory = vec![self.read_outputs(slave)?];
         for k in from..from + count {
             match slave.do_step(self.time(k), self.step_size(), true) {
                 Ok(StepResult::Whole | StepResult::Event { .. }) => {
-                    trajectory.push(self.read(slave)?);
+                    trajectory.push(self.read_outputs(slave)?);
                 }
                 Ok(StepResult::Part { reached, .. }) => {
                     let what = format!(
@@ -284,7 +293,7 @@ impl<S: Slave> Trial<'_, S> {
                     break;
                 }
                 Err(error) => {
-                    self.failed(&error, &format!("at t = {} s", seconds(self.time(k))), "4.2.2");
+                    self.report(&error, &format!("at t = {} s", seconds(self.time(k))), "4.2.2");
                     return None;
                 }
             }
@@ -292,22 +301,23 @@ impl<S: Slave> Trial<'_, S> {
         Some(trajectory)
     }
 
-    fn read(&mut self, slave: &mut S) -> Option<Vec<Value>> {
-        let values = outputs(self.description).take(LOOKED_AT).map(|variable| get(slave, variable));
+    /// Reads the outputs; adds a finding if that fails.
+    fn read_outputs(&mut self, slave: &mut S) -> Option<Vec<Value>> {
+        let values = outputs(self.description).take(VARIABLES).map(|variable| get(slave, variable));
         values
             .collect::<Result<_, _>>()
-            .map_err(|error| self.failed(&error, "for an output", "2.1.7"))
+            .map_err(|error| self.report(&error, "for an output", "2.1.7"))
             .ok()
     }
 
     /// Compares the start values with the description; `None` if the process of the FMU ended.
-    fn start_values(&mut self, slave: &mut S) -> Option<()> {
-        for variable in start_variables(self.description).take(LOOKED_AT) {
+    fn check_start_values(&mut self, slave: &mut S) -> Option<()> {
+        for variable in start_variables(self.description).take(VARIABLES) {
             let Some(stated) = start(variable) else { continue };
             let difference = match get(slave, variable) {
                 Ok(value) if value.agrees(&stated) => continue,
                 Err(error) if gone(&error) => {
-                    self.failed(&error, &format!("when {} is read", variable.name), "2.1.7");
+                    self.report(&error, &format!("when {} is read", variable.name), "2.1.7");
                     return None;
                 }
                 Ok(value) => format!("the library starts with {value}, the XML says {stated}"),
@@ -321,8 +331,9 @@ impl<S: Slave> Trial<'_, S> {
         Some(())
     }
 
-    fn numbers(&mut self, trajectory: &Trajectory) {
-        for (index, variable) in outputs(self.description).take(LOOKED_AT).enumerate() {
+    /// Adds a finding for each output with a value that is not finite.
+    fn check_finite(&mut self, trajectory: &Trajectory) {
+        for (index, variable) in outputs(self.description).take(VARIABLES).enumerate() {
             let step = trajectory
                 .iter()
                 .position(|row| row.get(index).is_some_and(|value| !value.is_finite()));
@@ -337,11 +348,11 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Checks that an unknown value reference is an error. In FMI 3.0 our importer itself refuses
     /// it, as it gives references to the elements of arrays.
-    fn unknown_reference(&mut self) {
+    fn check_unknown_reference(&mut self) {
         if self.description.version() == Version::V3 {
             return;
         }
-        let Some(mut slave) = self.initialized("unknown", None, None) else { return };
+        let Some(mut slave) = self.initialize("unknown", None, None) else { return };
         match slave.get_real(&[unknown_reference(self.description)], &mut [0.0]) {
             Ok(()) => {
                 let what = "accepts a value reference that no variable has, expected fmi2Error";
@@ -349,7 +360,7 @@ impl<S: Slave> Trial<'_, S> {
                 self.findings.add(Error, "fmi2GetReal", what, why, "2.1.2");
             }
             Err(error) if gone(&error) => {
-                self.failed(&error, "for a value reference that no variable has", "2.1.2");
+                self.report(&error, "for a value reference that no variable has", "2.1.2");
             }
             Err(error) if error.messages.is_empty() => {
                 let what = "refuses an unknown value reference without a message";
@@ -360,31 +371,31 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Sets inputs to their present values. An FMU may refuse that, but must change nothing of the importer.
-    fn settings(&mut self) {
+    /// Sets real inputs to their present values. An FMU may refuse that, but must not end or block the process.
+    fn set_inputs(&mut self) {
         let inputs = |variable: &&ScalarVariable| variable.causality == Causality::Input;
         let is_real = |variable: &&ScalarVariable| ValueType::of(&variable.kind) == ValueType::Real;
         let inputs = self.description.variables.iter().filter(inputs).filter(is_real);
         let references: Vec<u32> =
-            inputs.take(LOOKED_AT).map(|variable| variable.value_reference).collect();
+            inputs.take(VARIABLES).map(|variable| variable.value_reference).collect();
         if references.is_empty() {
             return;
         }
-        let Some(mut slave) = self.initialized("inputs", None, None) else { return };
+        let Some(mut slave) = self.initialize("inputs", None, None) else { return };
         let mut values = vec![0.0; references.len()];
         let read = slave.get_real(&references, &mut values);
         let done = read.and_then(|()| slave.set_real(&references, &values));
         if let Err(error) = done
             && gone(&error)
         {
-            self.failed(&error, "for inputs at their present values", "2.1.7");
+            self.report(&error, "for inputs at their present values", "2.1.7");
         }
     }
 
     /// Checks that a step beyond a defined stop time is an error.
     fn step_past_stop_time(&mut self) {
         let (start, size) = (self.start_time(), self.step_size());
-        let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size), None) else {
+        let Some(mut slave) = self.initialize("end", Some(start + 0.5 * size), None) else {
             return;
         };
         match slave.do_step(start, size, true) {
@@ -394,63 +405,65 @@ impl<S: Slave> Trial<'_, S> {
                 self.findings.add(Warning, "fmi2DoStep", what, why, "2.1.6");
             }
             Err(error) if gone(&error) => {
-                self.failed(&error, "for a step past a stopTime that was defined", "2.1.6");
+                self.report(&error, "for a step past a stopTime that was defined", "2.1.6");
             }
             _ => {}
         }
     }
 
-    /// Checks that a restored state, directly or through bytes, gives the same outputs.
-    fn states(&mut self) {
+    /// Checks that an FMU with saved states gives the same outputs after it restored one, directly or from bytes.
+    fn check_states(&mut self) {
         let Some(flags) = &self.description.co_simulation else { return };
         if !flags.can_get_and_set_fmu_state {
             return;
         }
         let serialize = flags.can_serialize_fmu_state;
-        let Some(mut slave) = self.initialized("states", None, None) else { return };
+        let Some(mut slave) = self.initialize("states", None, None) else { return };
         let before = self.steps(&mut slave, 0, STEPS);
         if before.is_none_or(|trajectory| trajectory.len() <= STEPS as usize) {
             return;
         }
         if let Err(error) = slave.save_state(0) {
-            return self.failed(&error, "though canGetAndSetFMUstate is true", "2.1.8");
+            return self.report(&error, "though canGetAndSetFMUstate is true", "2.1.8");
         }
         let bytes = match serialize.then(|| slave.serialize_state()).transpose() {
             Ok(bytes) => bytes,
             Err(error) => {
-                return self.failed(&error, "though canSerializeFMUstate is true", "2.1.8");
+                return self.report(&error, "though canSerializeFMUstate is true", "2.1.8");
             }
         };
         let Some(first) = self.steps(&mut slave, STEPS, STEPS) else { return };
         if let Err(error) = slave.restore_state(0) {
-            return self.failed(&error, "for a state of the same instance", "2.1.8");
+            return self.report(&error, "for a state of the same instance", "2.1.8");
         }
-        let lives = self.again(&mut slave, &first, "fmi2SetFMUstate");
-        if let Some(bytes) = bytes.filter(|_| lives) {
+        let is_usable = self.repeat_steps(&mut slave, &first, "fmi2SetFMUstate");
+        if let Some(bytes) = bytes.filter(|_| is_usable) {
             if let Err(error) = slave.deserialize_state(&bytes) {
-                return self.failed(&error, "for bytes of the same instance", "2.1.8");
+                return self.report(&error, "for bytes of the same instance", "2.1.8");
             }
-            self.again(&mut slave, &first, "fmi2DeSerializeFMUstate");
+            self.repeat_steps(&mut slave, &first, "fmi2DeSerializeFMUstate");
         }
     }
 
-    /// Repeats the steps and compares the outputs; returns whether the steps could be made.
-    fn again(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
+    /// Repeats the steps after the saved state and compares the outputs with the `first` ones; returns false if a step
+    /// failed.
+    fn repeat_steps(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
         let second = self.steps(slave, STEPS, STEPS);
-        let apart = second.as_ref().map_or(0.0, |second| distance(first, second));
-        if apart > 0.0 {
+        let gap = second.as_ref().map_or(0.0, |second| distance(first, second));
+        if gap > 0.0 {
             let what = format!(
-                "the outputs after the state was restored differ from those before, by {apart:.1e} \
+                "the outputs after the state was restored differ from those before, by {gap:.1e} \
                  of their size"
             );
-            let severity = if apart > ROUNDED { Error } else { Warning };
+            let severity = if gap > ROUNDING { Error } else { Warning };
             let why = "Masters that repeat a step, and optimisers, get wrong results.";
             self.findings.add(severity, function, what, why, "2.1.8");
         }
         second.is_some()
     }
 
-    fn categories(&mut self, used: &BTreeSet<String>) {
+    /// Adds a finding for each category of messages that the description does not list.
+    fn check_categories(&mut self, used: &BTreeSet<String>) {
         // Descriptions of FMI 1.0 do not list categories.
         if self.description.version() == Version::V1 {
             return;

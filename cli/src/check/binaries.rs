@@ -99,7 +99,7 @@ pub(crate) fn check(
             for finding in &mut findings.all[before..] {
                 finding.stops = match version {
                     Version::V2 => stops(finding, platform, &interfaces),
-                    Version::V1 | Version::V3 => loading(finding, platform),
+                    Version::V1 | Version::V3 => stops_platform(finding, platform),
                 };
             }
         }
@@ -107,11 +107,11 @@ pub(crate) fn check(
     findings.all
 }
 
-/// Returns the functions that a library must export: in FMI 1.0 with the model identifier before
-/// them, in FMI 3.0 all of them.
+/// Returns the functions that a library must export: of FMI 2.0 those of its interface types, of FMI 3.0 all, of FMI
+/// 1.0 those of co-simulation with the model identifier before them, none if it is for model exchange only.
 fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) -> Vec<String> {
     match version {
-        // Model exchange has other functions.
+        // The functions of model exchange are not checked.
         Version::V1 if !interfaces.contains(&InterfaceType::CoSimulation) => Vec::new(),
         Version::V1 => abi1::FUNCTIONS.map(|name| format!("{identifier}_{name}")).to_vec(),
         Version::V2 => required_functions(interfaces).map(str::to_owned).collect(),
@@ -119,24 +119,25 @@ fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) ->
     }
 }
 
-/// Returns the platform whose importers cannot load the library.
-fn loading(finding: &Finding, platform: &Platform) -> Vec<Tool> {
+/// Returns the platform if an error stops all of its importers; nothing for lacking functions and lesser findings.
+fn stops_platform(finding: &Finding, platform: &Platform) -> Vec<Tool> {
     if finding.severity == Error && !finding.what.starts_with("lacks ") {
         return vec![Tool::Platform(platform.folder)];
     }
     Vec::new()
 }
 
-/// Adds a finding for a missing library.
+/// Adds a finding for a missing library: an error that lists other files in its folder, or a note if the folder is
+/// empty.
 fn missing(path: String, platform: &Platform, names: &[String], findings: &mut Findings) {
     let folder = format!("binaries/{}/", platform.folder);
-    let mut there = names.iter().filter(|name| name.starts_with(&folder) && !name.ends_with('/'));
-    let there: Vec<&str> = there.by_ref().take(5).map(String::as_str).collect();
-    if there.is_empty() {
+    let files = names.iter().filter(|name| name.starts_with(&folder) && !name.ends_with('/'));
+    let files: Vec<&str> = files.take(5).map(String::as_str).collect();
+    if files.is_empty() {
         let why = "It is the same as no folder for this platform.";
         return findings.add(Note, folder, "an empty folder", why, SECTION);
     }
-    let what = format!("expected this library, found {}", there.join(", "));
+    let what = format!("expected this library, found {}", files.join(", "));
     findings.add(Error, path, what, "Importers look for modelIdentifier.", SECTION);
     findings.stopping(&[Tool::Platform(platform.folder)]);
 }
@@ -152,7 +153,8 @@ const BY_FLAG: [&str; 7] = [
     "fmi2GetDirectionalDerivative",
 ];
 
-/// Returns the tools that an error in a library stops: in co-simulation, if the FMU supports it.
+/// Returns the tools that a finding about a library of FMI 2.0 stops; none unless it is an error. Of lacking functions,
+/// only those of co-simulation count if the FMU supports it.
 fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -> Vec<Tool> {
     if finding.severity != Error {
         return Vec::new();
@@ -221,7 +223,7 @@ fn library(
     versions(&file, path, findings);
 }
 
-/// Returns the part of a file for `machine`; a universal file for macOS has several parts.
+/// Returns the part of a universal file of macOS for `machine`, `None` if it has none; another file as a whole.
 fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
     use object::read::macho::{FatArch as _, MachOFatFile32, MachOFatFile64};
     if let Ok(fat) = MachOFatFile32::parse(bytes) {
@@ -235,7 +237,7 @@ fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
     Some(bytes)
 }
 
-/// Functions that need no instance.
+/// Functions of FMI 2.0 that need no instance.
 const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"];
 
 /// Returns the functions of FMI 2.0 that a library for `interfaces` must export: [`ALWAYS`], and all that an importer
@@ -323,7 +325,7 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
     }
 }
 
-/// Reports the newest version of glibc that a library for Linux needs.
+/// Adds a note with the newest version of glibc that a library for Linux needs, if it needs one.
 fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     let versions = file.imports().into_iter().flatten().flatten().filter_map(|import| {
         let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { return None };

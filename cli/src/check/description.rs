@@ -7,9 +7,9 @@ use super::finding::{Finding, Findings, Part, Severity, Tool};
 
 const FILE: &str = "modelDescription.xml";
 
-/// A rule, recognised by words of the finding: its effect on importers, and the tools that it
-/// stops.
+/// A rule of the standard: the effect of breaking it on importers, and the tools that this stops.
 struct Rule {
+    /// Words in the text of a problem by which the rule is recognised; the first rule that fits counts.
     words: &'static str,
     why: &'static str,
     stops: &'static [Tool],
@@ -54,7 +54,7 @@ const RULES: [Rule; 20] = {
     ]
 };
 
-/// Returns the tools that a warning of the parser stops, and the reason.
+/// Returns the tools that a warning of the parser stops, and the reason; both are empty for other warnings.
 fn stops(warning: &Warning) -> (&'static [Tool], &'static str) {
     if warning.place.contains("fmiVersion") && warning.expected.starts_with("2.0") {
         return (&[Tool::Fmpy], "FMPy reads 2.0 only.");
@@ -94,7 +94,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
     findings.all
 }
 
-/// Adds notes on things that the standard allows and users run into.
+/// Adds notes on things that the standard allows but that surprise users.
 fn notes(description: &ModelDescription, findings: &mut Findings) {
     let [experiment_section, variables, flags] = match description.version() {
         Version::V1 => ["", "", ""],

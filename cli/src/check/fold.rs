@@ -1,14 +1,14 @@
-//! Groups equal findings about several variables or files into one line.
+//! Groups findings of the same kind about several variables or files into one line.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use super::finding::{Finding, Part, Severity, Tool};
 
-/// A finding with the number of equal findings about other objects.
+/// A finding with the number of further findings of its kind.
 pub(super) struct FindingGroup<'a> {
-    pub(super) first: &'a Finding,
-    pub(super) more: usize,
+    first: &'a Finding,
+    more: usize,
     /// The other objects, as a noun in the plural.
     others: &'static str,
 }
@@ -27,40 +27,41 @@ impl fmt::Display for FindingGroup<'_> {
 type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static str>, &'a [Tool]);
 
 /// Groups findings by kind, in the order of their first occurrence. Two findings have the same kind
-/// if they differ only in names of variables, quoted texts, paths and numbers.
+/// if they differ only in names of variables, quoted texts, paths and numbers; numbers in findings about libraries
+/// count.
 pub(super) fn fold<'a>(
     findings: &'a [Finding],
     variables: &HashSet<&str>,
 ) -> Vec<FindingGroup<'a>> {
-    let mut lines: Vec<FindingGroup<'a>> = Vec::new();
+    let mut groups: Vec<FindingGroup<'a>> = Vec::new();
     let mut known: HashMap<Key<'a>, usize> = HashMap::new();
     for finding in findings {
-        let mut names = false;
-        // Numbers in findings about libraries, such as versions, distinguish them.
+        let mut named = false;
+        // Numbers in findings about libraries are versions.
         let numbers = finding.part != Part::Binaries;
-        let place = kind(&finding.place, variables, true, &mut names);
-        let what = kind(&finding.what, variables, numbers, &mut names);
-        let why = finding.why.as_ref().map(|why| kind(why, variables, numbers, &mut names));
+        let place = pattern(&finding.place, variables, true, &mut named);
+        let what = pattern(&finding.what, variables, numbers, &mut named);
+        let why = finding.why.as_ref().map(|why| pattern(why, variables, numbers, &mut named));
         let Finding { severity, part, section, stops, .. } = finding;
         let key = (*severity, *part, place, what, why, *section, stops.as_slice());
-        if let Some(&line) = known.get(&key) {
-            lines[line].more += 1;
+        if let Some(&group) = known.get(&key) {
+            groups[group].more += 1;
             continue;
         }
-        known.insert(key, lines.len());
+        known.insert(key, groups.len());
         let others = match part {
-            _ if names => "variables",
+            _ if named => "variables",
             Part::Archive | Part::Binaries => "files",
             Part::Description | Part::Behaviour => "places",
         };
-        lines.push(FindingGroup { first: finding, more: 0, others });
+        groups.push(FindingGroup { first: finding, more: 0, others });
     }
-    lines
+    groups
 }
 
-/// Removes the parts that may differ within a kind; sets `names` to true if a part is the name of a
-/// variable.
-fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) -> String {
+/// Returns `text` without the parts that may differ within a kind: names of variables, quoted texts, paths and, if
+/// `numbers`, numbers. Sets `named` to true if it removes the name of a variable.
+fn pattern(text: &str, variables: &HashSet<&str>, numbers: bool, named: &mut bool) -> String {
     let mut pattern = String::with_capacity(text.len());
     // Every second part is within quotation marks.
     for (index, part) in text.split('"').enumerate() {
@@ -71,7 +72,7 @@ fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) 
         for word in part.split_inclusive(' ') {
             let bare = word.trim_end_matches([' ', ',', ':', ';', '.']);
             if variables.contains(bare) {
-                *names = true;
+                *named = true;
             } else if !(bare.contains('/') || numbers && bare.parse::<f64>().is_ok()) {
                 pattern.push_str(word);
             }

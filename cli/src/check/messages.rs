@@ -14,9 +14,9 @@ const TARGET: &str = "fmu";
 /// Summary of the messages.
 #[derive(Default)]
 pub(super) struct MessageSummary {
-    /// The log categories used.
+    /// The log categories of the messages.
     pub(super) categories: BTreeSet<String>,
-    /// Number of messages, including those that arrived too fast to be kept.
+    /// Number of messages, including those that were lost because they came too fast.
     pub(super) messages: u64,
 }
 
@@ -27,36 +27,40 @@ pub(super) struct MessageRecorder {
 }
 
 impl MessageRecorder {
-    /// Runs `body`; returns its result and the summary of the messages during the call.
+    /// Runs `body`; returns its result and the summary of the messages that this thread logs meanwhile.
     pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, MessageSummary) {
-        let heard = Self::default();
-        let subscriber = tracing_subscriber::registry().with(heard.clone());
+        let recorder = Self::default();
+        let subscriber = tracing_subscriber::registry().with(recorder.clone());
         let result = tracing::subscriber::with_default(subscriber, body);
-        let messages = heard.messages.lock().map(|mut messages| std::mem::take(&mut *messages));
+        let messages = recorder.messages.lock().map(|mut messages| std::mem::take(&mut *messages));
         (result, messages.unwrap_or_default())
     }
 }
 
-/// A visitor that reads the field `category` of an event, and the number of messages that the event
-/// represents.
-struct Category(Option<String>, u64);
+/// A visitor that reads what an event says about messages.
+struct EventFields {
+    /// The field `category`.
+    category: Option<String>,
+    /// Number of messages that the event represents: the field `lost`, or 1.
+    count: u64,
+}
 
-impl Visit for Category {
+impl Visit for EventFields {
     fn record_u64(&mut self, field: &Field, value: u64) {
         if field.name() == "lost" {
-            self.1 = value;
+            self.count = value;
         }
     }
 
     fn record_str(&mut self, field: &Field, value: &str) {
         if field.name() == "category" {
-            self.0 = Some(value.to_owned());
+            self.category = Some(value.to_owned());
         }
     }
 
     fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
         if field.name() == "category" {
-            self.0 = Some(format!("{value:?}").trim_matches('"').to_owned());
+            self.category = Some(format!("{value:?}").trim_matches('"').to_owned());
         }
     }
 }
@@ -66,11 +70,11 @@ impl<S: Subscriber> Layer<S> for MessageRecorder {
         if event.metadata().target() != TARGET {
             return;
         }
-        let mut category = Category(None, 1);
-        event.record(&mut category);
-        if let Ok(mut messages) = self.messages.lock() {
-            messages.messages = messages.messages.saturating_add(category.1);
-            messages.categories.extend(category.0);
+        let mut fields = EventFields { category: None, count: 1 };
+        event.record(&mut fields);
+        if let Ok(mut summary) = self.messages.lock() {
+            summary.messages = summary.messages.saturating_add(fields.count);
+            summary.categories.extend(fields.category);
         }
     }
 }

@@ -4,7 +4,7 @@ use fmu_description::Version;
 
 use super::finding::Finding;
 
-/// Sections of FMI 2.0.5, and the sections of FMI 3.0.2 with the same rules.
+/// Sections of FMI 2.0.5, each with the section of FMI 3.0.2 that has the same rules.
 const PAIRS: [(&str, &str); 15] = [
     ("2.1", "2.2.2"),
     ("2.1.1", "2.2.2"),
@@ -23,7 +23,7 @@ const PAIRS: [(&str, &str); 15] = [
     ("4.2.4", "4.2"),
 ];
 
-/// Names of FMI 2.0 in findings about behaviour, and those of FMI 1.0 and 3.0.
+/// Names of FMI 2.0 in findings about behaviour, each with the names of FMI 1.0 and of FMI 3.0.
 const NAMES: [(&str, &str, &str); 9] = [
     ("fmi2DeSerializeFMUstate", "fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"),
     ("fmi2SetFMUstate", "fmi2SetFMUstate", "fmi3SetFMUState"),
@@ -36,7 +36,7 @@ const NAMES: [(&str, &str, &str); 9] = [
     ("canSerializeFMUstate", "canSerializeFMUstate", "canSerializeFMUState"),
 ];
 
-/// Replaces names of FMI 2.0 in a text by those of `version`.
+/// Replaces names of FMI 2.0 in a text by the names of `version`.
 pub(super) fn renamed(text: &str, version: Version) -> String {
     NAMES.iter().fold(text.to_owned(), |text, (second, first, third)| match version {
         Version::V1 => text.replace(second, first),
@@ -45,7 +45,8 @@ pub(super) fn renamed(text: &str, version: Version) -> String {
     })
 }
 
-/// Replaces sections of FMI 2.0.5 by those of `version`; a section that has no counterpart is left out.
+/// Replaces sections of FMI 2.0.5 in `findings` by sections of `version`, and removes a section without a counterpart:
+/// for FMI 1.0 all.
 pub(super) fn renumber(findings: &mut [Finding], version: Version) {
     for finding in findings {
         let pair = PAIRS.iter().find(|(second, _)| finding.section == Some(*second));
