@@ -9,7 +9,7 @@ const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 /// The environment variable that names the interpreter.
 const VARIABLE: &str = "ASO_FTC_PYTHON";
 
-/// The options are those of the Python package.
+/// The options of the Python package.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// A campaign.toml, or a folder of results
@@ -70,7 +70,8 @@ impl Options {
     }
 }
 
-/// Runs `python3 -m aso_ftc campaign` and returns its exit status.
+/// Runs `python3 -m aso_ftc campaign`, on Unix in place of this process, and returns its exit status. If Python or the
+/// package is missing, prints an error and returns 2.
 pub(crate) fn campaign(options: &Options) -> u8 {
     let python = std::env::var_os(VARIABLE).unwrap_or_else(|| PYTHON.into());
     let shown = python.to_string_lossy().into_owned();
@@ -84,7 +85,7 @@ pub(crate) fn campaign(options: &Options) -> u8 {
         Ok(status) if status.success() => {
             let mut command = Command::new(&python);
             command.args(["-m", "aso_ftc", "campaign"]).args(options.arguments());
-            match replaced(command) {
+            match run_in_place(command) {
                 Ok(status) => return status,
                 Err(error) => format!("cannot start {shown}: {error}"),
             }
@@ -101,15 +102,15 @@ pub(crate) fn campaign(options: &Options) -> u8 {
     2
 }
 
-/// Becomes the other program, so that it gets Ctrl-C alone.
+/// Replaces this process by the program, which then gets Ctrl-C alone; returns only after an error.
 #[cfg(unix)]
-fn replaced(mut command: Command) -> std::io::Result<u8> {
+fn run_in_place(mut command: Command) -> std::io::Result<u8> {
     Err(std::os::unix::process::CommandExt::exec(&mut command))
 }
 
-/// Runs the other program to its end.
+/// Runs the program to its end and returns its exit status; 1 if it has none from 0 to 255.
 #[cfg(not(unix))]
-fn replaced(mut command: Command) -> std::io::Result<u8> {
+fn run_in_place(mut command: Command) -> std::io::Result<u8> {
     let code = command.status()?.code().and_then(|code| u8::try_from(code).ok());
     Ok(code.unwrap_or(1))
 }

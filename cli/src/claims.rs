@@ -11,18 +11,17 @@ pub(crate) const WATCHED: [&str; 5] =
 
 /// Time in s after the activation at which the measurement of the residual motion starts.
 const SETTLING: f64 = 20.0;
-/// Fraction of the time before the activation after which the limit cycle is measured.
+/// Fraction of the time before the activation, at its end, in which the limit cycle is measured.
 const CYCLE: f64 = 0.75;
-/// Shortest slide in m that counts; near the end of a creep, rounding makes the cart stick and
-/// slip.
+/// Shortest slide in m that is counted: when the cart creeps to its rest, rounding makes it stick and slip.
 const SLIDE: f64 = 1e-3;
-/// Coulomb friction of the paper in N. An estimate follows the friction if its error is below a
-/// fifth of it.
+/// Coulomb friction of the paper in N. An estimate follows the friction if the root mean square of its error is
+/// below a fifth of it.
 const LEVEL: f64 = 25.0;
-/// Time in s around a transition within which an event belongs to the transition.
+/// Time in s before and after a transition within which a spike belongs to the transition.
 const NEAR: f64 = 0.01;
 
-/// Smallest and largest value seen.
+/// The smallest and the largest of the values added.
 #[derive(Clone, Copy)]
 struct Extremes {
     low: f64,
@@ -37,7 +36,7 @@ impl Extremes {
         self.high = self.high.max(value);
     }
 
-    /// Returns half of the peak-to-peak value.
+    /// Returns half of the peak-to-peak value; negative infinity without values.
     fn amplitude(self) -> f64 {
         0.5 * (self.high - self.low)
     }
@@ -45,6 +44,7 @@ impl Extremes {
 
 /// Measurements in one time window.
 struct Window {
+    /// Start and end of the window in s, both included.
     from: f64,
     to: f64,
     x_p: Extremes,
@@ -55,12 +55,14 @@ struct Window {
     largest: f64,
     largest_at: f64,
     at_transition: bool,
+    /// Number of samples.
     count: f64,
     /// Number of slides of more than [`SLIDE`] that start and end at rest, and the position of the
     /// last rest.
     slides: u32,
     rest: Option<f64>,
-    /// The last regime, and the time of the last change between rest and sliding.
+    /// The last regime, 0 at rest, and the time of the last change between rest and sliding; both are also of times
+    /// outside of the window, and NaN before.
     regime: f64,
     changed_at: f64,
 }
@@ -123,7 +125,7 @@ pub(crate) struct Measurement {
     fell: Option<f64>,
 }
 
-/// One line of the table.
+/// A claim with its measurement: one line of the table.
 #[derive(Debug, Serialize)]
 pub(crate) struct Claim {
     pub(crate) statement: String,
@@ -155,16 +157,15 @@ impl Measurement {
         }
     }
 
-    /// Returns the time in s at which the pendulum first passed the horizontal.
+    /// Returns the time in s of the first sample at which the pendulum had passed the horizontal; `None` if it has not.
     pub(crate) fn fell(&self) -> Option<f64> {
         self.fell
     }
 
-    /// Evaluates the claims. `end` is the time reached; `lost` is true if it is not the planned
-    /// one.
+    /// Evaluates the claims. `end` is the time reached in s; `lost` is true if the run failed or an FMU ended it.
     pub(crate) fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
         let Self { before, after, .. } = self;
-        let whole = before.count > 0.0 && end >= before.to;
+        let is_whole = before.count > 0.0 && end >= before.to;
         let settled = after.count > 1.0;
         let lost = lost || self.fell.is_some();
         let early = |statement: &str, paper, measured, unit, holds: bool| Claim {
@@ -172,7 +173,7 @@ impl Measurement {
             paper,
             measured,
             unit,
-            holds: if whole { Some(holds) } else { lost.then_some(false) },
+            holds: if is_whole { Some(holds) } else { lost.then_some(false) },
         };
         let late = |statement: &str, paper, measured, unit, holds: bool| Claim {
             statement: format!("{statement}, t > {} s", after.from),

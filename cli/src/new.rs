@@ -9,8 +9,8 @@ const MANIFEST: &str = include_str!("new/manifest.toml");
 const README: &str = include_str!("new/readme.md");
 const MODEL: &str = include_str!("new/model.rs");
 
-/// Names reserved by Rust, the template, cargo or Windows.
-const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmu \
+/// Names reserved by Rust, the template, cargo or Windows, in lower case.
+const RESERVED: &str = "about alloc aux clone con core default deserialize err experiment failure fmu \
     into model none nul ok option path prn result self send serde serialize simulation some std \
     step string test variable variables vec";
 
@@ -30,7 +30,7 @@ pub(crate) struct Options {
     fmu: Option<String>,
 }
 
-/// Writes the crate completely or not at all.
+/// Writes the crate completely or not at all; returns true. An existing folder is an error.
 pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     let model = identifier(&options.name)?;
     let folder = options.path.clone().unwrap_or_else(|| PathBuf::from(&options.name));
@@ -52,7 +52,8 @@ pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     Ok(true)
 }
 
-/// Returns the name of the model: the name of the crate in camel case, a C identifier.
+/// Returns the name of the model: the name of the crate in camel case. Returns an error if that is no C identifier or
+/// is reserved.
 fn identifier(name: &str) -> anyhow::Result<String> {
     let expected = "expected lower-case letters and digits in words joined by - or _, a letter \
                     first, such as heat-pump";
@@ -69,20 +70,21 @@ fn identifier(name: &str) -> anyhow::Result<String> {
     }
     let camel = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
     let identifier: String = words.into_iter().map(camel).collect();
-    if TAKEN.split(' ').any(|reserved| identifier.eq_ignore_ascii_case(reserved)) {
+    if RESERVED.split(' ').any(|reserved| identifier.eq_ignore_ascii_case(reserved)) {
         bail!("the name {name:?} is taken: Rust or the template use it for something else");
     }
     Ok(identifier)
 }
 
-/// Returns the value of `fmu =` in the manifest.
+/// Returns the value of `fmu =` in the manifest: a git URL or a folder. Returns an error if it is not that of the crate
+/// fmu.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
     if let Some(url) = source.filter(|source| source.contains("://") || source.contains('@')) {
         return Ok(format!("{{ git = {} }}", quoted(url)));
     }
     let folder = match source {
         Some(folder) => std::path::absolute(folder)?,
-        None => clone().context(
+        None => crate_of_clone().context(
             "expected --fmu SOURCE: this program is neither in a clone that has fmu nor called \
              in one",
         )?,
@@ -98,23 +100,25 @@ fn quoted(text: &str) -> String {
 }
 
 /// Returns the folder of the crate fmu in the clone that contains this program or the current folder,
-/// or that the program was built in.
-fn clone() -> Option<PathBuf> {
+/// or that the program was built in; `None` if there is no such clone.
+fn crate_of_clone() -> Option<PathBuf> {
     let built_in = option_env!("ASO_FTC_CLONE").map(PathBuf::from);
     let places = [std::env::current_exe().ok(), std::env::current_dir().ok(), built_in];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
     folders.map(|folder| folder.join("crates/fmu")).find(|folder| is_fmu(folder))
 }
 
+/// Whether the folder contains the crate fmu.
 fn is_fmu(folder: &Path) -> bool {
     let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
     let name = |manifest: toml::Table| Some(manifest.get("package")?.get("name")? == &"fmu".into());
     manifest.parse().ok().and_then(name).unwrap_or(false)
 }
 
-/// Writes the files into a temporary folder next to `target` and then renames it.
+/// Writes the files into a temporary folder next to `target` and then renames it. Creates the parent folders.
 fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
-    let target = std::path::absolute(target)?;
+    // The components are without a slash at the end, after which the temporary folder would be inside of the target.
+    let target: PathBuf = std::path::absolute(target)?.components().collect();
     let mut partial = target.clone().into_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
     let partial = PathBuf::from(partial);
@@ -126,4 +130,18 @@ fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
         // The error of the write is returned; an error of the removal adds nothing.
         let _ = fs::remove_dir_all(&partial);
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_may_be_stated_with_a_slash_at_its_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("models/heat-pump/");
+        write(&target, &[("Cargo.toml", "[package]".to_owned())]).unwrap();
+        assert_eq!(fs::read_to_string(target.join("Cargo.toml")).unwrap(), "[package]");
+        assert_eq!(fs::read_dir(folder.path().join("models")).unwrap().count(), 1);
+    }
 }

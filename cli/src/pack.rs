@@ -20,9 +20,10 @@ use figure::rasterise;
 
 use crate::models;
 
-/// The equations of a model and its drawing, from which the packer makes index.html and model.png.
-/// The equations stay in the FMU, so that index.html can be made again for another design.
+/// The equations of a model, from which the packer makes index.html. They are also in the FMU, so that
+/// index.html can be made again for another design.
 const FRAGMENT: &str = fmu_description::documentation::FRAGMENT;
+/// The drawing of a model, from which the packer makes its picture.
 const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
@@ -95,7 +96,8 @@ impl Versions {
     }
 }
 
-/// Builds and packs the given crates or all models of the workspace.
+/// Builds and packs the crates stated or, without one, the models of the clone; prints the files written and returns
+/// true.
 pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
     if options.sbom && !cfg!(feature = "sbom") {
         bail!(
@@ -137,7 +139,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
 struct PackOptions<'a> {
     /// Folder for the FMUs.
     out: &'a Path,
-    /// Folder with libraries of all platforms.
+    /// Folder with libraries that were built elsewhere, in place of the one built here.
     binaries: Option<&'a Path>,
     #[cfg_attr(not(feature = "sbom"), expect(dead_code, reason = "refused without the feature"))]
     sbom: bool,
@@ -152,8 +154,8 @@ pub(crate) struct PackedFmu {
     description: ModelDescription,
 }
 
-/// Returns the folder with the FMUs: `dist`, into which they are packed if the current folder is in a
-/// clone; the one beside the command; or `dist`, packed from the clone that the command was built in.
+/// Returns the folder with the FMUs. In a clone, packs its models into `dist`. Outside of a clone, this is the folder
+/// beside the command or, without one, `dist` with the models of the clone that the command was built in.
 pub(crate) fn folder_of_models(dist: &Path) -> anyhow::Result<PathBuf> {
     if models::clone_upwards()?.is_none()
         && let Some(folder) = models::beside()
@@ -189,7 +191,8 @@ fn update_descriptions(root: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Name of the archive and of the committed description, without extension: `MODEL`, `MODEL.fmi3`.
+/// Returns the name of the archive and of the committed description without extension: `MODEL`, in FMI 3.0
+/// `MODEL.fmi3`.
 fn file_stem(description: &ModelDescription) -> String {
     let name = &description.model_name;
     if description.version() == Version::V3 { format!("{name}.fmi3") } else { name.clone() }
@@ -222,7 +225,7 @@ fn pack_version(
     let mut package = Package::new(xml).for_version(version);
     let libraries = match packing.binaries {
         Some(folder) => binaries::collect(folder, &description)?,
-        None => vec![own_library(library, &description)?],
+        None => vec![native_library(library, &description)?],
     };
     for (path, mut bytes) in libraries {
         symbols::hide_unneeded(&mut bytes, version, resources.is_dir());
@@ -252,8 +255,9 @@ fn pack_version(
     Ok(PackedFmu { path, description })
 }
 
-/// Returns path and bytes of the library that was built here, for the FMU.
-fn own_library(
+/// Returns path in the FMU and bytes of the library that was built here. Returns an error if FMI has no name for this
+/// platform.
+fn native_library(
     library: &library::Library,
     description: &ModelDescription,
 ) -> anyhow::Result<(String, Vec<u8>)> {
@@ -268,7 +272,8 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-/// Adds the terminals of the author, or one with all inputs and outputs.
+/// Adds the terminals of the author, or one with all inputs and outputs. A terminal with an unknown variable is an
+/// error.
 fn add_terminals(
     package: &mut Package,
     folder: &Path,
@@ -298,7 +303,7 @@ fn add_terminals(
     Ok(())
 }
 
-/// Adds the author's files, and an entry page if they have none.
+/// Adds the author's files other than the drawing, and an entry page if they have none.
 fn add_documentation(
     package: &mut Package,
     folder: &Path,
@@ -334,7 +339,8 @@ fn add_documentation(
     Ok(())
 }
 
-/// Adds `model.png`, or a picture made from the drawing; in FMI 3.0 it is the icon (section 2.5.1.5).
+/// Adds `model.png`, or a picture made from the drawing, if there is one of them; in FMI 3.0 it is the icon (section
+/// 2.5.1.5).
 fn add_picture(package: &mut Package, folder: &Path, version: Version) -> anyhow::Result<()> {
     let target = if version == Version::V3 { "terminalsAndIcons/icon.png" } else { "model.png" };
     let picture = folder.join("model.png");

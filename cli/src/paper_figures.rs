@@ -60,7 +60,9 @@ struct Run<'a> {
     millimetres: Vec<f64>,
     milliradians: Vec<f64>,
     difference: Vec<f64>,
-    activation: (f64, String),
+    /// Time in s at which the compensation starts, and the text of its mark.
+    activation: f64,
+    activation_text: String,
 }
 
 impl<'a> Run<'a> {
@@ -89,17 +91,18 @@ impl<'a> Run<'a> {
             millimetres: x_p.iter().map(|position| 1000.0 * position).collect(),
             milliradians: theta.iter().map(|angle| 1000.0 * angle).collect(),
             difference: f_fric.iter().zip(f_hat).map(|(force, guess)| force - guess).collect(),
-            activation: (activation, format!("compensation starts, t_on = {activation} s")),
+            activation,
+            activation_text: format!("compensation starts, t_on = {activation} s"),
         })
     }
 
-    /// Draws Figure 5.
+    /// Draws Figure 5: cart position and pendulum angle, and close-ups of their settled part, if there is one.
     fn motion(&self) -> Figure<'_> {
         let panel = |y_label, y_cap, curve| Panel {
             y_label,
             y_cap: Some(y_cap),
             series: vec![curve],
-            marks: vec![(self.activation.0, &self.activation.1)],
+            marks: vec![(self.activation, &self.activation_text)],
             ..Panel::default()
         };
         let position = |values| self.curve("x_p, cart position", values, Ink::Blue);
@@ -124,7 +127,8 @@ impl<'a> Run<'a> {
         Figure { title: "Cart position and pendulum angle, before and after compensation", panels }
     }
 
-    /// Draws Figure 6.
+    /// Draws Figure 6: friction and its estimate, and their difference, from a close-up of the settled part, if there
+    /// is one.
     fn friction(&self) -> Figure<'_> {
         let strongest = self.f_fric.iter().filter(|force| force.is_finite());
         let cap = STRONGEST * strongest.fold(1.0, |most: f64, force| most.max(force.abs()));
@@ -136,7 +140,7 @@ impl<'a> Run<'a> {
                 Series { broad: true, ..self.curve("f_fric", self.f_fric, Ink::Sky) },
                 self.curve("f_hat", self.f_hat, Ink::Vermilion),
             ],
-            marks: vec![(self.activation.0, &self.activation.1)],
+            marks: vec![(self.activation, &self.activation_text)],
             ..Panel::default()
         };
         let close_up = self.settled().map(|(start, end)| (start, end.min(start + CLOSE_UP)));
@@ -157,20 +161,20 @@ impl<'a> Run<'a> {
 
     /// Returns the settled part of the run: from the end of the transient, but at most halfway
     /// through the time after the activation, to the end. `None` if the run ends before the
-    /// activation or diverges after it.
+    /// activation or diverges in this part.
     fn settled(&self) -> Option<(f64, f64)> {
         let motion = || self.time.iter().zip(self.x_p.iter().zip(self.theta));
         let known = motion().filter(|(t, (x, a))| t.is_finite() && x.is_finite() && a.is_finite());
         let end = known.map(|(time, _)| *time).fold(f64::NEG_INFINITY, f64::max);
-        let start = self.activation.0 + SETTLING.min(0.5 * (end - self.activation.0));
+        let start = self.activation + SETTLING.min(0.5 * (end - self.activation));
         let lost = motion().any(|(time, (position, angle))| {
             (start..=end).contains(time) && (position.abs() > FARTHEST || angle.abs() > STEEPEST)
         });
-        (start > self.activation.0 && end > start && !lost).then_some((start, end))
+        (start > self.activation && end > start && !lost).then_some((start, end))
     }
 }
 
-/// Labels the time axis of the last of several panels with the same time range.
+/// Labels the time axis of the last of consecutive panels with the same time range.
 fn name_time_axes(panels: &mut [Panel]) {
     for index in 0..panels.len() {
         let next = panels.get(index + 1).map(|panel| panel.x_range);

@@ -110,7 +110,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
-/// Returns the configuration of plant and controller in the folder `fmus` with these settings.
+/// Returns the configuration of a run of plant and controller in the folder `fmus` with these settings.
 fn experiment(options: &Options, fmus: &Path, settings: &[(String, String)]) -> LoadedConfig {
     let mut config = Config::default();
     for (name, file) in models::FMUS {
@@ -132,7 +132,7 @@ fn settings(options: &Options) -> Vec<(String, String)> {
     options.scenario.settings().into_iter().chain(options.settings.iter().cloned()).collect()
 }
 
-/// Reads the columns that the figures need from a results file.
+/// Reads the columns that the figures need from a results file, as far as it has them.
 fn columns(path: &Path) -> anyhow::Result<HashMap<String, Vec<f64>>> {
     let table = Table::open(path)?;
     let mut columns = HashMap::new();
@@ -144,6 +144,7 @@ fn columns(path: &Path) -> anyhow::Result<HashMap<String, Vec<f64>>> {
     Ok(columns)
 }
 
+/// Prints the table of claims, when and why the pendulum fell or the run ended early, and the folder of the results.
 fn report(options: &Options, written: &Summary) {
     println!("scenario {}", written.scenario);
     println!("{}", table(written.claims));
@@ -162,9 +163,11 @@ fn report(options: &Options, written: &Summary) {
 /// The variables read at every communication point.
 struct Watch {
     probe: Probe,
-    /// `controller.t_on`, `plant.F_s` and `plant.linearised`, read at the start.
+    /// `controller.t_on`, `plant.F_s` and `plant.linearised`.
     parameters: Probe,
+    /// The values of `parameters` at the start; 0 before.
     parameter_values: [f64; 3],
+    /// The measurements; `None` before the start.
     measurement: Option<Measurement>,
 }
 
@@ -182,6 +185,7 @@ impl Watch {
         })
     }
 
+    /// Adds the values at the present time; the first call reads the parameters.
     fn add(&mut self, simulation: &mut Simulation) -> Result<(), SystemError> {
         let time = simulation.time();
         if self.measurement.is_none() {
@@ -204,12 +208,12 @@ impl Watch {
         self.parameter_values[0]
     }
 
-    /// Returns the largest friction in N.
+    /// Returns the bound of the fault in N: the static friction `F_s` of the plant.
     fn fault_bound(&self) -> f64 {
         self.parameter_values[1]
     }
 
     fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
-        self.measurement.as_ref().map(|measured| measured.claims(end, lost)).unwrap_or_default()
+        self.measurement.as_ref().map(|all| all.claims(end, lost)).unwrap_or_default()
     }
 }

@@ -9,7 +9,7 @@ use fmu_description::{ModelDescription, Version};
 use super::read;
 use crate::check::{Severity, binaries};
 
-/// Rust targets of the FMI platforms on which dependencies may differ.
+/// Platforms of FMI, each with its Rust targets, on which dependencies may differ.
 const TARGETS: [(&str, &[&str]); 8] = [
     ("linux64", &["x86_64-unknown-linux-gnu"]),
     ("linux32", &["i686-unknown-linux-gnu"]),
@@ -21,7 +21,7 @@ const TARGETS: [(&str, &[&str]); 8] = [
     ("aarch64-darwin", &["aarch64-apple-darwin"]),
 ];
 
-/// Platforms of FMI 2.0 and the tuples of FMI 3.0.
+/// Platforms of FMI 2.0, each with the tuple of FMI 3.0.
 const TUPLES: [(&str, &str); 5] = [
     ("linux64", "x86_64-linux"),
     ("linux32", "x86-linux"),
@@ -30,16 +30,15 @@ const TUPLES: [(&str, &str); 5] = [
     ("darwin64", "x86_64-darwin"),
 ];
 
-/// Returns the targets of the platforms in `folder`.
+/// Returns the targets in [`TARGETS`] of the platforms that have a folder in `folder`.
 ///
 /// # Errors
 ///
 /// Returns an error if the folder cannot be read.
 pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
-    let there = folders(folder)?;
-    let is_there = |name: &str| there.iter().any(|path| path.ends_with(name));
-    let triples =
-        TARGETS.iter().filter(|(name, _)| is_there(name)).flat_map(|(_, targets)| *targets);
+    let platforms = folders(folder)?;
+    let has = |name: &str| platforms.iter().any(|path| path.ends_with(name));
+    let triples = TARGETS.iter().filter(|(name, _)| has(name)).flat_map(|(_, targets)| *targets);
     Ok(triples.copied().collect())
 }
 
@@ -48,8 +47,8 @@ pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
 ///
 /// # Errors
 ///
-/// Returns an error if there is no library, or if importers would refuse one: built for another
-/// platform than its folder, or without a function of the standard.
+/// Returns an error if a file cannot be read, if there is no library, or if importers may refuse one: built for
+/// another platform than its folder, without a function of the standard, or with a library that it needs and lacks.
 pub(super) fn collect(
     folder: &Path,
     description: &ModelDescription,
@@ -59,9 +58,9 @@ pub(super) fn collect(
     for platform in folders(folder)? {
         for file in files(&platform)? {
             if file.file_stem().is_some_and(|stem| stem.to_str() == Some(model)) {
-                let part =
+                let name =
                     |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
-                let names = part(&platform).zip(part(&file));
+                let names = name(&platform).zip(name(&file));
                 let (platform, name) = names.context("a file without a name")?;
                 libraries.push((format!("binaries/{platform}/{name}"), read(&file)?));
             }
@@ -79,8 +78,8 @@ pub(super) fn collect(
     Ok(libraries)
 }
 
-/// Returns the path of a library in an FMU of `version`: FMI 3.0 has platform tuples only (section
-/// 2.5.1.4.1).
+/// Returns the path of a library in an FMU of `version`: in FMI 3.0 with the platform tuple (section 2.5.1.4.1),
+/// otherwise `path`.
 pub(super) fn path_in(version: Version, path: String) -> String {
     let folder = path.split('/').nth(1).unwrap_or_default();
     match TUPLES.iter().find(|(name, _)| *name == folder) {
@@ -91,6 +90,7 @@ pub(super) fn path_in(version: Version, path: String) -> String {
     }
 }
 
+/// Returns an error with the findings about the libraries that are no notes, if there are any.
 fn refuse_broken(
     libraries: &[(String, Vec<u8>)],
     description: &ModelDescription,
@@ -108,12 +108,12 @@ fn refuse_broken(
     if faults.is_empty() { Ok(()) } else { bail!("{}", faults.join("\n")) }
 }
 
-/// Returns the folders in `folder`, sorted by name.
+/// Returns the paths of the folders in `folder`, sorted by name.
 fn folders(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files(folder)?.into_iter().filter(|path| path.is_dir()).collect())
 }
 
-/// Returns the content of `folder`, sorted by name.
+/// Returns the paths of the files and folders in `folder`, sorted by name.
 fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let failed = || format!("cannot read {}", folder.display());
     let items = fs::read_dir(folder).with_context(failed)?;

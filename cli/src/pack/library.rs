@@ -21,7 +21,7 @@ const PROFILE: &str = include_str!("fmu-profile.toml");
 pub(super) struct Library {
     pub(super) file: PathBuf,
     pub(super) package: Package,
-    /// The packages in the library, by name and version.
+    /// The packages in the library, sorted by name and version.
     pub(super) dependencies: Vec<Package>,
     pub(super) toolchain: Toolchain,
 }
@@ -34,14 +34,14 @@ pub(super) struct Toolchain {
     host: String,
 }
 
-/// Builds the libraries of the crates in `folders`, those of one workspace by one call of cargo, which
-/// compiles them side by side; `locked` is `--locked` of cargo. The dependencies include the
-/// dependencies on the targets `others`, for which the libraries are built elsewhere.
+/// Builds the libraries of the crates in `folders`, in their order. Cargo builds the crates of one workspace together,
+/// so that it compiles them in parallel; `locked` is `--locked` of cargo. The dependencies include the dependencies on
+/// the targets `others`, for which the libraries are built elsewhere.
 ///
 /// # Errors
 ///
-/// Returns an error, with the folder, if there is no such crate, if it is not a `cdylib`, or if it does
-/// not compile.
+/// Returns an error, for the first two with the folder, if there is no such crate, if it is not a `cdylib`, or if it
+/// does not compile.
 pub(super) fn build(
     folders: &[PathBuf],
     locked: bool,
@@ -96,7 +96,7 @@ impl Source {
         &self.metadata.workspace_root
     }
 
-    /// The built library, from the artifacts of the workspace.
+    /// Returns the built library, from the artifacts of the workspace.
     fn library(
         &self,
         artifacts: &[Artifact],
@@ -106,10 +106,10 @@ impl Source {
         let Self { folder, metadata, package, toolchain } = self;
         let mut dependencies = dependencies(metadata, package, artifacts);
         let everywhere: HashSet<_> =
-            reached(metadata, package).into_iter().map(|package| &package.id).collect();
+            normal_dependencies(metadata, package).into_iter().map(|package| &package.id).collect();
         for target in others {
-            let there = self::metadata(folder, target, locked)?;
-            let more = reached(&there, package)
+            let metadata = self::metadata(folder, target, locked)?;
+            let more = normal_dependencies(&metadata, package)
                 .into_iter()
                 .filter(|package| !everywhere.contains(&package.id));
             let more: Vec<_> =
@@ -166,6 +166,7 @@ fn program(variable: &str, name: &str) -> OsString {
     std::env::var_os(variable).unwrap_or_else(|| name.into())
 }
 
+/// Returns what cargo says about the crate in `folder` and its dependencies on the target `host`.
 fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata> {
     let mut options = vec!["--filter-platform".to_owned(), host.to_owned()];
     options.extend(locked.then(|| "--locked".to_owned()));
@@ -180,9 +181,10 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
 /// Builds the libraries of `members`, crates of the workspace of `source`, with the profile `fmu`;
 /// returns all artifacts.
 ///
-/// No library has a local path, so that the same sources give the same bytes. Code that a build script wrote stands in the
-/// target folder; only where its path is found in a library the flags name it, from then on. Named always, it would make
-/// cargo build all again in a copy of the folder.
+/// The libraries contain no local path, so that the same sources give the same bytes. Only code that a build script
+/// wrote has a path in the target folder. A flag that replaces this path would make cargo build everything again in a
+/// copy of the folder. So this function adds the flag, and builds again, only after it found the path in a library; a
+/// marker file keeps that for later calls.
 fn compile<'a>(
     source: &Source,
     members: impl Iterator<Item = &'a Source>,
@@ -203,7 +205,7 @@ fn compile<'a>(
     call_cargo(source, &ids, locked, &flags)
 }
 
-/// Whether a library among the artifacts has this text.
+/// Whether a library among the artifacts contains `text`.
 fn contain(artifacts: &[Artifact], text: &str) -> anyhow::Result<bool> {
     let is_library =
         |artifact: &&Artifact| artifact.target.crate_types.contains(&CrateType::CDyLib);
@@ -216,7 +218,7 @@ fn contain(artifacts: &[Artifact], text: &str) -> anyhow::Result<bool> {
     Ok(false)
 }
 
-/// Builds the packages `ids` of the workspace of `source` with compiler flags.
+/// Builds the packages `ids` of the workspace of `source` with compiler flags; returns all artifacts.
 fn call_cargo(
     source: &Source,
     ids: &[&str],
@@ -227,7 +229,8 @@ fn call_cargo(
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
-    // Not by what is packed: other flags for a crate alone would build it again after it was packed with others.
+    // This depends on the workspace, not on the crates to pack, so that a crate has the same flags alone and with
+    // others.
     let alone = metadata.workspace_members.len() == 1;
     command.current_dir(&source.folder).arg(if alone { "rustc" } else { "build" }).args(ids);
     command.args(["--lib", "--profile", "fmu", "--message-format", "json-render-diagnostics"]);
@@ -261,8 +264,8 @@ fn call_cargo(
     Ok(artifacts)
 }
 
-/// Returns compiler flags that remove local paths from the library, so that the same sources give
-/// the same bytes.
+/// Returns compiler flags that replace local paths in the library: the folder of cargo, and packages outside of the
+/// workspace.
 fn remappings(metadata: &Metadata) -> Vec<String> {
     let cargo_home = std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
@@ -294,19 +297,20 @@ fn has_profile(root: &Path) -> anyhow::Result<bool> {
     Ok(manifest.get("profile").is_some_and(|profiles| profiles.get("fmu").is_some()))
 }
 
-/// Returns the packages in the library: dependencies that were built.
+/// Returns the packages in the library: the dependencies of `root` that were built.
 fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> Vec<Package> {
     let built: HashSet<&PackageId> =
         artifacts.iter().map(|artifact| &artifact.package_id).collect();
-    reached(metadata, root)
+    normal_dependencies(metadata, root)
         .into_iter()
         .filter(|package| built.contains(&package.id))
         .cloned()
         .collect()
 }
 
-/// Returns the dependencies of `root`, without build scripts, tests and procedural macros.
-fn reached<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
+/// Returns the direct and indirect dependencies of `root`, without procedural macros and those of build scripts and
+/// tests.
+fn normal_dependencies<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
     let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
     let nodes: Vec<_> = nodes.collect();
     let (mut open, mut packages) = (vec![&root.id], Vec::<&Package>::new());

@@ -16,7 +16,7 @@ const NAMES: [&str; 6] = ["license", "licence", "unlicense", "copying", "copyrig
 const STANDARD_LIBRARY: &str = "share/doc/rust/COPYRIGHT-library.html";
 
 /// Adds `license.txt`, with the licence of the crate and a list of the packages in the library, and
-/// a folder with the texts of each package.
+/// a folder with the texts of each package that has some.
 pub(super) fn add(package: &mut Package, library: &Library) -> anyhow::Result<()> {
     let mut entry = line(&library.package).into_bytes();
     for path in texts(&library.package)? {
@@ -45,6 +45,7 @@ pub(super) fn add(package: &mut Package, library: &Library) -> anyhow::Result<()
     Ok(())
 }
 
+/// Returns a line with the name, the version and the licence of a package.
 fn line(package: &Crate) -> String {
     let license = match (&package.license, &package.license_file) {
         (Some(license), _) => license,
@@ -54,7 +55,8 @@ fn line(package: &Crate) -> String {
     format!("{} {}: {license}\n", package.name, package.version)
 }
 
-/// Returns the files with licence texts, in the folder of the package or upwards to its workspace.
+/// Returns the files with licence texts: the one that the manifest states, and those of the first folder that has any,
+/// from that of the package upwards to its workspace.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     for folder in package.manifest_path.as_std_path().ancestors().skip(1) {
@@ -64,7 +66,7 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
         }
         let unread = || format!("cannot read {}", manifest.display());
         let manifest: toml::Table = fs::read_to_string(&manifest).with_context(unread)?.parse()?;
-        let mut files = named(folder)?;
+        let mut files = license_files(folder)?;
         files.extend(stated.clone());
         files.sort();
         files.dedup();
@@ -76,7 +78,7 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// Returns the files in `folder` with names of licences, and the files in a folder `LICENSES`.
-fn named(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+fn license_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let failed = || format!("cannot read {}", folder.display());
     for item in fs::read_dir(folder).with_context(failed)? {

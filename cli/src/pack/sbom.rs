@@ -16,12 +16,12 @@ use fmu_description::ModelDescription;
 
 use super::library::Library;
 
-/// Returns the bill of materials of the FMU with this description, as JSON. `foreign` are libraries
-/// that were built elsewhere, by a compiler of unknown version.
+/// Returns the bill of materials of the FMU with this description, as JSON. `foreign` states that the libraries
+/// were built elsewhere, by a compiler of unknown version.
 ///
 /// # Errors
 ///
-/// Returns an error if a crate has a name or a licence expression that `CycloneDX` does not allow.
+/// Returns an error if a crate has a name or a licence expression that is not allowed.
 pub(super) fn bill(
     description: &ModelDescription,
     library: &Library,
@@ -83,6 +83,7 @@ fn licenses(stated: &str) -> anyhow::Result<Licenses> {
     Ok(Licenses(vec![LicenseChoice::Expression(expression)]))
 }
 
+/// Returns the standard library of the compiler `release`; without one, of unknown version.
 fn standard_library(release: Option<&String>) -> Component {
     let name = "rust-std";
     let reference = release.map_or(name.to_owned(), |release| format!("{name}@{release}"));

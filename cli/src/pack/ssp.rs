@@ -11,7 +11,7 @@ use super::PackedFmu;
 
 /// Names of the elements, in the order of the models of the workspace.
 const NAMES: [&str; 2] = ["plant", "controller"];
-/// Output and input of each connection.
+/// The connections: element and output, element and input.
 const LINKS: [[&str; 4]; 3] = [
     ["plant", "x_p", "controller", "x_p"],
     ["plant", "theta", "controller", "theta"],
@@ -22,7 +22,7 @@ const STOP_TIME: f64 = 100.0;
 /// Sample time of the command in s; both FMUs propose it as communication step.
 const STEP: f64 = 1e-3;
 
-/// Writes `InvertedPendulum.ssp` into the folder `out`.
+/// Writes `InvertedPendulum.ssp`, with the plant and the controller in `fmus`, into the folder `out`; returns its path.
 pub(super) fn write(fmus: &[PackedFmu], out: &Path) -> anyhow::Result<PathBuf> {
     let elements = NAMES.iter().zip(fmus).map(|(name, packed)| Element {
         name: (*name).to_owned(),
