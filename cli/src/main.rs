@@ -1,8 +1,8 @@
 //! `aso-ftc`: exports the fault-tolerant controller and the friction pendulum as FMUs, couples
 //! FMUs, and repeats the experiment of Patton and Klinkhieo (2009).
 //!
-//! Exit status: 0 success; 1 a claim does not hold or a run failed; 2 wrong usage or bad input; 128 and the
-//! number of the signal if one ended a run.
+//! Exit status: 0 success; 1 a claim, a check or a design does not hold, a run failed, or output is lost; 2 wrong usage
+//! or bad input; 128 and the number of the signal if one ended a run or a design.
 #![forbid(unsafe_code)]
 
 #[macro_use]
@@ -121,8 +121,9 @@ fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
+/// Performs a verb and returns the exit status; prints an error that the verb returns.
 fn perform(verb: Command) -> u8 {
-    let done = match verb {
+    let outcome = match verb {
         Command::Reproduce(options) => reproduce::reproduce(&options),
         Command::Pack(options) => pack::pack(&options),
         Command::New(options) => new::new(&options),
@@ -137,7 +138,7 @@ fn perform(verb: Command) -> u8 {
         }
         Command::Man(options) => manual::man(&options, Arguments::command()).map(|()| true),
     };
-    match done {
+    match outcome {
         Ok(true) => 0,
         Ok(false) => 1,
         Err(error) => {

@@ -22,17 +22,18 @@ use study::{
 
 use crate::logging;
 use crate::plot;
+use facts::PlannedEntries;
 pub(crate) use interrupt::status as interrupted;
 use live::Live;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use progress::Progress;
 
-/// Largest number of connections listed.
+/// Largest number of connections that are listed.
 const LISTED: usize = 20;
 
-/// Couples FMUs and writes the results. Exit status: 0 the run reached its end, 1 it failed after
-/// the first step, 2 it failed before, 128 + the number of the signal
-/// that ended it.
+/// Couples FMUs and writes the results. Exit status: 0 if the run reached its stop time, or an FMU or the live view
+/// ended it, or `--print-config` is stated; 1 if it failed after its start, or an output is not complete; 2 if it could
+/// not start; 128 and the number of the signal that ended it.
 pub(crate) fn run(options: &Options) -> u8 {
     options.start_logging();
     if options.results.report {
@@ -43,9 +44,9 @@ pub(crate) fn run(options: &Options) -> u8 {
     }
     match prepare(options) {
         Ok(None) => 0,
-        Ok(Some(started)) => {
-            let log = started.log_calls.clone();
-            let status = started.go();
+        Ok(Some(active)) => {
+            let log = active.log_calls.clone();
+            let status = active.go();
             // The last calls free the instances.
             match log.map(|(log, path)| (log.check(), path)) {
                 Some((Err(error), path)) => {
@@ -62,17 +63,17 @@ pub(crate) fn run(options: &Options) -> u8 {
     }
 }
 
-/// A started run with the data needed at its end.
-struct Started {
+/// A run after its start with the data needed at its end.
+struct ActiveRun {
     run: Run,
     /// The current folder at the start.
-    here: PathBuf,
+    folder: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
     /// What the report says about the run, if one is requested.
     report: Option<report::Run>,
-    /// The numbers of settings and faults of the scenario at the start; further ones are interventions.
-    planned: (usize, usize),
+    /// The entries of the scenario at the start; further ones are interventions.
+    planned: PlannedEntries,
     /// The trace of the buses that the report can show.
     bus_trace: Option<PathBuf>,
     /// The pacing by the clock, if one is requested.
@@ -83,21 +84,21 @@ struct Started {
     log_calls: Option<(CallLog, PathBuf)>,
 }
 
-/// Prepares and starts the run; `None` if only the configuration was requested.
-fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
+/// Prepares and starts the run; with `--print-config`, prints the configuration and returns `None`.
+fn prepare(options: &Options) -> anyhow::Result<Option<ActiveRun>> {
     let (loaded, saved) = options.load()?;
     check_outputs(options, &loaded)?;
     // An FMU may change the current folder.
-    let here = std::env::current_dir().context("the current folder")?;
+    let folder = std::env::current_dir().context("the current folder")?;
     let log_calls = options.watching.log_calls.as_deref().map(open_call_log).transpose()?;
-    let making = AssemblyOptions {
+    let assembly = AssemblyOptions {
         logging: options.watching.verbose > 0,
         by_unit: options.names_fmus_by_file(),
         log_calls: log_calls.as_ref(),
         ..Default::default()
     };
     let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
-    let prepared = PreparedRun::new(loaded, &making)?;
+    let prepared = PreparedRun::new(loaded, &assembly)?;
     if options.watching.print_config {
         print!("{}", prepared.config.render()?);
         return Ok(None);
@@ -110,20 +111,21 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     describe(options, system, plan, by_name);
     let units = units(system, ports);
     let report = options.results.report.then(|| facts::facts(system, plan, &config.results.plot));
-    let planned = (config.scenario.set.len(), config.scenario.fault.len());
+    let planned = PlannedEntries::of(&config.scenario);
     let is_shown = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "log");
     let bus_trace = config.results.bus_trace.clone().filter(is_shown);
     let ports = prepared.ports.clone();
     let mut run = prepared.start(saved.as_ref())?;
     let pace = options.time.real_time.map(RealTime::new);
     let factor = pace.as_ref().map(|pace| pace.overruns().factor);
-    let open = |start| Live::open(&mut run, &ports, factor, start, &here);
+    let open = |start| Live::open(&mut run, &ports, factor, start, &folder);
     let live = options.watching.live.map(open).transpose()?;
     let log_calls = log_calls.zip(options.watching.log_calls.clone());
-    Ok(Some(Started { run, here, units, report, planned, bus_trace, pace, live, log_calls }))
+    Ok(Some(ActiveRun { run, folder, units, report, planned, bus_trace, pace, live, log_calls }))
 }
 
-/// Checks that no output is an input, and reserves standard output for the results if they go there.
+/// Checks that no output is an input and that results to a stream are not needed again; reserves standard output for
+/// the results if they go there.
 fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()> {
     let config = &loaded.config;
     let results = config.results.file.as_deref();
@@ -150,7 +152,8 @@ fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Prints the connections and, if variables are connected `by_name`, the inputs without one.
+/// Prints the connections, the inputs without one if variables are connected `by_name`, and the algorithm with
+/// `--explain`; warns of loops that are not iterated.
 fn describe(options: &Options, system: &System, plan: &Plan, by_name: bool) {
     println!("{}", connections(system));
     let open = if by_name { open_inputs::list(system) } else { String::new() };
@@ -190,7 +193,7 @@ pub(crate) fn advance(
     ended
 }
 
-/// Checks before the run that the plot can be drawn.
+/// Checks before the run that the plot, if one is requested, can be drawn.
 fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Result<()> {
     let results = &config.results;
     let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) else {
@@ -208,7 +211,7 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     selection.choose(&names).context("plot").map(|_| ())
 }
 
-/// Lists the connections; long lists are shortened.
+/// Lists the first [`LISTED`] connections and the number of further ones.
 fn connections(system: &System) -> String {
     let names = system.connections.iter().map(|connection| {
         format!("{} -> {}", system.name(connection.from), system.name(connection.to))
@@ -224,6 +227,7 @@ fn connections(system: &System) -> String {
     lines.join("\n")
 }
 
+/// Warns if direct dependencies form a loop and steps are not iterated.
 fn warn_of_loop(plan: &Plan, system: &System) {
     let looped = by_direct_dependencies(system).looped;
     if plan.algorithm.coupling == Coupling::Once && !looped.is_empty() {
@@ -247,12 +251,14 @@ fn summary(tally: RunStatistics, start: f64, time: f64) -> String {
     )
 }
 
+/// Returns name and unit of each variable that has a unit.
 fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
     let unit = |port: &Port| Some((system.name(*port), study::unit(system, *port)?));
     ports.iter().filter_map(unit).collect()
 }
 
-impl Started {
+impl ActiveRun {
+    /// Runs to the end, completes the outputs, and returns the exit status.
     fn go(mut self) -> u8 {
         let start = self.run.simulation.time();
         let ended = match (&mut self.pace, &mut self.live) {
@@ -281,41 +287,42 @@ impl Started {
         println!("{outcome}");
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
-        // What the live view says of the end.
-        let mut told = outcome.clone();
+        // For the live view.
+        let mut message = outcome.clone();
         let status = match &ended {
             RunEnd::AtStop => 0,
             RunEnd::ByFmu(name) => {
-                let asked = self.run.simulation.ended_at().unwrap_or(time);
-                let (asked, ending) = (number::seconds(asked), apart(asked, time));
+                let requested = self.run.simulation.ended_at().unwrap_or(time);
+                let note = early_end(requested, time);
+                let requested = number::seconds(requested);
                 tracing::warn!(
-                    "{name} requested the end of the simulation at t = {asked} s{ending}"
+                    "{name} requested the end of the simulation at t = {requested} s{note}"
                 );
                 0
             }
             RunEnd::Interrupted if self.is_stopped() => {
-                told = format!("the run was stopped in the live view at t = {shown} s");
-                println!("{told}");
+                message = format!("the run was stopped in the live view at t = {shown} s");
+                println!("{message}");
                 0
             }
             RunEnd::Interrupted => {
-                let more = self.run.checkpoint_file().map(|path| relative(path, &self.here));
+                let more = self.run.checkpoint_file().map(|path| relative(path, &self.folder));
                 let more =
                     more.map(|path| format!("; to go on: {}", run_command("--resume ", &path)));
                 let more = more.unwrap_or_default();
-                told = format!("the run was interrupted at t = {shown} s{more}");
-                tracing::error!("{told}");
+                message = format!("the run was interrupted at t = {shown} s{more}");
+                tracing::error!("{message}");
                 interrupt::status()
             }
             RunEnd::Failed(error) => {
                 let error = error.sentence();
-                told = format!("the run ended early, after t = {shown} s: {error}");
-                tracing::error!("{told}");
+                message = format!("the run ended early, after t = {shown} s: {error}");
+                tracing::error!("{message}");
                 1
             }
         };
         if let Some(live) = self.live.take() {
-            live.end(&told, &self.here);
+            live.end(&message, &self.folder);
         }
         let traced = self.run.finish_trace().map_err(anyhow::Error::from);
         let mut outputs = vec![traced];
@@ -331,7 +338,7 @@ impl Started {
         for error in outputs.into_iter().filter_map(Result::err) {
             let sentence = files::sentence(error.as_ref());
             // The run may have ended with this error.
-            if !told.contains(&sentence) {
+            if !message.contains(&sentence) {
                 tracing::error!("{sentence}");
             }
             status = status.max(1);
@@ -339,13 +346,13 @@ impl Started {
         status
     }
 
-    /// Whether the live view has stopped the run.
+    /// Whether the live view, and no signal, has stopped the run.
     fn is_stopped(&self) -> bool {
         let by_page = self.live.as_ref().is_some_and(|live| live.stopped);
         by_page && !interrupt::is_raised()
     }
 
-    /// Writes the report, if one is requested.
+    /// Writes the report, if one is requested, and prints its name.
     fn report(&mut self, file: &Path, outcome: String, failed: bool) -> anyhow::Result<()> {
         let Some(run) = self.report.take() else { return Ok(()) };
         let scenario = &self.run.config.scenario;
@@ -370,6 +377,7 @@ impl Started {
         Ok(())
     }
 
+    /// Warns if the iteration failed in some steps.
     fn warn_of_fallbacks(&self, tally: RunStatistics) {
         let Some(fallbacks) = self.run.simulation.fallbacks().filter(|known| known.count > 0)
         else {
@@ -385,7 +393,8 @@ impl Started {
         );
     }
 
-    /// Completes the results, and prints the files written; returns the results file.
+    /// Completes the results, and prints the names of their file and, unless the run failed, of the checkpoint. Returns
+    /// the results file; `None` if none is written.
     fn write(&mut self, ended: &RunEnd) -> anyhow::Result<Option<PathBuf>> {
         let file = self.run.finish()?.map(Path::to_owned);
         if let Some(file) = file.as_deref().filter(|file| !is_stream(file)) {
@@ -401,10 +410,10 @@ impl Started {
 
     /// Prints the name of a file that was written.
     fn show(&self, path: &Path) {
-        println!("{}", relative(path, &self.here));
+        println!("{}", relative(path, &self.folder));
     }
 
-    /// Draws the plot of the results in `file`, if one is requested.
+    /// Draws the plot of the results in `file`, if one is requested, and prints its name.
     fn draw(&self, file: &Path) -> anyhow::Result<()> {
         let results = &self.run.config.results;
         let Some(picture) = results.plot_file.as_deref().filter(|_| !results.plot.is_empty())
@@ -421,25 +430,24 @@ impl Started {
     }
 }
 
-/// Returns a note if the results end before the time `asked` at which an FMU requested the end, all
-/// in s.
-fn apart(asked: f64, end: f64) -> String {
-    if asked <= end {
+/// Returns a note if the results end before the time `requested` by an FMU, otherwise an empty text; both times in s.
+fn early_end(requested: f64, end: f64) -> String {
+    if requested <= end {
         return String::new();
     }
-    let [asked, end] = [asked, end].map(number::seconds);
+    let [requested, end] = [requested, end].map(number::seconds);
     format!(
         "; the results end at t = {end} s, the last time that all FMUs have in common (with \
-         --rollback, which needs FMUs that can go back, they end at {asked} s)"
+         --rollback, which needs FMUs that can go back, they end at {requested} s)"
     )
 }
 
-/// Returns a path as it is from the folder `here`.
-fn relative(path: &Path, here: &Path) -> String {
-    path.strip_prefix(here).unwrap_or(path).display().to_string()
+/// Returns a path in `folder` relative to it, and another path unchanged.
+fn relative(path: &Path, folder: &Path) -> String {
+    path.strip_prefix(folder).unwrap_or(path).display().to_string()
 }
 
-/// Returns the command line of a run of `file`, with an option before it.
+/// Returns the command line of a run of `file`, with `option` before it.
 fn run_command(option: &str, file: &str) -> String {
     let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
     format!("{} run {option}{}", quoted(&command), quoted(file))

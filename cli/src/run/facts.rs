@@ -1,4 +1,4 @@
-//! What the report of a run says about the run itself.
+//! Facts about a run for its report: system, algorithm, and changes and faults of the scenario.
 
 use fmu_description::Causality;
 use master::{Port, System};
@@ -7,7 +7,21 @@ use serde::Serialize;
 use study::Plan;
 use study::scenario::Scenario;
 
-/// The system, the algorithm and the variables to plot; outcome, marks and messages follow at the end of the run.
+/// The numbers of entries of a scenario before interventions.
+#[derive(Clone, Copy)]
+pub(super) struct PlannedEntries {
+    settings: usize,
+    faults: usize,
+}
+
+impl PlannedEntries {
+    pub(super) fn of(scenario: &Scenario) -> Self {
+        Self { settings: scenario.set.len(), faults: scenario.fault.len() }
+    }
+}
+
+/// Returns the system, the algorithm and the variables to plot; outcome, marks and messages follow at the end of the
+/// run.
 pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
     let variable = |port: Port| {
         system.slaves[port.slave].1.description().variables[port.variable].name.clone()
@@ -36,21 +50,22 @@ pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
     }
 }
 
-/// Returns what a scenario changes and when; entries after the first `planned` settings and faults are interventions.
-pub(super) fn marks(scenario: &Scenario, planned: (usize, usize), start: f64) -> Vec<Mark> {
+/// Returns the settings, the steps of signals and the faults of a scenario with their times; settings and faults after
+/// the `planned` ones are interventions. A fault without a time is from the `start` of the run on.
+pub(super) fn marks(scenario: &Scenario, planned: PlannedEntries, start: f64) -> Vec<Mark> {
     let kind = |at: usize, planned: usize, kind| {
         if at < planned { kind } else { MarkKind::Intervention }
     };
     let set = scenario.set.iter().enumerate().map(|(at, entry)| {
         let entry = entry.get_ref();
-        let text = format!("{} = {}", entry.variable.get_ref(), written(entry.value.get_ref()));
-        Mark { kind: kind(at, planned.0, MarkKind::Change), time: entry.at, end: None, text }
+        let text = format!("{} = {}", entry.variable.get_ref(), toml_text(entry.value.get_ref()));
+        Mark { kind: kind(at, planned.settings, MarkKind::Change), time: entry.at, end: None, text }
     });
     let steps = scenario.signal.iter().flat_map(|entry| {
         let entry = entry.get_ref();
         let steps = entry.steps.iter().flat_map(toml::Spanned::get_ref);
         steps.map(|(time, value)| {
-            let text = format!("{} = {}", entry.variable.get_ref(), written(value.get_ref()));
+            let text = format!("{} = {}", entry.variable.get_ref(), toml_text(value.get_ref()));
             Mark { kind: MarkKind::Change, time: *time, end: None, text }
         })
     });
@@ -60,10 +75,11 @@ pub(super) fn marks(scenario: &Scenario, planned: (usize, usize), start: f64) ->
         let table = toml::Table::try_from(entry).unwrap_or_default();
         let body = table.iter().find_map(|(name, body)| Some((name, body.as_table()?)));
         let time = |name: &str| body?.1.get(name)?.as_float();
-        let what = body.map(|(name, body)| format!("{name} {}", written(body))).unwrap_or_default();
+        let what =
+            body.map(|(name, body)| format!("{name} {}", toml_text(body))).unwrap_or_default();
         let text = format!("{}: {what}", entry.connection.get_ref());
         let (time, end) = (time("from").unwrap_or(start), time("until"));
-        Mark { kind: kind(at, planned.1, MarkKind::Fault), time, end, text }
+        Mark { kind: kind(at, planned.faults, MarkKind::Fault), time, end, text }
     });
     set.chain(steps).chain(faults).collect()
 }
@@ -74,8 +90,8 @@ pub(super) fn disturbed(scenario: &Scenario) -> Vec<String> {
     scenario.fault.iter().map(|fault| input(fault.get_ref().connection.get_ref())).collect()
 }
 
-/// A value as in a TOML file, in one line.
-fn written(value: impl Serialize) -> String {
+/// Formats a value as in a TOML file, in one line; empty if TOML cannot state it.
+fn toml_text(value: impl Serialize) -> String {
     toml::Value::try_from(value).map(|value| value.to_string()).unwrap_or_default()
 }
 

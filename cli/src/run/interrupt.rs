@@ -1,5 +1,5 @@
-//! Handles Ctrl-C and the signals by which systems announce the end: the run ends after the current step, or
-//! without it if the step does not return.
+//! Handles Ctrl-C and the signals by which systems announce the end: the run ends after the current step; the process
+//! ends if the step does not return.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -11,17 +11,19 @@ use fmu_import::crash;
 
 use crate::signals::on_signal;
 
-/// Time limit of a call of an FMU, and of a whole step, after the signal.
+/// Time limits of a call of an FMU, and of the current step, after the signal.
 const CALL: Duration = Duration::from_millis(800);
 const STEP: Duration = Duration::from_secs(5);
 /// Interval of checks whether calls return.
 const LOOK: Duration = Duration::from_millis(50);
-/// A second signal within this time is the first one, sent to a process and to its group.
+/// A second signal within this time is taken for the first one, which was sent to the process and to its group.
 const TOGETHER: Duration = Duration::from_millis(200);
 
+/// Whether signals are handled.
 static LISTENING: AtomicBool = AtomicBool::new(false);
-/// The number of the signal that has arrived; 0: none.
+/// The number of the first signal that has arrived; 0: none.
 static RAISED: AtomicU8 = AtomicU8::new(0);
+/// Whether the steps have ended.
 static NOTICED: AtomicBool = AtomicBool::new(false);
 /// The thread of [`wait`].
 static WAITING: OnceLock<Thread> = OnceLock::new();
@@ -32,7 +34,7 @@ pub(crate) fn status() -> u8 {
 }
 
 /// Starts to handle signals: the first one ends the run soon, a second one ends the process at
-/// once.
+/// once. A second call has no effect.
 pub(super) fn listen() -> anyhow::Result<()> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
@@ -44,7 +46,8 @@ pub(super) fn listen() -> anyhow::Result<()> {
     on_signal(raise).context("signals cannot be handled")
 }
 
-/// Acts on a signal.
+/// Handles a signal: the first one makes [`wait`] watch the end of the run, a later one after [`TOGETHER`] ends the
+/// process.
 fn raise(signal: u8) {
     /// When the first signal arrived.
     static FIRST: OnceLock<Instant> = OnceLock::new();
@@ -61,8 +64,8 @@ fn raise(signal: u8) {
     }
 }
 
-/// Waits for a signal, then for the end of the run, and ends the process if an FMU call does not return, or the step takes too
-/// long. Writing results, plots and checkpoints may take longer.
+/// Waits for a signal. Then ends the process if a call of an FMU does not return within [`CALL`], or if the steps do
+/// not end within [`STEP`]; writing results, plots and checkpoints may take longer.
 fn wait() {
     while !is_raised() {
         thread::park();

@@ -1,4 +1,4 @@
-//! The live view of a run: publishes samples, performs the requests of the page between steps.
+//! The live view of a run: publishes samples and performs the requests of the page between steps.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,20 @@ use fmu_description::number::seconds;
 use fmu_description::{Causality, Kind, ScalarVariable, Variability};
 use live::{Action, Facts, Phase, Request, Sample, Source, Subject, Variable, View};
 use master::{Port, Probe, Readout, System};
+use results::is_stream;
 use study::config::CheckpointSettings;
 use study::{Error, RealTime, Run};
 
 use super::{interrupt, relative, run_command};
 use crate::logging;
 
-/// Largest number of signals, and of variables that can be set, on the page.
+/// Largest number of signals on the page.
 const SIGNALS: usize = 500;
+/// Largest number of variables that can be set on the page.
 const SETTINGS: usize = 5000;
 /// Interval between two looks for a signal of the operating system while the run is paused.
 const LOOK: Duration = Duration::from_millis(50);
-/// How long the command waits at its end until an open page has shown this.
+/// Longest time that the command waits at its end until an open page has shown the end.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// State of the run at its start, as `--live` gives it.
@@ -36,46 +38,48 @@ pub(crate) enum LiveStart {
 pub(super) struct Live {
     view: View,
     probe: Probe,
-    /// Whether the FMUs let the signals be read.
+    /// Whether the signals can be read; false after the first error.
     readable: bool,
     phase: Phase,
     /// Whether the run pauses again after the step that it makes.
     pauses_again: bool,
     start: Instant,
-    /// Time of all pauses.
+    /// Time of all pauses and requests.
     paused: Duration,
     /// Lines of the file that repeats the run: what it is, the interventions, and the stop.
     remarks: Vec<String>,
-    /// Beside the results. The file that repeats the run before a checkpoint keeps its name.
+    /// The file that repeats the run, in the folder of the results. It has another name for a resumed run, so that it
+    /// does not replace the file of the run before the checkpoint.
     file: PathBuf,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,
 }
 
 impl Live {
-    /// Starts the view of a run whose recorded variables are `ports`, and prints its address. `here`
-    /// is the current folder.
+    /// Starts the view of a run whose recorded variables are `ports`, and prints its address. `pace` is the factor of
+    /// `--real-time`, `folder` the current folder.
     pub(super) fn open(
         run: &mut Run,
         ports: &[Port],
         pace: Option<f64>,
         start: LiveStart,
-        here: &Path,
+        folder: &Path,
     ) -> anyhow::Result<Self> {
-        let results = run.config.results.file.clone().unwrap_or_default();
-        let (begin, stop) = (run.simulation.time(), run.plan.stop);
-        let resumed = begin > run.plan.experiment.start_time;
+        // Beside a pipe or a device there is no folder for the file.
+        let results = run.config.results.file.clone().filter(|file| !is_stream(file));
+        let (start_time, stop) = (run.simulation.time(), run.plan.stop);
+        let is_resumed = start_time > run.plan.experiment.start_time;
         let first =
             "A run with --live, with its interventions. `aso-ftc run` with this file repeats it";
-        let (file, first) = if resumed {
-            let begin = seconds(begin);
-            let name = format!("live-from-{begin}.toml");
-            (name, format!("{first} from its start, not from the checkpoint at t = {begin} s."))
+        let (file, first) = if is_resumed {
+            let time = seconds(start_time);
+            let name = format!("live-from-{time}.toml");
+            (name, format!("{first} from its start, not from the checkpoint at t = {time} s."))
         } else {
             ("live.toml".to_owned(), format!("{first}."))
         };
-        let file = results.with_file_name(file);
-        let shown = relative(&file, here);
+        let file = results.unwrap_or_default().with_file_name(file);
+        let shown = relative(&file, folder);
         let repeat = run_command("", &shown);
         let settable = settable(run.simulation.system());
         let unrecorded = settable.iter().filter(|port| !ports.contains(port));
@@ -85,7 +89,7 @@ impl Live {
         let facts = Facts {
             subject: Subject::Run,
             system: names.join(", "),
-            start: begin,
+            start: start_time,
             stop,
             pace,
             signals: probe.names().iter().filter_map(|name| named(system, name)).collect(),
@@ -115,13 +119,14 @@ impl Live {
         })
     }
 
-    /// Does what the page asks for, at a communication point of the run; one atomic load if it asks for
-    /// nothing.
+    /// Performs the requests of the page, at a communication point of the run; breaks if the page stops the run.
+    /// Without a request, this is one atomic load.
     #[inline]
     pub(super) fn attend(&mut self, run: &mut Run, pace: Option<&mut RealTime>) -> ControlFlow<()> {
         if self.view.is_called() { self.perform_all(run, pace) } else { ControlFlow::Continue(()) }
     }
 
+    /// Publishes a sample if one is due, and performs all requests, during a pause until it ends.
     #[cold]
     fn perform_all(&mut self, run: &mut Run, pace: Option<&mut RealTime>) -> ControlFlow<()> {
         let due = self.view.take_calls();
@@ -204,24 +209,27 @@ impl Live {
         Ok(format!("Accepted: it takes effect at t = {from} s, or at the later time of an entry."))
     }
 
-    /// Writes the file that repeats the run.
+    /// Writes the file that repeats the run; an error is also logged.
     fn write(&self, run: &Run) -> Result<(), String> {
         let text = self.repetition(run).map_err(|error| error.sentence())?;
         files::whole::write(&self.file, text.as_bytes()).map_err(|error| {
-            let said = format!("done, but {} cannot be written: {error}", self.file.display());
-            tracing::error!("{said}");
-            said
+            let message = format!("done, but {} cannot be written: {error}", self.file.display());
+            tracing::error!("{message}");
+            message
         })
     }
 
-    /// Returns the complete configuration of the run with all interventions. Its results get other
-    /// names than those of the run.
+    /// Returns the complete configuration of the run with all interventions. Its results, its plot and its bus trace
+    /// have other names than those of the run, and there is no checkpoint.
     fn repetition(&self, run: &Run) -> Result<String, Error> {
         let mut config = run.config.clone();
-        for (path, name) in
-            [(&mut config.results.file, "repeat"), (&mut config.results.plot_file, "repeat-plot")]
-        {
-            if let Some(path) = path {
+        let results = &mut config.results;
+        for (path, name) in [
+            (&mut results.file, "repeat"),
+            (&mut results.plot_file, "repeat-plot"),
+            (&mut results.bus_trace, "repeat-bus"),
+        ] {
+            if let Some(path) = path.as_mut().filter(|path| !is_stream(path)) {
                 let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
                 *path = path.with_file_name(format!("{name}.{ending}"));
             }
@@ -232,7 +240,7 @@ impl Live {
         Ok(remarks + &config.render()?)
     }
 
-    /// Publishes the values of the signals.
+    /// Publishes the values of the signals, NaN if they cannot be read; the first error is a warning.
     pub(super) fn sample(&mut self, run: &mut Run, pace: Option<&RealTime>) {
         let start = Instant::now();
         let time = run.simulation.time();
@@ -258,7 +266,7 @@ impl Live {
         self.view.set_cost(start.elapsed());
     }
 
-    /// Returns the part of the run's summary on pauses.
+    /// Returns the part of the run's summary on pauses; empty below 1 ms.
     pub(super) fn summary(&self) -> String {
         let paused = self.paused.as_secs_f64();
         if paused < 0.001 {
@@ -267,17 +275,17 @@ impl Live {
         format!("; {paused:.3} s of it paused by the live view")
     }
 
-    /// Prints how the run is repeated, tells the page how it ended, and closes the page. `here` is the
-    /// current folder.
-    pub(super) fn end(self, outcome: &str, here: &Path) {
+    /// Prints the command that repeats the run if the page changed it, shows `outcome` on the page, and closes the
+    /// page. `folder` is the current folder.
+    pub(super) fn end(self, outcome: &str, folder: &Path) {
         if self.remarks.len() > 1 {
-            println!("to repeat it: {}", run_command("", &relative(&self.file, here)));
+            println!("to repeat it: {}", run_command("", &relative(&self.file, folder)));
         }
         self.view.end(outcome, PATIENCE);
     }
 }
 
-/// Returns a probe of the variables that can be read: those that are recorded, then those that can be set.
+/// Returns a probe of the first [`SIGNALS`] of `ports` that can be read.
 fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
     let time = run.simulation.time();
     let system = run.simulation.system();
@@ -288,6 +296,7 @@ fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
     Ok(Probe::new(system, &readable))
 }
 
+/// Returns the variable with this name; `None` if the system has none.
 fn named(system: &System, name: &str) -> Option<Variable> {
     system.port(name).ok().map(|port| variable(system, port))
 }
@@ -303,7 +312,7 @@ fn variable(system: &System, port: Port) -> Variable {
     }
 }
 
-/// Returns the inputs without a connection and the tunable parameters.
+/// Returns the first [`SETTINGS`] of the inputs without a connection and the tunable parameters.
 fn settable(system: &System) -> Vec<Port> {
     let inputs = system.ports(Causality::Input).into_iter();
     let free = inputs.filter(|port| system.source(*port).is_none());
@@ -312,7 +321,7 @@ fn settable(system: &System) -> Vec<Port> {
     free.chain(parameters.filter(is_tunable)).take(SETTINGS).collect()
 }
 
-/// Returns the connected inputs on which a fault can act.
+/// Returns the connected inputs on which a fault can act: real numbers, integers and Booleans, each with its output.
 fn inputs(system: &System) -> Vec<Source> {
     let fits = |port: Port| {
         !matches!(system.variable(port).kind, Kind::String(_) | Kind::Binary(_) | Kind::Clock(_))

@@ -1,13 +1,14 @@
-//! Lists the inputs without a connection, with options that would set or connect them.
+//! Lists the inputs without a connection, with options that set or connect them.
 
 use master::{Port, System};
 
-/// Largest number of inputs listed, and of outputs proposed for one.
+/// Largest number of inputs that are listed.
 const INPUTS: usize = 20;
+/// Largest number of outputs that are proposed for an input.
 const OUTPUTS: usize = 3;
 
-/// Returns a line for each input without a connection, which keeps its start value; empty if every
-/// input has a source.
+/// Returns a heading, a line for each of the first [`INPUTS`] inputs without a connection, and the number of further
+/// ones; empty for a single FMU and if every input has a source.
 pub(super) fn list(system: &System) -> String {
     let open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
     let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();
@@ -20,15 +21,16 @@ pub(super) fn list(system: &System) -> String {
     lines.join("\n")
 }
 
+/// Returns the line of an input: options that connect it to outputs that fit, or the option that sets it.
 fn line(system: &System, input: Port) -> String {
     let name = system.name(input);
     let outputs = system.candidates(input);
     if outputs.is_empty() {
         return format!("  {name}: set it by --set {name}=VALUE");
     }
-    let typed = |output: &Port| format!("--connect {}={name}", system.name(*output));
-    let proposed: Vec<_> = outputs.iter().take(OUTPUTS).map(typed).collect();
+    let option = |output: &Port| format!("--connect {}={name}", system.name(*output));
+    let options: Vec<_> = outputs.iter().take(OUTPUTS).map(option).collect();
     let more = outputs.len().saturating_sub(OUTPUTS);
     let more = if more > 0 { format!(" ({more} more outputs fit)") } else { String::new() };
-    format!("  {name}: {}{more}", proposed.join(" or "))
+    format!("  {name}: {}{more}", options.join(" or "))
 }

@@ -306,7 +306,7 @@ pub(super) struct WatchingOptions {
     pub(super) log_json: bool,
 }
 
-/// Splits `name=value`.
+/// Splits `name=value`; the name must not be empty.
 pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
@@ -314,7 +314,7 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// Splits `from=to`.
+/// Splits `from=to`; the error for another sign between them proposes the right form.
 fn connection(text: &str) -> Result<(String, String), String> {
     let split =
         |sign| text.split_once(sign).filter(|(from, to)| !from.is_empty() && !to.is_empty());
@@ -327,6 +327,7 @@ fn connection(text: &str) -> Result<(String, String), String> {
     Err(format!("expected OUTPUT=INPUT, {word} --connect {}={}", from.trim(), to.trim()))
 }
 
+/// Splits `name=count` and parses the count, which is above 0.
 fn multiple(text: &str) -> Result<(String, u32), String> {
     let (name, value) = setting(text)?;
     match value.parse() {
@@ -349,7 +350,7 @@ fn method(text: &str) -> Result<Method, String> {
 }
 
 impl AlgorithmOptions {
-    /// Overwrites the settings in `request` with the options stated.
+    /// Overwrites the settings in `request` with the options stated, and adds those of `--every`.
     pub(crate) fn apply(&self, request: &mut AlgorithmRequest) {
         put(&mut request.step, self.step);
         put(&mut request.method, self.method);
@@ -385,7 +386,7 @@ impl Options {
     }
 
     /// Returns the configuration of the file or the checkpoint, with the options of the command
-    /// line, and the checkpoint.
+    /// line, and the checkpoint of a resumed run.
     pub(super) fn load(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         let (mut loaded, saved) = self.base()?;
         let config = &mut loaded.config;
@@ -405,6 +406,8 @@ impl Options {
         Ok((loaded, saved))
     }
 
+    /// Returns the configuration of the checkpoint, of the system or of the FMUs stated, without further options;
+    /// without any of them, that of the default system.
     fn base(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         if let Some(path) = &self.safety.resume {
             let saved = SavedRun::read(path)?;
@@ -450,6 +453,8 @@ impl Options {
         Ok((LoadedConfig { config, source: None }, None))
     }
 
+    /// Adds FMUs, interfaces, solvers, connections, settings and libraries of the command line. Two sources of an input
+    /// are an error.
     fn put_system(&self, config: &mut Config) -> anyhow::Result<()> {
         for (name, path) in &self.system.fmus {
             config.fmus.put(name.clone(), path.into());
@@ -479,11 +484,12 @@ impl Options {
         Ok(())
     }
 
-    /// Whether FMUs are given as paths only.
+    /// Whether the command line states FMUs by their paths in place of the file of a system.
     pub(super) fn names_fmus_by_file(&self) -> bool {
         self.system.inputs.first().is_some_and(|path| is_fmu(path))
     }
 
+    /// Adds the options of the results, and fills in the names of all files.
     fn put_results(&self, config: &mut Config, saved: Option<&SavedRun>) -> anyhow::Result<()> {
         let results = &mut config.results;
         if !self.results.record.is_empty() {
@@ -498,16 +504,19 @@ impl Options {
         put(&mut results.every, self.results.record_every);
         let out = self.results.out.as_deref();
         let format = self.results.format.as_deref();
-        // A resumed run must not overwrite the rows before the checkpoint.
+        // A resumed run must not overwrite the files of the run before the checkpoint.
+        let next_path = |path: PathBuf| match saved {
+            Some(saved) => resumed_path(&path, saved.time()),
+            None => path,
+        };
         let place = |stated: &Option<PathBuf>, known: &Option<PathBuf>, name: &str| {
             if let Some(path) = stated {
                 return path.clone();
             }
-            let path = match (out, known) {
+            next_path(match (out, known) {
                 (None, Some(known)) => known.clone(),
                 (out, _) => out.unwrap_or(Path::new(OUT)).join(name),
-            };
-            saved.map_or(path.clone(), |saved| resumed(&path, saved.time()))
+            })
         };
         let mut file = place(&self.results.results, &results.file, "results.csv");
         if file == Path::new("-") {
@@ -524,30 +533,34 @@ impl Options {
         }
         results.file = Some(file);
         results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
-        let known = results.bus_trace.take();
-        let known =
-            known.map(|path| saved.map_or(path.clone(), |saved| resumed(&path, saved.time())));
+        let known = results.bus_trace.take().map(next_path);
         results.bus_trace = self.results.bus_trace.clone().or(known);
         Ok(())
     }
 }
 
-/// Returns the results file for the rows after `time`, in the folder of the file for the rows
-/// before.
-fn resumed(path: &Path, time: f64) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+/// Returns the path of a file that a run resumed at `time` writes, in the folder of the file `path` of the run before.
+/// A pipe or device keeps its path.
+fn resumed_path(path: &Path, time: f64) -> PathBuf {
+    if is_stream(path) {
+        return path.to_owned();
+    }
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
     // The file may belong to a run that was itself resumed.
-    let stem = stem.split("-from-").next().unwrap_or_default();
+    let stem = match name.rsplit_once("-from-") {
+        Some((stem, time)) if time.parse::<f64>().is_ok() => stem,
+        _ => &name,
+    };
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-from-{}.{ending}", seconds(time)))
 }
 
-/// Whether `path` is an FMU, packed or unpacked.
+/// Whether `path` has the extension of an FMU, or is the folder of an unpacked one.
 fn is_fmu(path: &Path) -> bool {
     has_ending(path, "fmu") || path.join("modelDescription.xml").is_file()
 }
 
-/// Returns the name of the file, with a number if the configuration already has an FMU of this
+/// Returns the name of the file without extension, with a number if the configuration already has an FMU of this
 /// name.
 fn free_name(path: &Path, config: &Config) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -556,11 +569,13 @@ fn free_name(path: &Path, config: &Config) -> String {
     std::iter::once(stem.clone()).chain(numbered).find(|name| !is_used(name)).unwrap_or(stem)
 }
 
+/// Whether `path` has this extension, in upper or lower case.
 fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
-/// Checks the numbers of the command line; numbers of a file were checked when it was read.
+/// Checks the numbers of the command line, and that checkpoints at intervals have a file; numbers of a file were
+/// checked when it was read.
 fn check_numbers(config: &Config) -> anyhow::Result<()> {
     let above = [
         ("--tolerance", &config.experiment.tolerance),
@@ -578,4 +593,21 @@ fn check_numbers(config: &Config) -> anyhow::Result<()> {
         config.checkpoint.file.as_ref().context("--checkpoint-every needs --checkpoint FILE")?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resumed_run_replaces_only_the_time_of_a_former_one_and_writes_to_the_same_pipe() {
+        for (path, expected) in [
+            ("a/results.csv", "a/results-from-2.5.csv"),
+            ("a/results-from-1.csv", "a/results-from-2.5.csv"),
+            ("log-from-lab.csv", "log-from-lab-from-2.5.csv"),
+            (STANDARD_OUTPUT, STANDARD_OUTPUT),
+        ] {
+            assert_eq!(resumed_path(Path::new(path), 2.5), Path::new(expected));
+        }
+    }
 }

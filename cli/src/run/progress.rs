@@ -16,10 +16,12 @@ const DIGITS: usize = 3;
 /// A progress bar of simulated time; hidden if standard error is not a terminal.
 pub(super) struct Progress {
     bar: Option<ProgressBar>,
+    /// Start time of the run in s.
     start: f64,
+    /// Simulated time in s between two updates, and the time of the next one; infinite without a bar.
     part: f64,
     next: f64,
-    began: Instant,
+    wall_clock_start: Instant,
 }
 
 impl Progress {
@@ -29,10 +31,11 @@ impl Progress {
             .is_terminal()
             .then(|| logging::bar("{bar:24} {percent:>3} %, {msg}, {eta} left", whole(PARTS)));
         let next = if bar.is_some() { start } else { f64::INFINITY };
-        Self { bar, start, part: (stop - start) / PARTS, next, began: Instant::now() }
+        let wall_clock_start = Instant::now();
+        Self { bar, start, part: (stop - start) / PARTS, next, wall_clock_start }
     }
 
-    /// Updates the bar to `time`, in s.
+    /// Updates the bar to `time`, in s, if an update is due.
     #[inline]
     pub(super) fn show(&mut self, time: f64) {
         if time >= self.next {
@@ -45,7 +48,8 @@ impl Progress {
         self.next = time + self.part;
         if let Some(bar) = &self.bar {
             let done = time - self.start;
-            let speed = done / self.began.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
+            let elapsed = self.wall_clock_start.elapsed().as_secs_f64();
+            let speed = done / elapsed.max(f64::MIN_POSITIVE);
             let (time, speed) = (rounded(time, DIGITS), rounded(speed, DIGITS));
             bar.set_message(format!("t = {time} s, {speed} times real time"));
             bar.set_position(whole(done / self.part));
