@@ -19,8 +19,8 @@ pub use reconfiguration::{Combination, Fallback, GainSet, Reconfiguration};
 use schedule::Schedule;
 pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Measurement, Signal};
 
-/// The matrices of a design or of a point of its schedule, by name: those that it always has, then those of the named
-/// fields that it states.
+/// The matrices of a design or of a point of its schedule with their names: the eight required ones, then the optional
+/// ones of the listed fields that are stated.
 macro_rules! named_matrices {
     ($owner:ident: $($name:literal $field:ident),*) => {{
         let always = [
@@ -58,7 +58,8 @@ pub struct Design {
     /// The estimator of a sampled controller.
     #[serde(default)]
     pub estimator: Option<Estimator>,
-    /// The diagonal of W, p numbers, in 1/s; without unit in a sampled controller.
+    /// The diagonal of W, p numbers, in 1/s; in a sampled controller without unit. Without it measurements are not
+    /// filtered.
     #[serde(default)]
     pub filter: Option<Vec<f64>>,
     /// A, n x n.
@@ -82,7 +83,7 @@ pub struct Design {
     /// P_f, q x p: the direct term of the fault estimate; without it there is none.
     #[serde(rename = "P_f", default)]
     pub p_f: Option<Matrix>,
-    /// Bounds of the correction of a sliding-mode law.
+    /// The sliding-mode law that estimates the faults, if it is one.
     #[serde(default)]
     pub sliding_mode: Option<SlidingMode>,
     /// K_x, m x n.
@@ -112,8 +113,8 @@ pub struct Design {
     /// N_r, m x t: the feedforward of the references.
     #[serde(rename = "N_r", default)]
     pub n_r: Option<Matrix>,
-    /// The decay of u_t, which keeps the commands where they are when the law changes: u_t' = -transfer u_t, in 1/s; of
-    /// a sampled controller the part that goes in a sample. Without it the commands jump.
+    /// The decay of u_t, which keeps the commands where they are when the law changes: u_t' = -transfer u_t, in 1/s; in
+    /// a sampled controller the fraction that decays in one sample. Without it the commands jump.
     #[serde(default)]
     pub transfer: Option<f64>,
     /// The n states.
@@ -127,13 +128,13 @@ pub struct Design {
     /// The t references; the inputs have the same names.
     #[serde(default)]
     pub references: Vec<Signal>,
-    /// What the controller does without an actuator, one entry for each actuator that may be gone.
+    /// The gains without an actuator, one entry for each actuator that may be gone.
     #[serde(default)]
     pub reconfigurations: Vec<Reconfiguration>,
-    /// What it does without several of them.
+    /// The gains without several of them.
     #[serde(default)]
     pub combinations: Vec<Combination>,
-    /// The feedback that needs not to know which actuator has failed.
+    /// The feedback that does not need to know which actuator has failed.
     #[serde(default)]
     pub fallback: Option<Fallback>,
     /// The experiment that importers run by default.
@@ -156,7 +157,7 @@ pub enum Estimator {
     Prediction,
 }
 
-/// The nonlinear injection of a sliding-mode law; each has one number for each fault.
+/// The nonlinear injection of a sliding-mode law; each list has one number for each fault.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlidingMode {
@@ -172,7 +173,7 @@ pub struct SlidingMode {
 pub struct Defaults {
     /// End of the experiment.
     pub stop_time: f64,
-    /// `None` means the sample time of a sampled controller.
+    /// The communication step. Without it, it is the sample time of a sampled controller; a continuous one states it.
     #[serde(default)]
     pub step_size: Option<f64>,
 }
@@ -182,21 +183,22 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// [`DesignError`] for the first entry that is missing, unknown, out of its range, or does not fit the others.
+    /// [`DesignError`] if the text is no TOML, or for the first entry that is missing, unknown, out of its range, or
+    /// does not fit the others.
     pub fn parse(text: &str, path: &str) -> Result<Self, DesignError> {
         let malformed = |error: toml::de::Error| {
             let message = error.to_string().trim_end().to_owned();
             DesignError::Malformed { path: path.to_owned(), message }
         };
         let mut design: Self = toml::from_str(text).map_err(malformed)?;
-        design.complete_the_operating_point();
+        design.complete_operating_point();
         design.check(path)?;
         design.locate_reconfigurations();
         Ok(design)
     }
 
-    /// Sets the missing values of an operating point to 0 where the file states one of them.
-    fn complete_the_operating_point(&mut self) {
+    /// Sets the missing values of the operating point to 0 if the file states at least one value.
+    fn complete_operating_point(&mut self) {
         let signals = self.states.iter_mut().chain(&mut self.references);
         let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
         values.extend(self.measurements.iter_mut().map(|measurement| &mut measurement.operating));
@@ -208,16 +210,13 @@ impl Design {
         }
     }
 
-    /// Sets the positions that reconfigurations state by names.
+    /// Sets the positions of the actuators and faults that reconfigurations and combinations name.
     fn locate_reconfigurations(&mut self) {
-        let at = |name: &String, mut names: std::slice::Iter<'_, Fault>| {
-            names.position(|fault| fault.name == *name)
-        };
+        let position = |name: &String| self.faults.iter().position(|fault| fault.name == *name);
         for case in &mut self.reconfigurations {
             let actuator = self.actuators.iter().position(|actuator| actuator.name == case.gone);
             case.actuator = actuator.unwrap_or_default();
-            case.restarted =
-                case.restart.iter().filter_map(|name| at(name, self.faults.iter())).collect();
+            case.restarted = case.restart.iter().filter_map(position).collect();
         }
         for combination in &mut self.combinations {
             let positions = self.actuators.iter().enumerate();
@@ -226,8 +225,8 @@ impl Design {
         }
     }
 
-    /// The gains without the actuators whose bits are set in `gone`, if the design has gains for
-    /// them.
+    /// The gains without the actuators whose bits are set in `gone`, bit j for actuator j; `None` if the design has no
+    /// gains without exactly these.
     pub fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
         if gone.is_power_of_two() {
             let case = self.without(gone.trailing_zeros() as usize)?;
@@ -242,8 +241,8 @@ impl Design {
         self.reconfigurations.iter().find(|case| case.actuator == j)
     }
 
-    /// Sets the matrices of reconfigurations and fall-back, which are no variables, to zero: a direction
-    /// in the space of the variables.
+    /// Sets the gains of reconfigurations, combinations and fall-back to zero. In a direction of differentiation they
+    /// are zero, because they are no variables of the FMU.
     pub fn clear_reconfigurations(&mut self) {
         for case in &mut self.reconfigurations {
             case.k_x.iter_mut().chain(&mut case.k_f).for_each(Matrix::clear);
@@ -276,27 +275,27 @@ impl Design {
         !self.reconfigurations.is_empty() || self.fallback.is_some()
     }
 
-    /// The design of one value of the scheduling variable, with the numbers of the plant of the file;
-    /// None without a schedule.
+    /// The design without its schedule, for the matrices and the operating point at one value of the scheduling
+    /// variable; `None` if it has no schedule.
     #[must_use]
     pub fn unscheduled(&self) -> Option<Self> {
         self.schedule.is_some().then(|| Self { schedule: None, ..self.clone() })
     }
 
-    /// The matrices that depend on the scheduling variable; the last ones where they are stated.
+    /// The matrices that depend on the scheduling variable; P_f, K_i, L_w and N_r where they are stated.
     pub fn scheduled_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
         let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, p_f, k_i, l_w, n_r, .. } = self;
         let stated = [p_f, k_i, l_w, n_r].into_iter().flatten();
         [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
     }
 
-    /// Sets the matrices that do not depend on the scheduling variable to zero: a direction in the space of
-    /// this variable.
+    /// Sets A_f, H and F_i to zero. In a direction of differentiation they are zero, because they do not depend on the
+    /// scheduling variable.
     pub fn clear_constant(&mut self) {
         [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten().for_each(Matrix::clear);
     }
 
-    /// Takes what the importer can change: the limits of the actuators and the filter.
+    /// Copies from `other` what the importer can change: the limits of the actuators and the filter.
     pub fn take_parameters(&mut self, other: &Self) {
         for (actuator, other) in self.actuators.iter_mut().zip(&other.actuators) {
             actuator.limits = other.limits;
@@ -347,7 +346,7 @@ impl Design {
         self.transfer_at(self.transfers())
     }
 
-    /// x_hat, f_hat, y_f, x_i and u_t of z.
+    /// Splits z into x_hat, f_hat, y_f, x_i and u_t; parts that the design does not have are empty.
     pub fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 5] {
         let (z, u_t) = z.split_at_mut(self.transfer_at(0));
         let (z, x_i) = z.split_at_mut(self.integral_at(0));
@@ -356,7 +355,7 @@ impl Design {
         [x_hat, f_hat, y_f, x_i, u_t]
     }
 
-    /// The matrices by the name that the file and the variables have; those from A_f on only where they
+    /// The matrices with the names that they have in the file and as FMI variables; those from A_f on only where they
     /// are stated.
     pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         named_matrices! {

@@ -1,16 +1,14 @@
 //! A controller whose matrices and operating point depend on a scheduling variable.
 //!
-//! A sampled controller interpolates at each sample, a continuous one at each instant. Theta is held within the
-//! grid:
+//! A sampled controller interpolates at each sample, a continuous one at each instant. Theta is limited to the grid:
 //!
 //! ```text
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
 //! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, P_f, K_i,
-//! L_w, N_r, r_op. The controller then acts like one whose design states these numbers: it takes the sample, or has
-//! the derivatives and commands. The estimates are those of states, not of deviations, so that a change of the
-//! operating point does not change them.
+//! L_w, N_r, r_op. The sample, or the derivatives and the commands, are those of a controller whose design states these
+//! numbers. The estimates are values, not deviations, so that a change of the operating point does not change them.
 
 use crate::design::Design;
 use crate::design::schedule::Schedule;
@@ -18,21 +16,21 @@ use crate::design::schedule::Schedule;
 /// The place of a value in the grid.
 #[derive(Clone, Copy)]
 struct Place {
-    /// The interval, from 0, and the part of it before the value.
+    /// The interval, from 0, and the fraction of it below the value.
     interval: usize,
     part: f64,
-    /// Whether the value is inside of the grid.
+    /// Whether the value is within the grid, ends included.
     inside: bool,
 }
 
 impl Schedule {
-    /// The position of the measurement that schedules.
+    /// The position of the measurement that is the scheduling variable; `None` if an input of its own is.
     #[must_use]
     pub fn measurement(&self, design: &Design) -> Option<usize> {
         design.measurements.iter().position(|signal| signal.name == self.variable)
     }
 
-    /// The first and the last value of the grid, which has two points at least.
+    /// The first and the last value of the grid, which has at least two points.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
         [self.points[0].at, self.points[self.points.len() - 1].at]
@@ -49,8 +47,8 @@ impl Schedule {
         Place { interval, part: (value - from) / (to - from), inside }
     }
 
-    /// Writes the interpolated matrices and operating point into `design`; returns the value after it
-    /// was held within the grid.
+    /// Writes the interpolated matrices and operating point into `design`; returns the value limited to the grid. NaN
+    /// gives the first point.
     pub fn interpolate(&self, value: f64, design: &mut Design) -> f64 {
         let Place { interval, part, .. } = self.place(value);
         let mix = |[from, to]: [f64; 2]| from * (1.0 - part) + to * part;
@@ -58,11 +56,10 @@ impl Schedule {
         mix([self.points[interval].at, self.points[interval + 1].at])
     }
 
-    /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for
-    /// the derivative `slope` of the scheduling variable; zero outside of the grid. At a point of the
-    /// grid they are those of the interval after it, at the last point those of the interval before it. The
-    /// matrices that the schedule leaves constant become zero. Returns the derivative of the value that is held
-    /// within the grid.
+    /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for the derivative
+    /// `slope` of the scheduling variable. They are zero outside of the grid; at a point of the grid they belong to the
+    /// interval after it, at the last point to the one before it. A_f, H and F_i, which are constant, become zero.
+    /// Returns the derivative of the value limited to the grid.
     pub fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
         let Place { interval, inside, .. } = self.place(value);
         let [from, to] = [0, 1].map(|end| self.points[interval + end].at);
@@ -72,6 +69,7 @@ impl Schedule {
         slope
     }
 
+    /// Writes `mix` of both ends of the interval into each scheduled matrix and into the operating point.
     fn write(&self, interval: usize, mix: impl Fn([f64; 2]) -> f64, design: &mut Design) {
         let [from, to] = [0, 1].map(|end| &self.points[interval + end]);
         let places = design.scheduled_mut();

@@ -54,8 +54,8 @@ pub struct CarriedFault {
     pub description: String,
     /// Where it enters.
     pub enters: Entry,
-    /// The position of its rate among the states of the fault model, of a ramp. The faults are the first of these states, in
-    /// their order.
+    /// The position of the rate of a ramp among the states of the fault model; none for a constant fault. The first of
+    /// these states are the faults, in their order.
     #[serde(default)]
     pub rate: Option<usize>,
 }
@@ -73,7 +73,7 @@ pub enum Entry {
 }
 
 impl KalmanDesign {
-    /// Number of states of the fault model.
+    /// Number of states of the fault model: the faults and the rates of ramps.
     #[must_use]
     pub fn fault_states(&self) -> usize {
         self.faults.len() + self.faults.iter().filter(|fault| fault.rate.is_some()).count()
@@ -83,7 +83,8 @@ impl KalmanDesign {
     ///
     /// # Errors
     ///
-    /// A sentence: the text is no such file, or its shapes do not agree.
+    /// A sentence with `path`: the text is no such file, a number is out of its range, a shape does not fit, or a fault
+    /// names a command, a measurement or a rate that does not exist.
     pub fn parse(text: &str, path: &str) -> Result<Self, String> {
         let design: Self = toml::from_str(text).map_err(|error| format!("{path}: {error}"))?;
         design.check().map_err(|text| format!("{path}: {text}"))?;
@@ -114,17 +115,17 @@ impl KalmanDesign {
             }
         }
         let (m, faults) = (self.commands.len(), self.faults.len());
-        let within = |what: &str, at: usize, count: usize| {
+        let check_position = |what: &str, at: usize, count: usize| {
             (at < count).then_some(()).ok_or(format!("a fault names {what} {at} of {count}"))
         };
         for fault in &self.faults {
             match fault.enters {
-                Entry::Actuator(at) => within("command", at, m)?,
-                Entry::Sensor(at) => within("measurement", at, p)?,
+                Entry::Actuator(at) => check_position("command", at, m)?,
+                Entry::Sensor(at) => check_position("measurement", at, p)?,
                 Entry::Input(_) => {}
             }
             if let Some(rate) = fault.rate {
-                within("rate", rate, q)?;
+                check_position("rate", rate, q)?;
                 (rate >= faults).then_some(()).ok_or("the rate of a fault is a fault")?;
             }
         }
@@ -135,7 +136,7 @@ impl KalmanDesign {
     ///
     /// # Errors
     ///
-    /// An entry that TOML cannot hold.
+    /// The error of the serializer for an entry that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }

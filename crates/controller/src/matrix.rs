@@ -32,8 +32,8 @@ impl Matrix {
         self.values.fill(0.0);
     }
 
-    /// Adds each row times `vector` to an element of `sums`: the sum of the products if `WHOLE`, else
-    /// one product after the other.
+    /// Adds row i times `vector` to `sums[i]`, for each row. With `WHOLE` the products of a row are summed first,
+    /// otherwise they are added to `sums[i]` one after the other.
     ///
     /// For short rows a loop costs more than the products, so it is unrolled for them.
     pub fn add_product<const WHOLE: bool>(&self, vector: &[f64], sums: &mut [f64]) {

@@ -33,7 +33,7 @@ impl Refusal {
 }
 
 impl Design {
-    /// Checks shapes, names, ranges and combinations of entries.
+    /// Checks combinations of entries, names that refer to others, shapes, the schedule and ranges, in this order.
     pub(super) fn check(&self, path: &str) -> Result<(), DesignError> {
         if let Some(what) = self.contradiction() {
             return Err(DesignError::Entry { path: path.to_owned(), what });
@@ -261,7 +261,7 @@ impl Design {
                 (None, None, None) => self.fallback.is_some(),
                 _ => false,
             };
-            let decided = case.loss.zip(case.time);
+            let limit = case.loss.zip(case.time);
             let lost = self.faults.iter().any(|fault| fault.loss_of.as_ref() == Some(gone));
             let matrices = case.k_x.iter().chain(&case.k_f).flat_map(|matrix| &matrix.values);
             let mut numbers = matrices.chain(case.k_s.iter().flatten()).chain([&case.stuck_at]);
@@ -276,9 +276,9 @@ impl Design {
                 "a number is not finite"
             } else if case.restart.iter().any(|name| !self.faults.iter().any(|f| f.name == *name)) {
                 "`restart` names a fault that does not exist"
-            } else if case.loss.is_some() != case.time.is_some() || decided.is_some() && !lost {
+            } else if case.loss.is_some() != case.time.is_some() || limit.is_some() && !lost {
                 "loss and time belong together, and to a fault with loss_of"
-            } else if decided.is_some_and(|(loss, time)| !(loss > 0.0 && (0.0..1e9).contains(&time))) {
+            } else if limit.is_some_and(|(loss, time)| !(loss > 0.0 && (0.0..1e9).contains(&time))) {
                 "expected a loss above 0 and a time of at least 0 s"
             } else {
                 return None;
@@ -301,13 +301,13 @@ impl Design {
                 return Some("fallback: a number is not finite".to_owned());
             }
         }
-        let position = |name: &String| self.reconfigurations.iter().position(|r| r.gone == *name);
+        let has_entry = |name: &String| self.reconfigurations.iter().any(|r| r.gone == *name);
         let order =
             |name: &String| self.actuators.iter().position(|actuator| actuator.name == *name);
         self.combinations.iter().enumerate().find_map(|(at, combination)| {
             let ordered = combination.gone.windows(2).all(|pair| order(&pair[0]) < order(&pair[1]));
             let count = combination.gone.len();
-            let text = if count < 2 || !combination.gone.iter().all(|name| position(name).is_some()) {
+            let text = if count < 2 || !combination.gone.iter().all(has_entry) {
                 "expected at least two actuators, each with an entry in reconfigurations"
             } else if !ordered {
                 "expected each actuator once, in the order of the actuators"
@@ -385,7 +385,7 @@ impl Design {
         Some(Refusal::new(channel(name, k, count), value, "a finite number above 0"))
     }
 
-    /// The first element of `filter` that breaks its rule.
+    /// The first element of `filter` that is out of its range.
     #[must_use]
     pub fn refused_filter(&self) -> Option<Refusal> {
         let (most, rule) = self.rates();
@@ -394,14 +394,15 @@ impl Design {
         Some(Refusal::new(channel("filter", k, filter.len()), filter[k], rule))
     }
 
-    /// The decay of the transfer, if it breaks its rule.
+    /// The decay of the transfer, if it is out of its range.
     fn refused_transfer(&self) -> Option<Refusal> {
         let (most, rule) = self.rates();
         let value = self.transfer.filter(|value| !(*value > 0.0 && *value <= most))?;
         Some(Refusal::new("transfer".to_owned(), value, rule))
     }
 
-    /// The largest decay of a filter, and the rule in words: a rate, in a sampled controller a part in a sample.
+    /// The largest decay of a filter or of the transfer, and the range in words: a rate in 1/s; in a sampled controller
+    /// the fraction that decays in one sample.
     fn rates(&self) -> (f64, &'static str) {
         match self.sample_time {
             None => (f64::MAX, "more than 0 1/s"),
@@ -440,7 +441,8 @@ impl Design {
         })
     }
 
-    /// The first of range and longest time of a hold that breaks its rule.
+    /// Checks range, operating point within the range, and longest hold of a measurement; returns the first one that
+    /// is refused.
     fn refused_hold(&self, signal: &Measurement) -> Option<Refusal> {
         let name = &signal.name;
         if let Some([low, high]) = signal.range {
@@ -488,7 +490,7 @@ impl Design {
         None
     }
 
-    /// The communication step of the default experiment, in s.
+    /// The communication step of the default experiment in s: the stated one, otherwise the sample time.
     #[must_use]
     pub fn step_size(&self) -> f64 {
         self.experiment.step_size.or(self.sample_time).unwrap_or_default()

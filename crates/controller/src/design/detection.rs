@@ -6,19 +6,19 @@ use super::Design;
 use super::checks::Refusal;
 use crate::matrix::Matrix;
 
-/// The filter of the residuals r, of k states x_r, with the tests of r. In a sampled controller
+/// The filter of the residuals r, which has k states x_r, and the tests of r. In a sampled controller
 ///
 /// ```text
 /// x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k],  r[k] = C x_r[k] + D_u u[k] + D_y y[k]
 /// ```
 ///
-/// in a continuous one x_r' in place of x_r[k+1]; its residuals are averages of r over each interval of
-/// `sample_time`, times the root of `sample_time`. Without faults the residuals are white with
-/// variance 1.
+/// in a continuous one x_r' in place of x_r[k+1]; its residuals are the averages of r over each interval of
+/// `sample_time`, times the root of `sample_time`. Without faults the residuals are white with variance 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionDesign {
-    /// The interval in s between two tests of a continuous controller; a sampled one tests in each sample.
+    /// The interval in s between two tests of a continuous controller; a sampled one states none, and tests in each
+    /// sample.
     #[serde(default)]
     pub sample_time: Option<f64>,
     /// Time in s after the start of the run from which the residuals are tested.
@@ -45,11 +45,11 @@ pub struct DetectionDesign {
     pub start: Matrix,
     /// The faults that `fault_isolated` counts, from 1.
     pub faults: Vec<String>,
-    /// The tests, each of some rows of r in turn.
+    /// The tests. Each takes the next `residuals` rows of r; together they take all rows.
     pub tests: Vec<TestDesign>,
 }
 
-/// A test: of one residual by cumulative sums (`drift`), or of the mean of several over a window.
+/// A test: of one residual by cumulative sums (`drift`), or of the mean of one or more residuals over a `window`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestDesign {
@@ -70,7 +70,7 @@ pub struct TestDesign {
 }
 
 impl DetectionDesign {
-    /// The matrices with their names and the numbers of rows and columns that they must have.
+    /// The matrices with their names and their required numbers of rows and columns.
     fn shapes(&self, design: &Design) -> [(&'static str, &Matrix, (usize, usize)); 7] {
         let (k, rows) = (self.a.rows, self.c.rows);
         let (m, p) = (design.actuators.len(), design.measurements.len());
@@ -85,7 +85,7 @@ impl DetectionDesign {
         ]
     }
 
-    /// Describes the first entry with a wrong shape, or without its counterpart.
+    /// Describes the first entry with a wrong shape or length, without its counterpart, or that excludes another one.
     pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
         for (name, matrix, (rows, columns)) in self.shapes(design) {
             let (actual_rows, actual_columns) = (matrix.rows, matrix.columns);

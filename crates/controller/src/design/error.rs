@@ -4,7 +4,7 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// It is not TOML, or has an entry that does not exist or lacks one.
+    /// The text is no TOML, an entry is unknown or missing, or a value has the wrong type.
     #[error("{path}: {message}")]
     Malformed {
         /// The file.
@@ -17,13 +17,13 @@ pub enum DesignError {
     Shape {
         /// The file.
         path: String,
-        /// The matrix.
+        /// The matrix or the list.
         what: &'static str,
         /// Its shape.
         actual: String,
         /// The shape that it must have.
         expected: String,
-        /// What rows and columns stand for.
+        /// The signals of its rows and columns.
         meaning: String,
     },
     /// A number is out of its range.

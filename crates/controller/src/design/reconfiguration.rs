@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
 
-/// What the controller does without an actuator; see `fmu-controller/src/reconfiguration.rs`.
+/// The gains without an actuator, and when it counts as gone; see `fmu-controller/src/reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reconfiguration {
@@ -24,13 +24,14 @@ pub struct Reconfiguration {
     /// K_s, m numbers.
     #[serde(rename = "K_s", default)]
     pub k_s: Option<Vec<f64>>,
-    /// The states of the fault model that restart at 0 when the actuator is gone or back.
+    /// The states of the fault model that restart at 0 when the actuator fails or comes back.
     #[serde(default)]
     pub restart: Vec<String>,
     /// Their positions; set when the file is read.
     #[serde(default)]
     pub restarted: Vec<usize>,
-    /// The actuator counts as gone if its estimated loss of effectiveness is above `loss` for `time` s.
+    /// The actuator counts as gone after its estimated loss of effectiveness has been above `loss` for `time` s.
+    /// Without both, only an input of the FMU reports it.
     #[serde(default)]
     pub loss: Option<f64>,
     /// See `loss`; in s.
@@ -38,7 +39,7 @@ pub struct Reconfiguration {
     pub time: Option<f64>,
 }
 
-/// What the controller does without several actuators; each of them has a [`Reconfiguration`], too.
+/// The gains without several actuators; each of them has a [`Reconfiguration`], too.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Combination {
@@ -53,7 +54,7 @@ pub struct Combination {
     /// K_f, m x q.
     #[serde(rename = "K_f")]
     pub k_f: Matrix,
-    /// K_s, m numbers for each actuator that is gone.
+    /// K_s, m x (the number of actuators that are gone), in their order.
     #[serde(rename = "K_s")]
     pub k_s: Matrix,
 }
@@ -73,16 +74,16 @@ pub struct Fallback {
 /// The gains in force in place of those of the intact plant.
 #[derive(Clone, Copy)]
 pub enum GainSet<'a> {
-    /// Those without one actuator.
+    /// The gains without one actuator.
     Single(&'a Reconfiguration),
-    /// Those without several actuators.
+    /// The gains without several actuators.
     Several(&'a Combination),
-    /// Those of the fall-back.
+    /// The gains of the fall-back.
     Fallback(&'a Fallback),
 }
 
 impl<'a> GainSet<'a> {
-    /// Row `j` of K_x.
+    /// Row `j` of K_x; empty for an actuator that only the fall-back serves.
     #[must_use]
     pub fn k_x(self, j: usize) -> &'a [f64] {
         match self {
@@ -92,7 +93,7 @@ impl<'a> GainSet<'a> {
         }
     }
 
-    /// Row `j` of K_f, empty without compensation.
+    /// Row `j` of K_f; empty without compensation.
     #[must_use]
     pub fn k_f(self, j: usize) -> &'a [f64] {
         let k_f = match self {
@@ -103,7 +104,7 @@ impl<'a> GainSet<'a> {
         k_f.map_or(&[], |k_f| k_f.row(j))
     }
 
-    /// Row `j` of K_s: a number for each stuck actuator, in their order; empty in the fall-back.
+    /// Row `j` of K_s: a number for each stuck actuator, in the order of the actuators; empty in the fall-back.
     #[must_use]
     pub fn k_s(self, j: usize) -> &'a [f64] {
         match self {

@@ -8,23 +8,23 @@ use crate::matrix::Matrix;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// The name of a measurement, or of an input of its own.
+    /// The name of the scheduling variable: a measurement, or an input of its own.
     pub variable: String,
-    /// The unit of that input.
+    /// The unit of the input.
     #[serde(default)]
     pub unit: Option<String>,
-    /// What that input is.
+    /// What the input is, for a reader.
     #[serde(default)]
     pub description: String,
-    /// The grid, in ascending order.
+    /// The points of the grid, at least two, in ascending order.
     pub points: Vec<Point>,
 }
 
-/// The matrices and the operating point at a value of the scheduling variable.
+/// The matrices and the operating point at a value of the scheduling variable; they replace those of the design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
-    /// The value.
+    /// The value of the scheduling variable.
     pub at: f64,
     /// The states at the operating point.
     pub x_op: Vec<f64>,
@@ -32,40 +32,40 @@ pub struct Point {
     pub u_op: Vec<f64>,
     /// The measurements at the operating point.
     pub y_op: Vec<f64>,
-    /// In place of the matrix of this name of the design.
+    /// A at this value.
     #[serde(rename = "A")]
     pub a: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// B at this value.
     #[serde(rename = "B")]
     pub b: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// C at this value.
     #[serde(rename = "C")]
     pub c: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// F_a at this value.
     #[serde(rename = "F_a")]
     pub f_a: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// K_x at this value.
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// K_f at this value.
     #[serde(rename = "K_f")]
     pub k_f: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// L_x at this value.
     #[serde(rename = "L_x")]
     pub l_x: Matrix,
-    /// In place of the matrix of this name of the design.
+    /// L_f at this value.
     #[serde(rename = "L_f")]
     pub l_f: Matrix,
-    /// In place of the matrix of this name of the design, if it has one.
+    /// P_f at this value, if the design states one.
     #[serde(rename = "P_f", default)]
     pub p_f: Option<Matrix>,
-    /// In place of the matrix of this name of the design, if it has one.
+    /// K_i at this value, if the design states one.
     #[serde(rename = "K_i", default)]
     pub k_i: Option<Matrix>,
-    /// In place of the matrix of this name of the design, if it has one.
+    /// L_w at this value, if the design states one.
     #[serde(rename = "L_w", default)]
     pub l_w: Option<Matrix>,
-    /// In place of the matrix of this name of the design, if it has one.
+    /// N_r at this value, if the design states one.
     #[serde(rename = "N_r", default)]
     pub n_r: Option<Matrix>,
     /// The references at the operating point; empty without references.

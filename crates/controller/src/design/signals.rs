@@ -11,7 +11,7 @@ pub struct Label<'a> {
     pub meaning: &'a str,
 }
 
-/// Signals: all have a name, a unit and a description, and then their own entries.
+/// Declares signals: each has a name, a unit and a description, and then its own entries.
 macro_rules! signals {
     ($($(#[$about:meta])* $signal:ident { $($(#[$text:meta])* $entry:ident: $kind:ty,)* })*) => {$(
         $(#[$about])*
@@ -46,13 +46,14 @@ signals! {
         operating: Option<f64>,
     }
 
-    /// A measurement, and when its value is not used; see [`crate::sample::measurements`].
+    /// A measurement, with its range and its longest hold if it has them; see [`crate::sample::measurements`].
     Measurement {
         /// Value at the operating point.
         operating: Option<f64>,
-        /// The smallest and the largest value that is used; the last one of them replaces any other value.
+        /// The smallest and the largest value that is used. The last value within them replaces a value outside.
         range: Option<[f64; 2]>,
-        /// The longest time in s for which it does; then the controller rests at its operating point.
+        /// The longest time in s for which the last value replaces others; after it the controller rests at its
+        /// operating point.
         longest_hold: Option<f64>,
     }
 
@@ -74,14 +75,14 @@ signals! {
 }
 
 impl Measurement {
-    /// The smallest and the largest value that is used: the largest numbers without a range.
+    /// The smallest and the largest value that is used; without a range these are the largest finite numbers.
     #[must_use]
     pub fn bounds(&self) -> [f64; 2] {
         self.range.unwrap_or([-f64::MAX, f64::MAX])
     }
 
-    /// The most samples for which the last value may be used: those within the longest time, up to rounding. None
-    /// without such a time, and where they are `u32::MAX` or more.
+    /// The most samples for which the last value may be used: those within the longest hold, up to rounding. `None`
+    /// without a longest hold, or if they are `u32::MAX` or more.
     #[must_use]
     pub fn most_held(&self, sample_time: f64) -> Option<u32> {
         let samples = (self.longest_hold? * (1.0 + HOLD_ROUNDING) / sample_time).floor();
@@ -90,11 +91,11 @@ impl Measurement {
     }
 }
 
-/// The part of the longest time of a hold below which a difference is rounding: an importer adds up its steps.
+/// The relative tolerance of the longest hold, for the rounding errors of an importer that adds up its steps.
 pub const HOLD_ROUNDING: f64 = 1e-9;
 
 impl Actuator {
-    /// The limits as deviations from the operating point.
+    /// The limits as deviations from the operating point; `None` without limits.
     #[must_use]
     pub fn range(&self) -> Option<[f64; 2]> {
         let [low, high] = self.limits?;

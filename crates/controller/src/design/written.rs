@@ -6,9 +6,9 @@ use super::Design;
 use super::schedule::{Point, Schedule};
 use crate::matrix::Matrix;
 
-/// What [`Design::parse`] adds to entries of lists, and is not written.
-const POSITIONS: [(&str, [&str; 2]); 2] =
-    [("reconfigurations", ["actuator", "restarted"]), ("combinations", ["mask", "mask"])];
+/// Lists, and the keys of their entries that [`Design::parse`] computes; these are not written.
+const POSITIONS: [(&str, &[&str]); 2] =
+    [("reconfigurations", &["actuator", "restarted"]), ("combinations", &["mask"])];
 /// The matrices that are written first, in order; the others follow.
 const FIRST: [&str; 6] = ["A", "B", "C", "F_a", "A_f", "D"];
 
@@ -17,7 +17,7 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// An entry that TOML cannot hold.
+    /// The error of the serializer for an entry that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         let mut all = toml::Table::try_from(Self { schedule: None, ..self.clone() })?;
         let (mut first, others): (Vec<_>, Vec<_>) =
