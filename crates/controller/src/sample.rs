@@ -14,13 +14,14 @@
 //! u_t'   = u_t - w u_t                                 when the law changes, u_t = u before - u
 //! ```
 //!
-//! (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4), (5),
-//! (18), in their general form). A current estimator adds `L_x` e and `L_f` e to `x_hat` and `f_hat_i` before it computes u, and not
-//! after it. Without `P_f` the estimate `f_hat` is `f_hat_i`; each other term is there where the design states its matrix.
+//! (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4),
+//! (5), (18), in their general form). A current estimator adds `L_x` e and `L_f` e to `x_hat` and `f_hat_i` before it
+//! computes u, not after it. Without `P_f` the estimate `f_hat` is `f_hat_i`; each other term exists if the design
+//! states its matrix.
 //!
-//! Every sum has its terms in the order of its equation, so that the results have the bits of the controller FMU. Nothing
-//! here allocates, indexes or panics. All of it is inlined into the step of a design: there the compiler knows every size, and
-//! leaves out what the design does not have.
+//! Every sum has its terms in the order of its equation, so that the results have the bits of the controller FMU. No
+//! function here allocates, indexes or panics. All of them are inlined into the step of a design, where the compiler
+//! knows every size and leaves out what the design does not have.
 
 pub mod detection;
 mod matrix;
@@ -37,7 +38,7 @@ pub use number::{Number, all_finite};
 pub struct Design<'a, N> {
     /// T in s.
     pub sample_time: &'a N,
-    /// Whether the command follows the measurements of its own sample.
+    /// Whether the estimator is current: the commands of a sample use its measurements.
     pub is_current: bool,
     /// A, n x n.
     pub a: Matrix<'a, N>,
@@ -73,27 +74,27 @@ pub struct Design<'a, N> {
     pub n_r: Matrix<'a, N>,
     /// The diagonal of W, p numbers.
     pub filter: &'a [N],
-    /// w, one number.
+    /// w of `u_t`, one number.
     pub transfer: &'a [N],
-    /// The bounds of a sliding-mode law, q numbers.
+    /// The bounds of the estimates of a sliding-mode law, q numbers.
     pub rho: &'a [N],
-    /// The half-widths of its boundary layer, q numbers.
+    /// The half-widths of its boundary layers, q numbers.
     pub delta: &'a [N],
     /// The states at the operating point.
     pub x_op: &'a [N],
-    /// The commands there.
+    /// The commands at the operating point.
     pub u_op: &'a [N],
-    /// The measurements there.
+    /// The measurements at the operating point.
     pub y_op: &'a [N],
-    /// The references there.
+    /// The references at the operating point.
     pub r_op: &'a [N],
-    /// The smallest commands: as deviations, as values.
+    /// The smallest commands: as deviations, as values; empty without limits.
     pub low: [&'a [N]; 2],
-    /// The largest commands: as deviations, as values.
+    /// The largest commands: as deviations, as values; empty without limits.
     pub high: [&'a [N]; 2],
 }
 
-/// What a sample knows from those before it, and its inputs, as values.
+/// The state of the controller before a sample, and the inputs of the sample, as values.
 pub struct State<'a, N> {
     /// The estimate of the states from the measurements before this sample.
     pub x_hat: &'a mut [N],
@@ -103,7 +104,7 @@ pub struct State<'a, N> {
     pub y_f: &'a mut [N],
     /// The integrals.
     pub x_i: &'a mut [N],
-    /// What is left in the commands since the law changed.
+    /// The remaining distance of the commands from the law that is in force.
     pub u_t: &'a mut [N],
     /// The commands of the sample before as deviations, of a design with D.
     pub u_before: &'a mut [N],
@@ -115,7 +116,7 @@ pub struct State<'a, N> {
     pub r: &'a [N],
 }
 
-/// The signals of a sample: deviations from the operating point; values; the estimate for the next sample, as values.
+/// The signals of a sample: deviations from the operating point, then values, then the state for the next sample.
 pub struct Signals<'a, N> {
     /// The measurements, without D u of the sample before.
     pub y: &'a mut [N],
@@ -133,13 +134,13 @@ pub struct Signals<'a, N> {
     pub f_hat: &'a mut [N],
     /// The commands.
     pub u: &'a mut [N],
-    /// The commands without limits; then what the limits add to them. Of a design with `L_w`.
+    /// The commands without limits, then what the limits add to them; empty without `L_w`.
     pub excess: &'a mut [N],
     /// The commands as values.
     pub command: &'a mut [N],
     /// The estimate of the states as values.
     pub x_value: &'a mut [N],
-    /// The estimate of the faults, a value.
+    /// The estimate of the faults as values.
     pub f_value: &'a mut [N],
     /// The estimate of the states for the next sample.
     pub next_x_hat: &'a mut [N],
@@ -181,7 +182,7 @@ fn copy<N: Number>(values: &[N], target: &mut [N]) {
 }
 
 impl<N: Number> Signals<'_, N> {
-    /// Signals as deviations from the operating point.
+    /// Sets y, `y_f`, `x_hat`, `f_hat_i` and r: the inputs and the state as deviations from the operating point.
     #[inline(always)]
     pub fn set_deviations(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         subtract(state.y, design.y_op, self.y);
@@ -224,7 +225,7 @@ impl<N: Number> Signals<'_, N> {
         design.l_f.set_product(self.e, self.f_hat_i);
     }
 
-    /// `f_hat_i` = rho s / (|s| + delta), element by element; `f_hat_i` has s before
+    /// `f_hat_i` = rho s / (|s| + delta), element by element; s is `f_hat_i` before the call
     #[inline(always)]
     pub fn inject(&mut self, design: &Design<'_, N>) {
         for ((f_hat, rho), delta) in self.f_hat_i.iter_mut().zip(design.rho).zip(design.delta) {
@@ -243,7 +244,7 @@ impl<N: Number> Signals<'_, N> {
         }
     }
 
-    /// The estimates as values. A predictor shows the estimates with which the sample starts.
+    /// Sets the estimates as values. The estimate of the states of a predictor is the one before the sample.
     #[inline(always)]
     pub fn set_values(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         copy(self.f_hat, self.f_value);
@@ -275,15 +276,15 @@ impl<N: Number> Signals<'_, N> {
         copy(self.u, self.excess);
     }
 
-    /// The commands as values.
+    /// Sets the commands as values.
     #[inline(always)]
     pub fn set_command_values(&mut self, design: &Design<'_, N>) {
         copy(self.u, self.command);
         add(design.u_op, self.command);
     }
 
-    /// u = u + `u_t`, `u_t`' = `u_t` - w `u_t`. When the law changes, `u_t` is the distance of the command from that of
-    /// the last sample. An actuator that is gone has none.
+    /// u = u + `u_t`, `u_t`' = `u_t` - w `u_t`, of a design with `u_t`. When the law changes, `u_t` is the last command
+    /// less the present one. For an actuator that is gone it is 0.
     #[inline(always)]
     pub fn transfer(
         &mut self,
@@ -310,7 +311,7 @@ impl<N: Number> Signals<'_, N> {
         copy(self.u, self.excess);
     }
 
-    /// Keeps the commands within their limits; an actuator that is gone has none. Returns whether one is at a limit.
+    /// Limits the commands, except those of actuators that are gone. Returns whether one was beyond its limits.
     #[inline(always)]
     pub fn limit(&mut self, design: &Design<'_, N>, gone: &[bool]) -> bool {
         let ([low, min], [high, max]) = (design.low, design.high);
@@ -333,7 +334,7 @@ impl<N: Number> Signals<'_, N> {
         is_at_limit
     }
 
-    /// `x_hat`' = A `x_hat` + B u + `F_a` `f_hat_i` + `L_x` e, the last term of a predictor only
+    /// `x_hat`' = A `x_hat` + B u + `F_a` `f_hat_i` + `L_x` e, `L_x` e of a predictor only
     #[inline(always)]
     pub fn predict_states(&mut self, design: &Design<'_, N>) {
         design.a.set_product(self.x_hat, self.next_x_hat);
@@ -345,7 +346,7 @@ impl<N: Number> Signals<'_, N> {
         add(design.x_op, self.next_x_hat);
     }
 
-    /// `f_hat_i`' = `A_f` `f_hat_i` + `L_f` e while estimating, else `f_hat_i`; the last term of a predictor only
+    /// `f_hat_i`' = `A_f` `f_hat_i` + `L_f` e while estimating, else `f_hat_i`; `L_f` e of a predictor only
     #[inline(always)]
     pub fn predict_faults(&mut self, design: &Design<'_, N>, estimating: bool) {
         copy(self.f_hat_i, self.next_f_hat);
@@ -374,7 +375,7 @@ impl<N: Number> Signals<'_, N> {
         add(design.y_op, self.next_y_f);
     }
 
-    /// u - v, of a design with `L_w`
+    /// `excess` = u - v, of a design with `L_w`; v is `excess` before the call
     #[inline(always)]
     pub fn set_excess(&mut self) {
         for (excess, u) in self.excess.iter_mut().zip(self.u.iter()) {
@@ -396,7 +397,7 @@ impl<N: Number> Signals<'_, N> {
         add_zero(self.next_x_i);
     }
 
-    /// The estimates before the commands: with a current estimator from the measurements of this sample.
+    /// Computes the estimates that the commands use: with a current estimator from the measurements of this sample.
     #[inline(always)]
     pub fn estimate(&mut self, design: &Design<'_, N>, state: &State<'_, N>, estimating: bool) {
         self.set_deviations(design, state);
@@ -411,7 +412,7 @@ impl<N: Number> Signals<'_, N> {
                 self.inject(design);
             }
             if design.p_f.is_stated() {
-                // With the innovation of the corrected estimate.
+                // The direct term uses the innovation of the corrected estimate.
                 self.set_innovation(design);
             }
         }
@@ -419,7 +420,7 @@ impl<N: Number> Signals<'_, N> {
         self.set_values(design, state);
     }
 
-    /// The estimate for the next sample.
+    /// Computes the state for the next sample, except `u_t`.
     #[inline(always)]
     pub fn predict(&mut self, design: &Design<'_, N>, state: &State<'_, N>, estimating: bool) {
         self.predict_states(design);
@@ -429,8 +430,8 @@ impl<N: Number> Signals<'_, N> {
         self.predict_integrals(design, state);
     }
 
-    /// The controller at rest: estimates and commands are those of the operating point, without faults; so is the
-    /// estimate for the next sample. Integrals are 0.
+    /// Sets the controller to rest: estimates and commands are those of the operating point, without faults, and so is
+    /// the state for the next sample. Integrals and `u_t` are 0.
     #[inline(always)]
     pub fn rest(&mut self, design: &Design<'_, N>) {
         self.u.fill(N::zero());
@@ -446,23 +447,23 @@ impl<N: Number> Signals<'_, N> {
         self.next_u_t.fill(N::zero());
     }
 
-    /// Whether commands and estimates are numbers.
+    /// Whether commands and estimates are finite.
     #[must_use]
     #[inline(always)]
     pub fn are_values_finite(&self) -> bool {
         all_finite(self.command) && all_finite(self.x_value) && all_finite(self.f_value)
     }
 
-    /// Stores the estimate for the next sample if all its elements are numbers; otherwise shows the stored one again.
-    /// Returns whether it stored.
+    /// Stores the commands and the state for the next sample if `is_finite` holds and all of them are finite; otherwise
+    /// the estimates as values become the stored ones. Returns whether it stored them.
     #[inline(always)]
     pub fn keep(&mut self, state: &mut State<'_, N>, is_finite: bool) -> bool {
         let next = [&*self.next_x_hat, &*self.next_f_hat, &*self.next_y_f, &*self.next_x_i];
-        let has_deviations = !state.u_before.is_empty();
+        let has_feedthrough = !state.u_before.is_empty();
         let is_finite = is_finite
             && all_finite(self.next_u_t)
             && next.into_iter().all(all_finite)
-            && (!has_deviations || all_finite(self.u));
+            && (!has_feedthrough || all_finite(self.u));
         if is_finite {
             copy(self.next_x_hat, state.x_hat);
             copy(self.next_f_hat, state.f_hat);
@@ -479,7 +480,7 @@ impl<N: Number> Signals<'_, N> {
     }
 }
 
-/// `E_hat` = -u `f_hat` / (u^2 + `u_e`^2), the largest number where it is beyond the range.
+/// `E_hat` = -u `f_hat` / (u^2 + `u_e`^2), limited to the finite numbers.
 pub fn lost_effectiveness<N: Number>(u: &N, f_hat: &N, squared_least_command: &N) -> N {
     let scale = N::whole(1) / (u.clone() * u.clone() + squared_least_command.clone());
     let loss = -(u.clone() * scale) * f_hat.clone();

@@ -19,7 +19,7 @@ pub struct Filter<'a, N> {
 }
 
 impl<N: Number> Filter<'_, N> {
-    /// The sum of three products, from 0 on.
+    /// `target` = the sum of three matrices times vectors, starting with 0.
     #[inline(always)]
     fn set_sums(matrices: &[Matrix<'_, N>; 3], vectors: [&[N]; 3], target: &mut [N]) {
         target.fill(N::zero());
@@ -28,8 +28,8 @@ impl<N: Number> Filter<'_, N> {
         }
     }
 
-    /// The next state, and the residuals of this sample; the sample at the start has none. Returns whether all are
-    /// numbers.
+    /// Computes the next state and the residuals of this sample from `x_r`, u and y; the residuals of the first sample
+    /// are 0. Returns whether all numbers are finite.
     #[inline(always)]
     pub fn advance(
         &self,
@@ -48,7 +48,7 @@ impl<N: Number> Filter<'_, N> {
     }
 }
 
-/// Keeps a sum within the range of the numbers; NaN and what is beyond it become the largest number.
+/// The sum if it is finite, else the largest finite number.
 fn within_range<N: Number>(sum: N) -> N {
     if sum.is_finite() { sum } else { N::largest() }
 }
@@ -63,12 +63,13 @@ fn above_zero<N: Number>(sum: N) -> N {
 pub struct Cumulative<N> {
     /// S+ and S-.
     pub sums: [N; 2],
-    /// The samples since which they are above 0.
+    /// For each sum the sample since which it is above 0.
     pub since: [u32; 2],
 }
 
 impl<N: Number> Cumulative<N> {
-    /// Takes the residual of a sample. Returns the larger sum, and the sample since which it is above 0.
+    /// Adds the residual of a sample to both sums. Returns the larger sum, and the sample since which it is above 0, or
+    /// this sample.
     #[inline(always)]
     pub fn take(&mut self, residual: &N, drift: &N, sample: u32) -> (N, u32) {
         for (sum, since) in self.sums.iter().zip(self.since.iter_mut()) {
@@ -88,15 +89,15 @@ impl<N: Number> Cumulative<N> {
 /// The window of a test of several residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
-    /// Its first sample.
+    /// The first sample of the window.
     pub since: u32,
-    /// The samples in it.
+    /// The number of samples in it so far.
     pub count: u32,
 }
 
 impl Window {
-    /// Adds the residuals of a sample to their sums. Returns the statistic and the first sample of a window that is
-    /// complete.
+    /// Adds the residuals of a sample to their sums. Returns the statistic and the first sample of the window if this
+    /// sample completes it, else `None`.
     #[inline(always)]
     pub fn take<'a, N: Number + 'a>(
         &mut self,
@@ -104,14 +105,14 @@ impl Window {
         length: u32,
         sample: u32,
     ) -> Option<(N, u32)> {
-        let starts = self.count == 0;
-        if starts {
+        let is_first = self.count == 0;
+        if is_first {
             self.since = sample;
         }
         self.count += 1;
         let mut squared = N::zero();
         for (sum, residual) in sums {
-            let before = if starts { N::zero() } else { sum.clone() };
+            let before = if is_first { N::zero() } else { sum.clone() };
             *sum = within_range(before + residual.clone());
             squared = squared + sum.clone() * sum.clone();
         }
@@ -130,7 +131,7 @@ pub struct Decision {
     pub isolated: i32,
     /// The sample of the first alarm.
     pub detected_at: u32,
-    /// The sample at which the fault started, as that alarm estimates it.
+    /// The sample at which the fault started, as the test of the first alarm estimates it.
     pub onset: u32,
 }
 
@@ -142,12 +143,13 @@ impl Decision {
         self.isolated != 0
     }
 
-    /// The time in s of a sample of the decision; -1 before an alarm.
+    /// The time in s of `sample`, which is `detected_at` or `onset`; -1 without an alarm.
     #[inline(always)]
     pub fn time<N: Number>(&self, sample: u32, sample_time: N) -> N {
         if self.is_detected() { N::whole(sample) * sample_time } else { -N::whole(1) }
     }
 
+    /// Notes the first alarm; later alarms change nothing.
     #[inline(always)]
     fn alarm(&mut self, sample: u32, onset: u32) {
         if !self.is_detected() {
@@ -155,7 +157,7 @@ impl Decision {
         }
     }
 
-    /// Finds the one fault to which exactly the tests react that have given an alarm.
+    /// After an alarm, finds the only fault to which exactly the tests with an alarm react; -1 for none or several.
     #[inline(always)]
     fn isolate<const TESTS: usize>(&mut self, alarmed: &[bool; TESTS], reacts: &[[bool; TESTS]]) {
         if self.is_detected() {
@@ -168,7 +170,7 @@ impl Decision {
     }
 }
 
-/// The sums of the windows and the residuals that they take, in the order of the tests.
+/// The sums of the windows and the residuals of a sample, in the order of the tests.
 pub struct Sums<'a, N> {
     /// The sums.
     pub sums: &'a mut [N],
@@ -176,13 +178,13 @@ pub struct Sums<'a, N> {
     pub residuals: &'a [N],
 }
 
-/// The outcomes of all tests, and what they are compared with.
+/// The outcomes of all tests, their thresholds, and the decision.
 pub struct Outcomes<'a, N, const TESTS: usize> {
     /// The statistic of each test.
     pub statistic: &'a mut [N; TESTS],
-    /// Whether it has given an alarm.
+    /// Whether each test has given an alarm.
     pub alarmed: &'a mut [bool; TESTS],
-    /// The statistic above which it gives one.
+    /// The threshold of each test: a statistic above it is an alarm.
     pub threshold: &'a [N; TESTS],
     /// For each fault the tests that react to it.
     pub reacts: &'a [[bool; TESTS]],
@@ -191,7 +193,7 @@ pub struct Outcomes<'a, N, const TESTS: usize> {
 }
 
 impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
-    /// Takes the residuals of a sample, one for each test by cumulative sums.
+    /// Tests the residuals of a sample by cumulative sums, one residual for each test.
     #[inline(always)]
     pub fn cumulate(
         &mut self,
@@ -200,15 +202,15 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         drifts: &[N; TESTS],
         sample: u32,
     ) {
-        let times = tests.iter_mut().zip(residuals).zip(drifts);
+        let inputs = tests.iter_mut().zip(residuals).zip(drifts);
         self.compare(
             sample,
-            times.map(|((test, residual), drift)| Some(test.take(residual, drift, sample))),
+            inputs.map(|((test, residual), drift)| Some(test.take(residual, drift, sample))),
         );
     }
 
-    /// Takes the residuals of a sample, for each test by windows as many as `counts` says; `sums` has one number for each
-    /// residual, `lengths` the samples of the windows.
+    /// Tests the residuals of a sample by windows. `counts`: the number of residuals of each test; `lengths`: the
+    /// samples of its window; `sums`: one sum for each residual.
     #[inline(always)]
     pub fn widen(
         &mut self,
@@ -228,7 +230,8 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         );
     }
 
-    /// Compares the statistics that are complete with their thresholds, and decides.
+    /// Compares each statistic with its threshold, notes alarms, and decides. `None`: the window of the test is not
+    /// complete.
     #[inline(always)]
     fn compare(&mut self, sample: u32, statistics: impl Iterator<Item = Option<(N, u32)>>) {
         let outcomes = self.statistic.iter_mut().zip(self.alarmed.iter_mut()).zip(self.threshold);

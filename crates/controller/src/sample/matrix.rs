@@ -2,7 +2,7 @@
 
 use super::number::Number;
 
-/// A matrix, row by row. Between two points of a schedule it is the sum of both matrices with their weights.
+/// A matrix, row by row. Between two points of a schedule it is the weighted sum of the matrices at both points.
 #[derive(Clone, Copy)]
 pub struct Matrix<'a, N> {
     pub(super) entries: &'a [N],
@@ -59,8 +59,9 @@ impl<N: Number> Matrix<'_, N> {
         self.for_each_row(vector, target, N::clone, |_, sum| sum);
     }
 
-    /// `target[i]` = `end(target[i]`, the sum of the products of row i from `start(target[i])` on), where the design states
-    /// the matrix. A row is as long as the vector. -0 + x has the bits of x.
+    /// `target[i]` = `end(target[i], sum)`, where `sum` starts with `start(target[i])` and adds the products of row i
+    /// and the vector. Changes nothing if the design does not state the matrix. A row is as long as the vector. The
+    /// sums start with -0, because -0 + x has the bits of x.
     #[inline(always)]
     fn for_each_row(
         &self,

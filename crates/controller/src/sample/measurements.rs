@@ -1,22 +1,22 @@
-//! Which measurements of a sample are used, and for how long the last value replaces one that is not.
+//! The choice of the measurements of a sample that are used; the last value replaces others for a limited time.
 
 use super::Number;
 
-/// When a measurement is used; a number for each measurement.
+/// The conditions under which measurements are used, one number for each measurement.
 #[derive(Clone, Copy)]
 pub struct Validity<'a, N> {
     /// The smallest values that are used.
     pub low: &'a [N],
-    /// The largest ones.
+    /// The largest values that are used.
     pub high: &'a [N],
-    /// The most samples for which the last value may be used, the largest number where there is no such limit; empty
-    /// without a limit.
+    /// The most samples for which the last value may be used, `u32::MAX` for a measurement without such a limit; empty
+    /// if no measurement has one.
     pub most_held: &'a [u32],
 }
 
 impl<N: Number> Validity<'_, N> {
-    /// Takes the measurements that are finite and in their range. The others keep their last value, and `held` counts
-    /// the samples for which they do. Returns whether there is one of them.
+    /// Takes the measurements that are finite and in their range. The others keep their last value, and `held`, if it
+    /// is not empty, counts the samples since it was taken. Returns whether a measurement keeps its last value.
     #[inline(always)]
     pub fn take(&self, values: &[N], last_values: &mut [N], held: &mut [u32]) -> bool {
         let mut counters = held.iter_mut();
@@ -35,7 +35,7 @@ impl<N: Number> Validity<'_, N> {
         is_held
     }
 
-    /// Whether the last value of a measurement is too old.
+    /// Whether the last value of a measurement was used for too many samples.
     #[must_use]
     #[inline(always)]
     pub fn is_lost(&self, held: &[u32]) -> bool {

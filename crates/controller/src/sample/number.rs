@@ -2,7 +2,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number of the equations: `f64`, `f32`, or one that also follows what rounding does or counts operations.
+/// A number of the equations: `f64`, `f32`, or a type that also bounds rounding errors or counts operations.
 pub trait Number:
     Clone
     + Add<Output = Self>
@@ -62,7 +62,7 @@ macro_rules! number {
 
 number!(f64: f64::from, f32: nearest);
 
-/// The nearest number: the upper half is exact, and the sum is rounded once.
+/// The `f32` nearest to a whole number: both halves are exact, and their sum is rounded once.
 fn nearest(count: u32) -> f32 {
     let [a, b, c, d] = count.to_be_bytes();
     f32::from(u16::from_be_bytes([a, b])) * 65_536.0 + f32::from(u16::from_be_bytes([c, d]))

@@ -7,36 +7,36 @@ use super::{Design, Matrix, Number, Signals};
 pub struct Case<'a> {
     /// Its position.
     pub actuator: usize,
-    /// The samples for which its loss must be above the limit.
+    /// The samples for which its loss must be above the limit before it counts as gone.
     pub samples: u32,
-    /// For each fault whether its estimate restarts at 0.
+    /// For each fault whether its estimate restarts at 0 when the actuator fails or comes back.
     pub restarts: &'a [bool],
 }
 
-/// What is known about an actuator that may be gone.
+/// The estimated loss of an actuator that may be gone, and the decision about it.
 pub struct Watch<'a, N> {
     /// Its estimated loss of effectiveness in the last sample.
     pub lost: &'a N,
     /// Whether the loss is above the limit.
     pub above: &'a mut bool,
-    /// The sample since which it is.
+    /// The sample since which the loss is above the limit.
     pub since: &'a mut u32,
     /// Whether the loss has decided that the actuator is gone.
     pub decided: &'a mut bool,
 }
 
-/// What is asked for in a sample.
+/// The inputs of a sample about an actuator.
 #[derive(Clone, Copy)]
 pub struct Request {
     /// Whether the actuator is reported as gone.
     pub is_reported: bool,
-    /// Whether the fall-back is asked for: then no loss decides.
+    /// Whether the fall-back is requested: then losses decide nothing.
     pub is_fall_back: bool,
 }
 
 impl<N: Number> Watch<'_, N> {
-    /// Decides in a sample whether the actuator is gone: it is reported, or its loss has been above `limit` for long
-    /// enough.
+    /// Decides in a sample whether the actuator is gone: it is reported, or its loss has been above `limit` for
+    /// `case.samples` samples now or before.
     #[inline(always)]
     pub fn decide(&mut self, case: &Case<'_>, limit: &N, request: Request, sample: u32) -> bool {
         if !request.is_fall_back && self.lost.is_above(limit) {
@@ -52,7 +52,7 @@ impl<N: Number> Watch<'_, N> {
 }
 
 impl Case<'_> {
-    /// Notes whether the actuator is gone; the estimates of its faults restart at 0 when it goes or comes back.
+    /// Notes whether the actuator is gone; when this changes, the estimates of its faults restart at 0.
     #[inline(always)]
     pub fn note<N: Number>(&self, is_gone: bool, gone: &mut [bool], f_hat: &mut [N]) {
         let Some(gone) = gone.get_mut(self.actuator) else { return };
@@ -70,12 +70,12 @@ impl Case<'_> {
 /// The sets of gains.
 #[derive(Clone, Copy)]
 pub struct Sets<'a, const ACTUATORS: usize> {
-    /// For each set of gains, the actuators that it does without; the first set is for the intact plant. The fall-back is
-    /// not among them.
+    /// For each set of gains except the fall-back, the actuators that it does without. The first set is that of the
+    /// intact plant.
     pub gone: &'a [[bool; ACTUATORS]],
-    /// For each actuator, the set of gains that does without it alone, or 0 if there is none; empty with a fall-back.
+    /// For each actuator the set of gains without it alone, 0 if there is none; empty with a fall-back.
     pub single: &'a [u32],
-    /// The set of the fall-back.
+    /// The set of the fall-back, if there is one.
     pub fall_back: Option<u32>,
 }
 
@@ -89,8 +89,9 @@ pub struct Choice {
 }
 
 impl<const ACTUATORS: usize> Sets<'_, ACTUATORS> {
-    /// Chooses the set for the actuators that are gone: the one without exactly these; else the fall-back, or without a
-    /// fall-back the set without the first of them.
+    /// Chooses the set of gains. With `is_fall_back` it is the fall-back, if there is one; otherwise the set without
+    /// exactly the actuators that are gone. If there is no such set, it is the fall-back, or without a fall-back the
+    /// set without the first of them.
     #[must_use]
     #[inline(always)]
     pub fn choose(&self, gone: &[bool; ACTUATORS], is_fall_back: bool) -> Choice {
@@ -126,7 +127,7 @@ pub struct Stuck<'a, N> {
 }
 
 impl<N: Number> Signals<'_, N> {
-    /// u = u + `K_s` `u_stuck`; the command of an actuator that is gone is the one at which it is stuck.
+    /// u = u + `K_s` `u_stuck`; the command of an actuator that is gone is the command at which it is stuck.
     #[inline(always)]
     pub fn add_stuck(&mut self, design: &Design<'_, N>, stuck: &Stuck<'_, N>) {
         let [deviations, values] = stuck.commands;
