@@ -13,34 +13,37 @@ static_assert static_cast stderr stdin stdout struct super switch template this 
 trait true try type typedef typeid typename typeof typeof_unqual union unix unsafe unsigned unsized \
 use using virtual void volatile wchar_t where while xor xor_eq yield";
 
-/// Names of headers of C, of crates that come with Rust, of folders of cargo, of devices of Windows.
-const TAKEN_FILES: &str = "\
-alloc aux build com1 com2 com3 com4 con core ctype deps examples fenv incremental inttypes iso646 \
-limits locale lpt1 lpt2 lpt3 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool \
-stddef stdint stdio stdlib stdnoreturn std string test tgmath threads time uchar wchar wctype";
+/// Names of headers of C, of crates that come with Rust, of folders of cargo, of devices of Windows; the names that
+/// `aso_controller.h` uses.
+const RESERVED_FILES: &str = "\
+alloc aso aso_controller aux build com1 com2 com3 com4 com5 com6 com7 com8 com9 con core ctype \
+deps examples fenv incremental inttypes iso646 limits locale lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 \
+lpt8 lpt9 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool stddef stdint stdio stdlib \
+stdnoreturn std string test tgmath threads time uchar wchar wctype";
 
-/// The most characters of the name of a controller: with `_init_at` the 31 characters
-/// of an external name that C99 guarantees.
+/// The most characters of the name of a controller: with `_init_at` it has the 31 characters that C99 guarantees for an
+/// external name.
 const LONGEST_PREFIX: usize = 23;
-/// The most characters of the name of a signal; C99 guarantees 63 for a field.
+/// The most characters of the name of a signal, before a number makes it different from others; C99 guarantees 63 for a
+/// field.
 const LONGEST_FIELD: usize = 40;
 
-/// Returns the start of the names of files, types and functions for the plant `name`: an identifier of C and Rust of at
-/// most 23 characters, no reserved word.
+/// Returns the start of the names of files, types and functions for the plant `name`: an identifier of C and Rust with
+/// at most 23 characters. It is no reserved word; without letters and digits in `name` it is `controller`.
 #[must_use]
 pub fn prefix(name: &str) -> String {
     let mut prefix = plain(name, LONGEST_PREFIX);
     if prefix.is_empty() {
         "controller".clone_into(&mut prefix);
     }
-    if is_in(RESERVED, &prefix) || is_in(TAKEN_FILES, &prefix) {
+    if is_in(RESERVED, &prefix) || is_in(RESERVED_FILES, &prefix) {
         prefix.push_str("_ctl");
     }
     prefix
 }
 
-/// Returns a field for each name: letters, digits and `_`; different from each other in any case, and
-/// from reserved words.
+/// Returns a field for each name: letters, digits and `_`. Ignoring case, the fields differ from each other and from
+/// reserved words.
 pub(super) fn fields<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for (position, name) in names.enumerate() {
@@ -58,8 +61,8 @@ pub(super) fn fields<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     all
 }
 
-/// Replaces what an identifier cannot hold: `motor.u` gives `motor_u`, `q[2]` gives `q_2`. The result
-/// starts with a letter, or is empty.
+/// Replaces characters that an identifier cannot hold: `motor.u` gives `motor_u`, `q[2]` gives `q_2`. The result has at
+/// most `longest` characters, and starts with a letter or is empty.
 fn plain(name: &str, longest: usize) -> String {
     let mut plain = String::new();
     for sign in name.chars() {
@@ -99,11 +102,15 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_file_is_no_header_of_c_and_no_crate_of_rust() {
+    fn a_plant_file_is_no_header_of_c_no_crate_of_rust_and_no_device() {
         for (stem, expected) in [
             ("three-tank", "three_tank"),
             ("String", "String_ctl"),
             ("core", "core_ctl"),
+            ("com7", "com7_ctl"),
+            // The file `aso_controller.h` takes the samples; its macros start with `ASO_`.
+            ("aso-controller", "aso_controller_ctl"),
+            ("Aso", "Aso_ctl"),
             ("float", "float_ctl"),
             ("2024", "n2024"),
             ("", "controller"),
