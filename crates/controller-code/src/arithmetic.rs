@@ -1,4 +1,4 @@
-//! Operations per sample and bytes of a controller.
+//! The operations of a sample, and the memory of a controller in bytes.
 
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -30,7 +30,7 @@ thread_local! {
     static COUNT: Cell<Arithmetic> = const { Cell::new(Arithmetic::NONE) };
 }
 
-/// A number that counts what is done with it. It is finite, and neither below nor above another one.
+/// A number that counts the operations with it. It is finite, and neither below nor above another one.
 #[derive(Clone, Copy)]
 struct Counted;
 
@@ -114,8 +114,8 @@ impl Arithmetic {
         all
     }
 
-    /// Adds what the code of a schedule needs beside the equations: the place in the grid, the operating point there, the
-    /// limits as deviations from it.
+    /// Adds the operations of a schedule outside of the equations: the place in the grid, the operating point there,
+    /// the limits as deviations from it.
     fn add_place(&mut self, controller: &Controller) {
         let Some(schedule) = &controller.schedule else { return };
         let operating = operating_vectors(controller).into_iter();
@@ -131,7 +131,8 @@ impl Arithmetic {
     }
 }
 
-/// Measurements, references and a scheduling variable: finite or not, within a range or not.
+/// Counts the checks of measurements, references and a scheduling variable: whether they are finite, and in their
+/// range.
 fn take_inputs(controller: &Controller) {
     let measured = vec![Counted; Kind::Measurement.count(controller)];
     if controller.checks_measurements() {
@@ -144,7 +145,8 @@ fn take_inputs(controller: &Controller) {
     sample::all_finite(&vec![Counted; others]);
 }
 
-/// The longest sample: faults are compensated, the most actuators are gone, each window ends, each test gives an alarm.
+/// Counts the longest sample: faults are compensated, the most actuators are gone, each window ends, each test gives an
+/// alarm.
 fn take_sample(controller: &Controller) {
     let numbers = Numbers::of(controller, |_| Counted, |_| Counted);
     let design = numbers.design();
@@ -158,8 +160,8 @@ fn take_sample(controller: &Controller) {
         let actuators = controller.actuators.len();
         let gains = vec![Counted; actuators * actuators];
         let commands = vec![Counted; actuators];
-        let most = reconfiguration.most_gone();
-        let without: Vec<_> = (0..actuators).map(|actuator| actuator < most).collect();
+        let most_gone = reconfiguration.most_gone();
+        let without: Vec<_> = (0..actuators).map(|actuator| actuator < most_gone).collect();
         let stuck = Stuck {
             k_s: sample::Matrix::new(&gains),
             without: &without,
@@ -186,6 +188,7 @@ fn take_sample(controller: &Controller) {
     signals.keep(&mut state, is_finite);
 }
 
+/// Counts the tests of the residuals and the times of the decision.
 fn test(detection: &Detection, residuals: &[Counted]) {
     match detection.method {
         Method::Cusum => {
@@ -265,7 +268,7 @@ impl Memory {
         let [actuators, faults] = [Kind::Actuator, Kind::Fault].map(|kind| kind.count(controller));
         let of_cases = controller.reconfiguration.as_ref();
         let of_cases = of_cases.map_or(0, |cases| cases.integer_bytes(actuators, faults));
-        // Of each loss its fault, its actuator and u_e^2.
+        // Each loss has its fault, its actuator and u_e^2.
         let of_losses = losses * (8 + size);
         let tables: usize = tables(controller).iter().map(Constants::count).sum();
         Self {

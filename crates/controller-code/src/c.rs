@@ -18,24 +18,25 @@ use super::summary::Vocabulary;
 use super::symbols::Kind;
 use super::{Precision, Request};
 
-/// The longest line of a table.
+/// The largest number of characters in a line of a table.
 const WIDTH: usize = 100;
 /// The file of C code that is the same for each design.
 const RUNTIME: &str = "aso_controller.h";
 /// Its text, which takes the samples.
 const RUNTIME_TEXT: &str = include_str!("../runtime/aso_controller.h");
 
-/// What every function of this file renders from.
+/// The data of the files: the request, the controller, its identifiers.
 struct Source<'a> {
     request: &'a Request<'a>,
     controller: &'a Controller,
     fields: &'a Fields,
-    /// `double` or `float`, and the start of the names of macros.
+    /// `double` or `float`.
     real: &'static str,
+    /// The start of the names of macros: the prefix in capitals.
     capital: String,
 }
 
-/// Returns header and source with their names.
+/// Returns the header, the source file and the file that takes the samples, with their names.
 pub(super) fn files(
     request: &Request<'_>,
     controller: &Controller,
@@ -75,7 +76,7 @@ impl Source<'_> {
         }
     }
 
-    /// A number with the suffix of its type; the largest number for infinity, which stands for no limit.
+    /// A number with the suffix of its type. Infinity stands for no limit and becomes the largest finite number.
     fn literal(&self, value: f64) -> String {
         let (suffix, largest) = match self.request.precision {
             Precision::Double => ("", "DBL_MAX"),
@@ -117,6 +118,7 @@ impl Source<'_> {
         )
     }
 
+    /// Adds a table: a vector, a matrix, or a matrix for each point of a schedule or set of gains.
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
         let Constants { name, meaning, rows, columns, layers, values } = table;
         if !meaning.is_empty() {
@@ -150,14 +152,14 @@ impl Source<'_> {
         lines.push("};".to_owned());
     }
 
-    /// Numbers without a comma after the last one.
+    /// Lines of numbers, without a comma after the last one.
     fn numbers(&self, values: &[f64], indent: &str) -> Vec<String> {
         let mut lines = wrapped(values.iter().map(|value| self.literal(*value)), indent);
         end_list(&mut lines);
         lines
     }
 
-    /// The rows of a matrix.
+    /// Adds the rows of a matrix, without a comma after the last one.
     fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], indent: &str) {
         for row in rows {
             match self.numbers(row, &format!("{indent}    ")).as_slice() {
@@ -181,7 +183,7 @@ fn end_list(lines: &mut [String]) {
     }
 }
 
-/// Numbers with commas, as many in a line as fit.
+/// Lines of numbers, each number with a comma, as many in a line as fit into [`WIDTH`].
 pub(super) fn wrapped(numbers: impl Iterator<Item = String>, indent: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for number in numbers {

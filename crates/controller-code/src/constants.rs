@@ -1,22 +1,27 @@
-//! A constant of the code.
+//! The constants of the code.
 
 use nalgebra::DMatrix;
 
 use super::symbols::Kind;
 
-/// A constant: its name in the design file and its rows; one row for a vector.
+/// A table of constants: a vector, or matrices below each other.
 pub(super) struct Constants {
+    /// The name, which C writes as it is and Rust in capitals.
     pub(super) name: &'static str,
+    /// The comment before the table in C; empty for a table that needs none.
     pub(super) meaning: &'static str,
-    /// The signals of the rows and, of a matrix, of the columns.
+    /// The signals of the rows of a matrix, or of the elements of a vector.
     pub(super) rows: Kind,
+    /// The signals of the columns of a matrix; none of a vector.
     pub(super) columns: Option<Kind>,
-    /// What the rows of a matrix are repeated for: each point of a schedule, each set of gains.
+    /// What there is a matrix for: each point of a schedule, or each set of gains; none for one matrix.
     pub(super) layers: Option<Kind>,
+    /// The rows of all matrices; one row for a vector.
     pub(super) values: Vec<Vec<f64>>,
 }
 
 impl Constants {
+    /// The number of elements.
     pub(super) fn count(&self) -> usize {
         self.values.iter().map(Vec::len).sum()
     }

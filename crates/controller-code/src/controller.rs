@@ -12,7 +12,7 @@ use super::schedule::Schedule;
 use super::symbols::Matrix;
 use crate::Error;
 
-/// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
+/// The controller of a sampled design: matrices, signals, switches. The shapes are those of the design file.
 pub(super) struct Controller {
     pub(super) description: String,
     /// T in s.
@@ -28,7 +28,7 @@ pub(super) struct Controller {
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,
-    /// The part of the commands in the measurements, if they contain them.
+    /// D, the direct term of the commands in the measurements, if there is one.
     pub(super) d: Option<DMatrix<f64>>,
     pub(super) f_a: DMatrix<f64>,
     /// The identity where faults are constant.
@@ -47,24 +47,25 @@ pub(super) struct Controller {
     pub(super) f_i: Option<DMatrix<f64>>,
     pub(super) l_w: Option<DMatrix<f64>>,
     pub(super) n_r: Option<DMatrix<f64>>,
-    /// The part of `u_t` that goes in a sample.
+    /// The fraction of `u_t` that decays in one sample.
     pub(super) transfer: Option<f64>,
     pub(super) states: Vec<Signal>,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
-    /// For each measurement the most samples for which its last value may replace it, if there is such a limit.
+    /// For each measurement the most samples for which its last value may replace it; none without such a limit.
     pub(super) most_held: Vec<Option<u32>>,
     pub(super) faults: Vec<Signal>,
     pub(super) references: Vec<Signal>,
     pub(super) losses: Vec<Loss>,
-    /// Matrices and operating points that follow a variable, in place of those above.
+    /// Matrices and operating points that depend on a variable, in place of those above.
     pub(super) schedule: Option<Schedule>,
     pub(super) detection: Option<Detection>,
     pub(super) reconfiguration: Option<Reconfiguration>,
 }
 
 impl Controller {
-    /// The controller of a design file; the error names what has no code.
+    /// The controller of a design file. The error says why there is no code: the design is continuous, a time is beyond
+    /// 2^32 samples, or tests of both methods are stated.
     pub(super) fn of(file: Design) -> Result<Self, Error> {
         // Each entry of a design file has code, or the reason why it needs none.
         let Design {
@@ -173,12 +174,12 @@ impl Controller {
         signals.iter().map(|signal| signal.operating).collect()
     }
 
-    /// The scheduling variable where it is an input of its own; else none.
+    /// The scheduling variable if it is an input of its own, else an empty list.
     pub(super) fn schedule_inputs(&self) -> &[Signal] {
         self.schedule.as_ref().and_then(Schedule::input).map_or(&[], std::slice::from_ref)
     }
 
-    /// A matrix at each point of the schedule; `None` if it is constant.
+    /// A matrix at each point of the schedule; `None` if it does not depend on the scheduling variable.
     pub(super) fn scheduled(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         self.schedule.as_ref().and_then(|schedule| schedule.matrices(matrix))
     }
@@ -188,7 +189,8 @@ impl Controller {
         self.first_compensated > 0 || self.counts_all()
     }
 
-    /// Whether it counts all of them: times of a detection and of a reconfiguration follow from their number.
+    /// Whether an instance counts all of its samples: the times of a detection and of a reconfiguration follow from
+    /// their number.
     pub(super) fn counts_all(&self) -> bool {
         self.detection.is_some() || self.reconfiguration.is_some()
     }
@@ -218,7 +220,9 @@ impl Controller {
         self.actuators.iter().any(|actuator| actuator.limits.is_some())
     }
 
-    /// Checks that `precision` can hold every constant.
+    /// Checks that `precision` can hold every constant. In single precision the error names the first one that is too
+    /// large, or a bound of a sliding-mode law or a `least_command` that is too small, or values of the scheduling
+    /// variable that become equal.
     pub(super) fn check_range(&self, precision: Precision) -> Result<(), Error> {
         if precision == Precision::Double {
             return Ok(());
@@ -288,7 +292,7 @@ fn continuous() -> Error {
     Error(text.to_owned())
 }
 
-/// The number of the first sample at which faults are compensated.
+/// The number of the first sample at which faults are compensated; an error if it needs more than 32 bits.
 fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
     first_at(t_on, sample_time).ok_or_else(|| {
         Error(format!(
@@ -298,6 +302,7 @@ fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
     })
 }
 
+/// The faults that are losses of effectiveness, with their actuators.
 fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
     let loss = |(fault, entry): (usize, &Fault)| {
         let name = entry.loss_of.as_ref()?;

@@ -28,16 +28,16 @@ pub(super) struct Detection {
     pub(super) tests: Vec<Test>,
 }
 
-/// What all tests of a detection do.
+/// The method of all tests of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
     /// Two cumulative sums of one residual.
     Cusum,
-    /// The squared mean of several residuals over a window.
+    /// The squared norm of the mean of one or more residuals over a window.
     Window,
 }
 
-/// A test of some rows of r in turn.
+/// A test of the residuals; each takes the next `residuals` rows of r.
 pub(super) struct Test {
     pub(super) name: String,
     pub(super) residuals: usize,
@@ -51,7 +51,8 @@ pub(super) struct Test {
 }
 
 impl Detection {
-    /// The detection of a design file with this sample time in s.
+    /// The detection of a design file with this sample time in s; an error if `from` is beyond 2^32 samples, or if the
+    /// tests have both methods.
     pub(super) fn of(file: DetectionDesign, sample_time: f64) -> Result<Self, Error> {
         let first_tested = first_at(file.from, sample_time).ok_or_else(|| {
             Error(format!(
@@ -92,13 +93,13 @@ impl Detection {
         })
     }
 
-    /// The numbers of the tests and of the start of the filter, for a check of their range.
+    /// The real numbers of the tests and of the start of the filter, for a check of their range.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let tests = self.tests.iter().flat_map(|test| [test.drift, test.threshold]);
         self.start.iter().copied().chain(tests)
     }
 
-    /// The constants of the tests in real numbers, and the start of the filter.
+    /// The tables of real numbers: the start of the filter, then drifts and thresholds of the tests.
     pub(super) fn tables(&self) -> Vec<Constants> {
         let of_tests = |name, meaning, value: fn(&Test) -> f64| {
             Constants::vector(name, meaning, Kind::Test, self.tests.iter().map(value).collect())
@@ -114,29 +115,29 @@ impl Detection {
         all
     }
 
-    /// The real numbers of an instance besides the vectors of the filter: statistics and sums.
+    /// The number of real numbers in an instance besides the vectors of the filter: statistics and sums.
     pub(super) fn stored(&self) -> usize {
         self.tests.len()
             + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }
     }
 
-    /// The 32-bit counters of an instance besides that of the samples: the starts of sums or windows, the
-    /// samples in windows, alarm and onset, the isolated fault.
+    /// The number of 32-bit integers in an instance besides the counter of samples: the starts of both sums, or the
+    /// start of a window and the samples in it, for each test; alarm, onset and isolated fault.
     pub(super) fn counters(&self) -> usize {
         2 * self.tests.len() + 3
     }
 
-    /// The bytes of the constants that are no real numbers: reactions and windows.
+    /// The bytes of the constants that are no real numbers: reactions, and residuals and lengths of windows.
     pub(super) fn integer_bytes(&self) -> usize {
         let windows = if self.method == Method::Window { 8 * self.tests.len() } else { 0 };
         windows + self.tests.len() * self.faults.len()
     }
 
-    /// The flags of an instance: the alarms of tests.
+    /// The number of flags in an instance: the alarms of the tests.
     pub(super) fn flags(&self) -> usize {
         self.tests.len()
     }
 }
 
-/// The vectors that the filter stores.
+/// The vectors that an instance stores for the filter.
 pub(super) const STORED: [Vector; 2] = [Vector::StoredXR, Vector::StoredResidual];

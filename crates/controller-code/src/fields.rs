@@ -34,7 +34,8 @@ impl Fields {
         }
     }
 
-    /// The fields of what is known about the actuators: those that may be gone, and the fall-back.
+    /// The fields of the inputs about actuators: `gone_` and the actuator for each that may be gone, then `fall_back`
+    /// if there is a fall-back.
     pub(super) fn switches(&self, controller: &Controller) -> Vec<String> {
         let Some(reconfiguration) = &controller.reconfiguration else { return Vec::new() };
         let gone = reconfiguration

@@ -1,8 +1,7 @@
 //! The sampled controller as source code: C99, or a Rust crate without the standard library.
 //!
-//! The equations of the written controller stand in two files that are the same for each design: `aso_controller::sample`,
-//! which the Rust crate contains, and from which the count of operations and the bound of rounding errors follow, and
-//! `runtime/aso_controller.h`.
+//! The equations are the same for each design. In C they are in `runtime/aso_controller.h`, in Rust in
+//! `aso_controller::sample`, from which the count of operations and the bound of rounding errors follow, too.
 #![forbid(unsafe_code)]
 
 mod arithmetic;
@@ -44,9 +43,9 @@ pub enum Language {
 /// The floating-point numbers of a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// 64 bits: the results of the FMU.
+    /// 64 bits: the results have the bits of the FMU.
     Double,
-    /// 32 bits: with a bound of the difference.
+    /// 32 bits: the code states a bound of the difference, if there is one.
     Single,
 }
 
@@ -68,7 +67,7 @@ impl Precision {
         }
     }
 
-    /// A number as both languages write it, without suffix; the nearest one of this precision.
+    /// The nearest number of this precision as text of both languages, without suffix.
     fn literal(self, value: f64) -> String {
         match self {
             Self::Double => format!("{value:?}"),
@@ -82,19 +81,20 @@ impl Precision {
 pub struct Code {
     /// The files: their paths, relative to a folder, and their contents.
     pub files: Vec<(PathBuf, String)>,
-    /// What makes the code worse than the design.
+    /// Sentences on what single precision may do to the loop, or why there is no bound of it; empty in double
+    /// precision.
     pub warnings: Vec<String>,
 }
 
-/// What the code states of its design, and its form.
+/// The facts about the design that the code states, and the form of the code.
 pub struct Request<'a> {
-    /// The start of the names of files, types and functions, as [`prefix`] makes it of any name.
+    /// The start of the names of files, types and functions: an identifier that [`prefix`] returns.
     pub prefix: String,
     /// The text that every file of the design contains.
     pub identity: &'a str,
     /// The verdict on the design: one word.
     pub verdict: &'static str,
-    /// The delay of all commands at which the loop becomes unstable, in s.
+    /// The delay of all commands at which the loop becomes unstable, in s, if it is known.
     pub delay_margin: Option<f64>,
     /// The language.
     pub language: Language,
@@ -102,7 +102,7 @@ pub struct Request<'a> {
     pub precision: Precision,
 }
 
-/// A design that has no code.
+/// Why a design has no code, in a sentence.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Error(String);
@@ -113,8 +113,8 @@ pub struct Error(String);
 ///
 /// # Errors
 ///
-/// Returns an [`Error`] for a continuous design; for an entry of the design that has no code; for a number beyond the
-/// range of the precision.
+/// Returns an [`Error`] for a continuous design; for a detection with tests of both methods; for a time beyond 2^32
+/// samples; for a number beyond the range of the precision.
 pub fn write(design: aso_controller::Design, request: &Request<'_>) -> Result<Code, Error> {
     let controller = Controller::of(design)?;
     controller.check_range(request.precision)?;

@@ -6,7 +6,7 @@ use aso_controller::sample::{self, Number, Signals, State};
 use super::controller::Controller;
 use super::symbols::{Kind, Matrix, Vector};
 
-/// The numbers of a controller.
+/// The numbers of a controller, for the count of operations and the bound of rounding errors.
 pub(super) struct Numbers<N> {
     is_current: bool,
     sample_time: N,
@@ -19,12 +19,13 @@ pub(super) struct Numbers<N> {
     bounds: [Vec<N>; 2],
     /// The operating point: states, commands, measurements, references.
     point: [Vec<N>; 4],
-    /// The limits, if there are any.
+    /// A zero for each limit of the commands; only their number counts. Empty without limits.
     limits: Vec<N>,
-    /// The weights of two points of a schedule.
+    /// The weights of two points of a schedule; none without one.
     weights: Option<[N; 2]>,
 }
 
+/// The entries of a matrix, row by row.
 struct Entries<N> {
     matrix: Matrix,
     values: Vec<N>,
@@ -32,7 +33,7 @@ struct Entries<N> {
 }
 
 impl<N: Number> Numbers<N> {
-    /// The controller with its constants and its operating point as such numbers.
+    /// Converts the constants of a controller by `constant`, its operating point by `point`.
     pub(super) fn of(
         controller: &Controller,
         constant: impl Fn(f64) -> N,
@@ -71,16 +72,16 @@ impl<N: Number> Numbers<N> {
         }
     }
 
-    /// A matrix, [`sample::Matrix::NONE`] if the controller does not state it.
+    /// A matrix; [`sample::Matrix::NONE`] if the controller does not state it.
     pub(super) fn matrix(&self, matrix: Matrix) -> sample::Matrix<'_, N> {
         let entries = self.matrices.iter().find(|entries| entries.matrix == matrix);
         let Some(Entries { values, is_scheduled, .. }) = entries else {
             return sample::Matrix::NONE;
         };
-        let whole = sample::Matrix::new(values);
+        let matrix = sample::Matrix::new(values);
         match &self.weights {
-            Some(weights) if *is_scheduled => whole.towards(values, weights),
-            _ => whole,
+            Some(weights) if *is_scheduled => matrix.towards(values, weights),
+            _ => matrix,
         }
     }
 
@@ -172,14 +173,14 @@ impl<N: Number> Vectors<N> {
         Self(SIGNALS.map(|vector| vec![N::zero(); vector.length(controller)]))
     }
 
-    /// The elements of `vector`; empty if it is none of `sample::Signals`.
+    /// The elements of `vector`; empty if it is none of `sample::Signals`, or if the design does not have it.
     pub(super) fn get_mut(&mut self, vector: Vector) -> &mut [N] {
         let place = SIGNALS.iter().position(|signal| *signal == vector);
         place.and_then(|place| self.0.get_mut(place)).map_or(&mut [], |values| values)
     }
 }
 
-/// What a sample knows from those before it, and its inputs.
+/// The state of a controller before a sample, and the inputs of the sample.
 pub(super) struct Memory<N> {
     /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_t`, `u_before`, u.
     stored: [Vec<N>; 7],
@@ -188,7 +189,7 @@ pub(super) struct Memory<N> {
 }
 
 impl<N: Number> Memory<N> {
-    /// The numbers of each vector.
+    /// Builds the memory from the numbers of each vector.
     pub(super) fn of(mut numbers: impl FnMut(Vector) -> Vec<N>) -> Self {
         use Vector::{
             Command, Measured, Referred, StoredFHat, StoredU, StoredUT, StoredXHat, StoredXI,

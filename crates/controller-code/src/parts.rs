@@ -1,4 +1,4 @@
-//! What the parts of a controller share: signals, matrices, the numbers of samples.
+//! Signals, matrices and numbers of samples, which the parts of a controller share.
 
 use aso_controller::design::{Actuator, Fault, Measurement};
 use nalgebra::DMatrix;
@@ -54,7 +54,7 @@ impl From<Fault> for Signal {
     }
 }
 
-/// A fault that is a loss of effectiveness, with its position and that of its actuator.
+/// A loss of effectiveness: the positions of its fault and of its actuator.
 pub(super) struct Loss {
     pub(super) fault: usize,
     pub(super) actuator: usize,
@@ -67,15 +67,15 @@ pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
     DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
 }
 
-/// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
-/// does not fit into 32 bits.
-pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
-    let is_on = |sample: f64| {
+/// The number of the first sample at or after `start`, both in s, with the tolerance of the FMU; sample 0 is at time 0.
+/// `None` if the number does not fit into 32 bits.
+pub(super) fn first_at(start: f64, period: f64) -> Option<u32> {
+    let is_reached = |sample: f64| {
         let time = sample * period;
-        time >= t_on - 8.0 * f64::EPSILON * time
+        time >= start - 8.0 * f64::EPSILON * time
     };
-    let mut sample = ((t_on / period).floor() - 2.0).max(0.0);
-    while !is_on(sample) && sample <= f64::from(u32::MAX) {
+    let mut sample = ((start / period).floor() - 2.0).max(0.0);
+    while !is_reached(sample) && sample <= f64::from(u32::MAX) {
         sample += 1.0;
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]

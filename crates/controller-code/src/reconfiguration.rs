@@ -9,7 +9,7 @@ use super::parts::{Loss, Signal, dense};
 use super::symbols::{Kind, Matrix};
 use crate::Error;
 
-/// What a controller does without some actuators.
+/// The gains of a controller without some actuators, and when these count as gone.
 pub(super) struct Reconfiguration {
     /// The actuators that may be gone.
     pub(super) cases: Vec<Case>,
@@ -25,15 +25,26 @@ pub(super) struct Case {
     pub(super) actuator: usize,
     /// The command at which it is stuck.
     pub(super) stuck_at: f64,
-    /// Whether the estimate of each state of the fault model restarts at 0.
+    /// For each state of the fault model whether its estimate restarts at 0 when the actuator fails or comes back.
     pub(super) restarts: Vec<bool>,
-    /// The loss that decides, with the fraction above which it does and the number of samples.
-    pub(super) decision: Option<(usize, f64, u32)>,
+    /// The loss that decides; none if only an input reports the actuator.
+    pub(super) decision: Option<Decision>,
 }
 
-/// Gains in force while exactly these actuators are gone.
+/// The condition under which an estimated loss decides that an actuator is gone.
+#[derive(Clone, Copy)]
+pub(super) struct Decision {
+    /// The position of the loss.
+    pub(super) loss: usize,
+    /// The fraction above which it must be.
+    pub(super) fraction: f64,
+    /// The number of samples for which it must be above.
+    pub(super) samples: u32,
+}
+
+/// Gains in force while exactly these actuators are gone, or gains of the fall-back.
 pub(super) struct GainSet {
-    /// For each actuator whether it is gone.
+    /// For each actuator whether it is gone; none is in the set of the fall-back.
     pub(super) gone: Vec<bool>,
     k_x: DMatrix<f64>,
     k_f: DMatrix<f64>,
@@ -41,19 +52,20 @@ pub(super) struct GainSet {
     k_s: DMatrix<f64>,
 }
 
-/// What the positions and shapes follow from.
+/// The parts of the controller that a reconfiguration refers to.
 pub(super) struct Plant<'a> {
     pub(super) sample_time: f64,
     pub(super) actuators: &'a [Actuator],
     pub(super) faults: &'a [Fault],
     pub(super) losses: &'a [Loss],
-    /// Those of the intact plant.
+    /// The gains of the intact plant.
     pub(super) k_x: &'a DMatrix<f64>,
     pub(super) k_f: &'a DMatrix<f64>,
 }
 
 impl Reconfiguration {
-    /// The reconfiguration of a design file; `None` if it has none.
+    /// The reconfiguration of a design file; `None` if it has neither cases nor a fall-back. An error if the time of a
+    /// case is beyond 2^32 samples.
     pub(super) fn of(
         cases: &[design::Reconfiguration],
         combinations: &[design::Combination],
@@ -68,8 +80,8 @@ impl Reconfiguration {
             let is_among = |actuator: &Actuator| names.contains(&actuator.name);
             plant.actuators.iter().map(is_among).collect::<Vec<_>>()
         };
-        // The columns of `k_s`, one for each stuck actuator in order, at the places of these actuators.
-        let scattered = |k_s: &DMatrix<f64>, gone: &[bool]| {
+        // Moves the columns of `k_s`, one for each stuck actuator in order, to the places of these actuators.
+        let scatter = |k_s: &DMatrix<f64>, gone: &[bool]| {
             let mut all = DMatrix::zeros(m, m);
             let places = gone.iter().enumerate().filter_map(|(j, gone)| gone.then_some(j));
             for (column, place) in k_s.column_iter().zip(places) {
@@ -80,9 +92,9 @@ impl Reconfiguration {
         let (k_x, k_f) = (plant.k_x.clone(), plant.k_f.clone());
         let none = vec![false; m];
         let mut sets = vec![GainSet { gone: none.clone(), k_x, k_f, k_s: DMatrix::zeros(m, m) }];
-        let mut known_cases = Vec::new();
+        let mut all_cases = Vec::new();
         for case in cases {
-            known_cases.push(Case {
+            all_cases.push(Case {
                 actuator: case.actuator,
                 stuck_at: case.stuck_at,
                 restarts: plant
@@ -94,13 +106,13 @@ impl Reconfiguration {
             });
             if let (Some(k_x), Some(k_f), Some(k_s)) = (&case.k_x, &case.k_f, &case.k_s) {
                 let gone = gone(std::slice::from_ref(&case.gone));
-                let k_s = scattered(&DMatrix::from_column_slice(m, 1, k_s), &gone);
+                let k_s = scatter(&DMatrix::from_column_slice(m, 1, k_s), &gone);
                 sets.push(GainSet { gone, k_x: dense(k_x), k_f: dense(k_f), k_s });
             }
         }
         for combination in combinations {
             let gone = gone(&combination.gone);
-            let k_s = scattered(&dense(&combination.k_s), &gone);
+            let k_s = scatter(&dense(&combination.k_s), &gone);
             sets.push(GainSet {
                 gone,
                 k_x: dense(&combination.k_x),
@@ -114,10 +126,10 @@ impl Reconfiguration {
             let k_f = k_f.as_ref().map_or_else(no_compensation, dense);
             sets.push(GainSet { gone: none, k_x: dense(k_x), k_f, k_s: DMatrix::zeros(m, m) });
         }
-        Ok(Some(Self { cases: known_cases, sets, fallback: compensates }))
+        Ok(Some(Self { cases: all_cases, sets, fallback: compensates }))
     }
 
-    /// A matrix in each of the sets; `None` if it is the same in all.
+    /// A matrix in each of the sets; `None` if it is the same in all of them.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         match matrix {
             Matrix::KX => Some(self.sets.iter().map(|set| &set.k_x).collect()),
@@ -126,7 +138,7 @@ impl Reconfiguration {
         }
     }
 
-    /// The number of sets that belong to certain actuators that are gone; the first set is that of none.
+    /// The number of sets without the fall-back: the one of the intact plant, then those without certain actuators.
     pub(super) fn regular_sets(&self) -> usize {
         self.sets.len() - usize::from(self.fallback.is_some())
     }
@@ -154,17 +166,17 @@ impl Reconfiguration {
         self.sets.iter().map(count).max().unwrap_or(0)
     }
 
-    /// All real numbers, for a check of their range.
+    /// The real numbers of gains and cases, for a check of their range.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
         let matrices = self.sets.iter().flat_map(|set| [&set.k_x, &set.k_f, &set.k_s]);
         let of_cases = self
             .cases
             .iter()
-            .flat_map(|case| [Some(case.stuck_at), case.decision.map(|limit| limit.1)]);
+            .flat_map(|case| [Some(case.stuck_at), case.decision.map(|limit| limit.fraction)]);
         matrices.flat_map(|matrix| matrix.iter().copied()).chain(of_cases.flatten())
     }
 
-    /// The constants in real numbers: the gains from stuck actuators, their commands, the fractions.
+    /// The tables of real numbers: the gains from stuck actuators, their commands, the fractions of losses.
     pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
         let k_s = self.sets.iter().map(|set| &set.k_s);
         let meaning = "gains from the commands of stuck actuators";
@@ -180,8 +192,9 @@ impl Reconfiguration {
             vector("u_stuck", "", &|j| stuck(j) - actuators[j].operating),
         ];
         if !self.cases.is_empty() {
-            let most =
-                self.cases.iter().map(|case| case.decision.map_or(f64::INFINITY, |limit| limit.1));
+            let fraction =
+                |case: &Case| case.decision.map_or(f64::INFINITY, |limit| limit.fraction);
+            let most = self.cases.iter().map(fraction);
             let meaning = "losses above which an actuator counts as gone";
             all.push(Constants::vector("most_lost", meaning, Kind::Case, most.collect()));
         }
@@ -189,15 +202,13 @@ impl Reconfiguration {
     }
 }
 
-/// The loss that decides, its fraction, and the samples that it lasts.
-fn decision(
-    case: &design::Reconfiguration,
-    plant: &Plant<'_>,
-) -> Result<Option<(usize, f64, u32)>, Error> {
-    let (Some(most), Some(time)) = (case.loss, case.time) else { return Ok(None) };
+/// The decision about an actuator by its estimated loss; `None` if the case states no limit, or if no fault is its
+/// loss. An error if the time is beyond 2^32 samples.
+fn decision(case: &design::Reconfiguration, plant: &Plant<'_>) -> Result<Option<Decision>, Error> {
+    let (Some(fraction), Some(time)) = (case.loss, case.time) else { return Ok(None) };
     let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == case.gone;
     let Some(loss) = plant.losses.iter().position(of_actuator) else { return Ok(None) };
-    // The first whole number of samples that last as long, with the tolerance of the FMU.
+    // The smallest whole number of samples that last as long, with the tolerance of the FMU.
     let least = time * (1.0 - 1e-9);
     let mut samples = (least / plant.sample_time).floor().max(0.0);
     while samples * plant.sample_time < least {
@@ -210,5 +221,5 @@ fn decision(
         )));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
-    Ok(Some((loss, most, samples as u32)))
+    Ok(Some(Decision { loss, fraction, samples: samples as u32 }))
 }

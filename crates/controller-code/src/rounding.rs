@@ -1,4 +1,4 @@
-//! A bound of what single precision changes.
+//! A bound of the differences between single and double precision.
 //!
 //! Each vector of a sample is computed with an error of at most
 //!
@@ -21,8 +21,8 @@
 //! M s and the spectral radius of M is below 1, the signals of double precision bound those of single precision:
 //! rounding does not make the loop unstable.
 //! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
-//! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
-//! not such a system, and has no bound.
+//! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop
+//! is not such a system, and has no bound.
 //!
 //! The law g(s) = rho s / (|s| + delta) of a sliding mode is not linear, but the slope of each of its chords is
 //! between 0 and c = rho / delta. So dg = (c / 2) ds + v with |v| <= (c / 2) |ds|, and v is one more input of the
@@ -48,29 +48,31 @@ use super::fields::Fields;
 use super::symbols::Kind;
 use super::text::{aligned, filled};
 
-/// For products of rounding errors, for the width of the peak gains, for the printed digits.
+/// A factor of the bound that covers products of rounding errors, and the rounding of its printed digits.
 const SECOND_ORDER: f64 = 1.001;
 /// The relative width of the peak gains.
 const WIDTH: f64 = 0.02;
 /// The largest order of the loop whose peak gains are computed.
 const LARGEST_ORDER: usize = 60;
-/// The part of a signal by which its rounding errors may change it before that is a warning.
+/// The fraction of a signal above which its rounding errors are a warning.
 const COARSE: f64 = 0.01;
 
-/// The reason why a loop may not be stable.
+/// Why the stability of a loop is not proven.
 const UNPROVEN: &str = "at worst, the errors of all signals are larger than the signals";
 
 /// The bound, or the reason why there is none.
 pub(super) struct RoundingBound {
     /// Outputs (commands, faults, residuals) x signals (as [`Kind::ALL`], then 1).
     bound: Result<DMatrix<f64>, String>,
-    /// 1 - |lambda| of the slowest eigenvalue of the loop.
+    /// 1 - |lambda| of the slowest eigenvalue of the loop; NaN if it is not known.
     slowest: f64,
-    /// Whether it proves that the loop with this controller is stable.
+    /// Whether the bound proves that the loop with the controller in single precision is stable.
     contracts: bool,
 }
 
 impl RoundingBound {
+    /// Computes the bound. There is none for a scheduled controller, for a loop of more than [`LARGEST_ORDER`] states,
+    /// if the peak gains cannot be computed, or if the slope of a sliding-mode law changes too much.
     pub(super) fn of(controller: &Controller) -> Self {
         if controller.schedule.is_some() {
             let reason = "matrices and operating point change with the scheduling variable";
@@ -105,7 +107,8 @@ impl RoundingBound {
         Self { bound: Err(reason.to_owned()), slowest: f64::NAN, contracts: false }
     }
 
-    /// What makes single precision too coarse for this design.
+    /// Sentences on signals that rounding may change by more than [`COARSE`], on a loop that may become unstable, or
+    /// on a bound that does not exist.
     pub(super) fn warnings(&self, controller: &Controller) -> Vec<String> {
         let bound = match &self.bound {
             Ok(bound) => bound,
@@ -140,7 +143,7 @@ impl RoundingBound {
         unstable.into_iter().chain(coarse).collect()
     }
 
-    /// The lines of the header.
+    /// The lines about the bound in the description of the code.
     pub(super) fn lines(&self, controller: &Controller, fields: &Fields) -> Vec<String> {
         let bound = match &self.bound {
             Ok(bound) => bound,
@@ -185,8 +188,9 @@ impl RoundingBound {
     }
 }
 
-/// A bound of the elements of `x_r` in a run from the operating point, states x signals: the peak-to-peak
-/// gains of the filter from the commands and the measurements.
+/// A bound of the elements of `x_r` in a run from the operating point, states x signals (the last column, of 1, is
+/// zero): the peak-to-peak gains of the filter from the commands and the measurements. No rows without a detection. An
+/// error if a gain cannot be computed.
 fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
     let signals: usize = Kind::ALL.map(|kind| kind.count(controller)).iter().sum();
     let k = Kind::ResidualState.count(controller);
@@ -206,7 +210,7 @@ fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
     Ok(all)
 }
 
-/// The place of the signals of a kind among all signals.
+/// The position of the first signal of a kind in the order of [`Kind::ALL`].
 fn first_signal(kind: Kind, controller: &Controller) -> usize {
     let before = Kind::ALL.into_iter().take_while(|other| *other != kind);
     before.map(|other| other.count(controller)).sum()

@@ -16,7 +16,7 @@ use super::symbols::Kind;
 use super::text::{ascii, file_text};
 use super::{Precision, Request};
 
-/// What every function of this file renders from.
+/// The data of the files: the request, the controller, its identifiers, and `f64` or `f32`.
 struct Source<'a> {
     request: &'a Request<'a>,
     controller: &'a Controller,
@@ -24,7 +24,7 @@ struct Source<'a> {
     real: &'static str,
 }
 
-/// Returns manifest and library with their paths.
+/// Returns the manifest, the library and the sources that take the samples, with their paths.
 pub(super) fn files(
     request: &Request<'_>,
     controller: &Controller,
@@ -72,7 +72,7 @@ impl Source<'_> {
         }
     }
 
-    /// A number; an infinite one stands for the largest finite one.
+    /// A number. Infinity stands for no limit and becomes the largest finite number.
     fn literal(&self, value: f64) -> String {
         match value {
             f64::INFINITY => format!("{}::MAX", self.real),
@@ -112,12 +112,11 @@ impl Source<'_> {
             (Kind::GainSet, "sets of gains"),
             (Kind::Case, "actuators that may be gone"),
         ] {
-            if kind.count(controller) == 0 {
-                continue;
-            }
-            lines.push(format!("/// Number of {what}."));
             let count = kind.count(controller);
-            lines.push(format!("pub const {}: usize = {count};", kind.plural()));
+            if count > 0 {
+                lines.push(format!("/// Number of {what}."));
+                lines.push(format!("pub const {}: usize = {count};", kind.plural()));
+            }
         }
         lines.push("/// Number of estimates.".to_owned());
         lines.push(format!("pub const ESTIMATES: usize = {};", fields.estimates(controller).len()));

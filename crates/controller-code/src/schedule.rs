@@ -6,7 +6,7 @@
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
-//! with theta held within the grid, as `aso_controller::design::schedule::Schedule::interpolate` does.
+//! with theta limited to the grid, as `aso_controller::design::schedule::Schedule::interpolate` does.
 
 use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;
@@ -18,11 +18,11 @@ use crate::Error;
 
 /// The schedule of a controller.
 pub(super) struct Schedule {
-    /// The scheduling variable with the start value.
+    /// The scheduling variable; its start value is the first point.
     pub(super) variable: Signal,
-    /// The position of the measurement that it is; `None` for an input of its own.
+    /// The position of the measurement that is the scheduling variable; `None` for an input of its own.
     pub(super) measurement: Option<usize>,
-    /// At least two, in ascending order.
+    /// The points of the grid, at least two, in ascending order.
     pub(super) points: Vec<Point>,
 }
 
@@ -47,7 +47,7 @@ impl Schedule {
         Self { variable, measurement, points }
     }
 
-    /// The scheduling variable as an input of its own, if it is one.
+    /// The scheduling variable, if it is an input of its own.
     pub(super) fn input(&self) -> Option<&Signal> {
         Some(&self.variable).filter(|_| self.measurement.is_none())
     }
@@ -75,7 +75,7 @@ impl Schedule {
         self.points.iter().map(values).collect()
     }
 
-    /// Checks that the values of the grid differ in `precision`, and that it can hold each number.
+    /// Checks that the values of the grid differ in `precision`, and that no number is beyond `largest`.
     pub(super) fn check_range(&self, precision: Precision, largest: f64) -> Result<(), Error> {
         let name = &self.variable.name;
         for (point, next) in self.points.iter().zip(self.points.iter().skip(1)) {

@@ -1,4 +1,4 @@
-//! What the user of the code must know: the same sentences for C and Rust.
+//! The description of the code for its users: the same sentences for C and Rust.
 
 mod options;
 
@@ -22,11 +22,11 @@ pub(super) struct Vocabulary {
     pub(super) outside: String,
     pub(super) lost: String,
     pub(super) real: &'static str,
-    /// How the compiler keeps the order of operations.
+    /// The options with which the compiler keeps the order of operations, or that it does.
     pub(super) compiler: &'static str,
 }
 
-/// One line on each signal: name, unit and description.
+/// One line on each signal: name, unit and description, in ASCII.
 pub(super) fn descriptions(signals: &[Signal]) -> Vec<String> {
     let described = |signal: &Signal| {
         let unit = signal.unit.as_ref().map_or_else(String::new, |unit| format!(" in {unit}"));
@@ -312,7 +312,7 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
     all
 }
 
-/// What the controller does while the last value of a measurement is too old.
+/// A sentence on the controller while the last value of a measurement is too old.
 fn rest(controller: &Controller, lost: &str) -> String {
     let measurements = controller.measurements.iter().zip(&controller.most_held);
     let longest: Vec<_> = measurements

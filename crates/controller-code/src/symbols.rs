@@ -9,7 +9,7 @@ macro_rules! vectors {
         }
 
         impl Vector {
-            /// The name without its owner.
+            /// The name in the code, without its structure.
             pub(super) fn name(self) -> &'static str {
                 match self {
                     $(Self::$vector => $name,)*
@@ -32,9 +32,9 @@ vectors! {
     StoredXHat "x_hat" State,
     StoredFHat "f_hat" Fault,
     StoredYF "y_f" Measurement,
-    /// The measurements as values; the last finite ones.
+    /// The measurements as values: the last ones that are used.
     Measured "y" Measurement,
-    /// The references as values; the last finite ones.
+    /// The references as values: the last finite ones.
     Referred "r" Reference,
     /// The integrals of the distances from the references.
     StoredXI "x_i" Integral,
@@ -43,7 +43,7 @@ vectors! {
     StoredResidual "residual" Residual,
     /// The commands of the sample before as deviations, for measurements that contain them.
     StoredU "u_before" Actuator,
-    /// What is left in the commands since their law changed.
+    /// The remaining distance of the commands from the law that is in force.
     StoredUT "u_t" Actuator,
     /// The operating point.
     XOp "x_op" State,
@@ -62,7 +62,7 @@ vectors! {
     YF "y_f" Measurement,
     U "u" Actuator,
     R "r" Reference,
-    /// How far the limits are from the command without limits.
+    /// The change of the commands by their limits.
     Excess "excess" Actuator,
     /// The commands and estimates as values.
     Command "command" Actuator,
@@ -90,14 +90,14 @@ macro_rules! matrices {
         impl Matrix {
             pub(super) const ALL: [Self; 22] = [$(Self::$matrix),*];
 
-            /// The name in the design file.
+            /// The name in the design file; of a matrix of the detection the one in the code.
             pub(super) fn name(self) -> &'static str {
                 match self {
                     $(Self::$matrix => $name,)*
                 }
             }
 
-            /// What its rows and columns belong to.
+            /// The kinds of its rows and columns.
             pub(super) fn kinds(self) -> [Kind; 2] {
                 match self {
                     $(Self::$matrix => [$(Kind::$kind),*],)*
@@ -107,7 +107,7 @@ macro_rules! matrices {
     };
 }
 
-// Each matrix with its name and what its rows and columns belong to.
+// Each matrix with its name and the kinds of its rows and columns.
 matrices! {
     A "A" [State, State],
     B "B" [State, Actuator],
@@ -136,14 +136,14 @@ matrices! {
 
 macro_rules! kinds {
     ($($(#[$text:meta])* $kind:ident $plural:literal,)*) => {
-        /// The signals of a controller.
+        /// The kinds of signals and of other numbered parts of a controller.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Kind {
             $($(#[$text])* $kind,)*
         }
 
         impl Kind {
-            /// The name of their number.
+            /// The name of the constant with their number.
             pub(super) fn plural(self) -> &'static str {
                 match self {
                     $(Self::$kind => $plural,)*

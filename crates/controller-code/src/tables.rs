@@ -1,4 +1,4 @@
-//! The constants and the variables of a controller.
+//! The tables of constants of a controller, and the vectors that it stores.
 
 use super::constants::Constants;
 use super::controller::Controller;
@@ -6,7 +6,7 @@ use super::detection::{self, Detection};
 use super::parts::Signal;
 use super::symbols::{Kind, Matrix, Vector};
 
-/// The vectors that are kept from sample to sample.
+/// The vectors that an instance stores from sample to sample, without the commands.
 pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     let mut all = vec![Vector::StoredXHat, Vector::StoredFHat];
     all.extend(controller.filter.is_some().then_some(Vector::StoredYF));
@@ -21,8 +21,8 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all
 }
 
-/// The limits of the commands: names and meaning, as deviations and as values, lower and upper.
-pub(super) const LIMITS: [(&str, &str); 4] = [
+/// The limits of the commands: names and meanings of lower and upper limits as deviations, then as values.
+const LIMITS: [(&str, &str); 4] = [
     ("u_low", "limits of u"),
     ("u_high", ""),
     ("u_min", "limits of the commands; the largest number stands for no limit"),
@@ -41,8 +41,8 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
         let points = controller.scheduled(matrix).map(|matrices| (Some(Kind::Point), matrices));
         let sets = controller.chosen(matrix).map(|matrices| (Some(Kind::GainSet), matrices));
         let one = || (None, matrix.of(controller).into_iter().collect());
-        let (layers, all_of_it): (_, Vec<_>) = points.or(sets).unwrap_or_else(one);
-        all.push(Constants::matrices(matrix.name(), "", matrix.kinds(), layers, all_of_it));
+        let (layers, matrices): (_, Vec<_>) = points.or(sets).unwrap_or_else(one);
+        all.push(Constants::matrices(matrix.name(), "", matrix.kinds(), layers, matrices));
     }
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
@@ -74,8 +74,8 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     }
     if controller.is_limited() {
         // With a schedule the limits as deviations are no constants.
-        let constant = if controller.schedule.is_some() { 2 } else { 0 };
-        for (position, (name, meaning)) in LIMITS.into_iter().enumerate().skip(constant) {
+        let first = if controller.schedule.is_some() { 2 } else { 0 };
+        for (position, (name, meaning)) in LIMITS.into_iter().enumerate().skip(first) {
             let limit = |actuator: &Signal| {
                 let side = position % 2;
                 let none = [f64::NEG_INFINITY, f64::INFINITY][side];
@@ -99,8 +99,8 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     all
 }
 
-/// The names of the tables that an instance starts from, of states, actuators, measurements, references:
-/// the operating point, which with a schedule has these values at the start only.
+/// The names of the tables with the start values of states, actuators, measurements and references: those of the
+/// operating point, or with a schedule tables of their own.
 pub(super) fn starts(controller: &Controller) -> [(&'static str, Kind); 4] {
     let names = match controller.schedule {
         None => ["x_op", "u_op", "y_op", "r_op"],
@@ -110,7 +110,7 @@ pub(super) fn starts(controller: &Controller) -> [(&'static str, Kind); 4] {
     [(x, Kind::State), (u, Kind::Actuator), (y, Kind::Measurement), (r, Kind::Reference)]
 }
 
-/// The grid of a schedule, and the operating point at each of its values.
+/// The grid of a schedule, and the operating point at each of its values; empty without a schedule.
 fn schedule(controller: &Controller) -> Vec<Constants> {
     let Some(schedule) = &controller.schedule else { return Vec::new() };
     let grid = schedule.points.iter().map(|point| point.at).collect();
@@ -133,7 +133,7 @@ fn schedule(controller: &Controller) -> Vec<Constants> {
     all
 }
 
-/// The parts of the operating point, with the name of their tables in a schedule.
+/// The vectors of the operating point, with the names of their tables in a schedule.
 pub(super) fn operating_vectors(controller: &Controller) -> Vec<(Vector, &'static str)> {
     let mut all =
         vec![(Vector::XOp, "x_op_at"), (Vector::UOp, "u_op_at"), (Vector::YOp, "y_op_at")];

@@ -1,16 +1,16 @@
 //! The text of a file, and lines of comments: paragraphs, columns, ASCII.
 
-/// The longest line of a paragraph.
+/// The largest number of bytes in a line of a paragraph.
 const WIDTH: usize = 92;
 
-/// The text of a file of these lines.
+/// The lines as the text of a file.
 pub(super) fn file_text(lines: &[String]) -> String {
     let mut text = lines.join("\n");
     text.push('\n');
     text
 }
 
-/// Breaks a paragraph into lines.
+/// Breaks a paragraph into lines of at most [`WIDTH`]; a longer word has a line of its own.
 pub(super) fn filled(paragraph: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in paragraph.split(' ') {
@@ -22,7 +22,7 @@ pub(super) fn filled(paragraph: &str) -> Vec<String> {
     lines
 }
 
-/// Columns of equal width.
+/// The rows as lines with columns of equal width.
 pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
     let width =
         |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
@@ -34,12 +34,12 @@ pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
     rows.iter().map(line).collect()
 }
 
-/// The text without line breaks.
+/// The text with spaces in place of control characters, line breaks included.
 pub(super) fn one_line(text: &str) -> String {
     text.replace(|sign: char| sign.is_control(), " ")
 }
 
-/// Replaces characters beyond ASCII, and what ends a comment.
+/// Replaces characters beyond printable ASCII, backslashes, marks of comments, trigraphs and code fences.
 pub(super) fn ascii(text: &str) -> String {
     let mut plain = String::new();
     for sign in text.chars() {

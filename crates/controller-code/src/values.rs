@@ -1,4 +1,4 @@
-//! What a controller has of each matrix and kind of signal.
+//! The matrices of a controller by their symbols, and the numbers of its signals by their kinds.
 
 use nalgebra::DMatrix;
 
@@ -6,7 +6,7 @@ use super::controller::Controller;
 use super::symbols::{Kind, Matrix};
 
 impl Matrix {
-    /// The matrix of a controller, if it has it.
+    /// The matrix of a controller, if it has one; `A_f` is the identity if faults are constant.
     pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
         let detection = controller.detection.as_ref();
         match self {
@@ -37,7 +37,7 @@ impl Matrix {
 }
 
 impl Kind {
-    /// The number of these of a controller.
+    /// The number of signals or other parts of this kind in a controller; 0 without them.
     pub(super) fn count(self, controller: &Controller) -> usize {
         let (detection, reconfiguration) = (&controller.detection, &controller.reconfiguration);
         match self {

@@ -101,7 +101,7 @@ impl Source<'_> {
         file_text(&lines)
     }
 
-    /// Numbers of signals, the sample time, bits of the status.
+    /// Adds macros: the numbers of signals, the sample time, the first samples, the bits of the status.
     fn macros(&self, lines: &mut Vec<String>) {
         let Self { controller, capital, .. } = self;
         for kind in self.kinds() {
@@ -148,8 +148,8 @@ impl Source<'_> {
         lines.extend([format!("}} {}_{what};", self.request.prefix), String::new()]);
     }
 
-    /// The structure with decision, residuals and statistics of a sample.
-    pub(super) fn detection_structure(&self, lines: &mut Vec<String>) {
+    /// Adds the structure with decision, residuals and statistics of a sample; nothing without a detection.
+    fn detection_structure(&self, lines: &mut Vec<String>) {
         if self.controller.detection.is_none() {
             return;
         }
@@ -169,8 +169,8 @@ impl Source<'_> {
         ));
     }
 
-    /// The fields of an instance that are real numbers, or the counters and flags.
-    pub(super) fn detection_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+    /// Adds the fields of the detection in an instance: the real numbers if `of_reals`, else counters and flags.
+    fn detection_state(&self, lines: &mut Vec<String>, of_reals: bool) {
         let Some(detection) = &self.controller.detection else { return };
         let (real, tests) = (self.real, self.count(Kind::Test));
         lines.extend(match (of_reals, detection.method) {
@@ -198,8 +198,8 @@ impl Source<'_> {
         });
     }
 
-    /// The structure of what is known about the actuators in a sample.
-    pub(super) fn actuators_structure(&self, lines: &mut Vec<String>) {
+    /// Adds the structure with the inputs about actuators that are gone; nothing without a reconfiguration.
+    fn actuators_structure(&self, lines: &mut Vec<String>) {
         if self.controller.reconfiguration.is_none() {
             return;
         }
@@ -209,8 +209,8 @@ impl Source<'_> {
         lines.push(format!("}} {}_Actuators;\n", self.request.prefix));
     }
 
-    /// The fields of an instance that are real numbers, or the counters and flags.
-    pub(super) fn reconfiguration_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+    /// Adds the fields of the reconfiguration in an instance: the real numbers if `of_reals`, else counters and flags.
+    fn reconfiguration_state(&self, lines: &mut Vec<String>, of_reals: bool) {
         let Some(reconfiguration) = &self.controller.reconfiguration else { return };
         let (real, cases, actuators) =
             (self.real, self.count(Kind::Case), self.count(Kind::Actuator));

@@ -1,4 +1,5 @@
-//! The tables of a design that are no real numbers: of tests, of actuators that may be gone, of losses.
+//! The tables of a design that are whole numbers or flags: of tests, of actuators that may be gone, of losses, of
+//! holds.
 
 use super::{Source, end_list, wrapped};
 use crate::detection::{Detection, Method, Test};
@@ -63,11 +64,11 @@ impl Source<'_> {
         let of_cases = reconfiguration.cases.iter();
         let place = |case: &Case| case.actuator;
         numbers(lines, ["case_actuator", &cases], of_cases.clone().map(place));
-        let samples = |case: &Case| case.decision.map_or(0, |decision| decision.2 as usize);
+        let samples = |case: &Case| case.decision.map_or(0, |decision| decision.samples as usize);
         numbers(lines, ["case_samples", &cases], of_cases.clone().map(samples));
         let losses = self.controller.losses.len();
         if losses > 0 {
-            let loss = |case: &Case| case.decision.map_or(losses, |decision| decision.0);
+            let loss = |case: &Case| case.decision.map_or(losses, |decision| decision.loss);
             numbers(lines, ["case_loss", &cases], of_cases.clone().map(loss));
         }
         lines.push("\n/* The faults whose estimates restart at 0. */".to_owned());
@@ -96,7 +97,7 @@ impl Source<'_> {
     }
 }
 
-/// A table of whole numbers with this name and size.
+/// Adds a table of whole numbers.
 fn numbers(lines: &mut Vec<String>, [name, size]: [&str; 2], values: impl Iterator<Item = usize>) {
     lines.push(format!("static const uint32_t {name}[{size}] =\n{{"));
     lines.extend(wrapped(values.map(|value| format!("{value}U")), "    "));
@@ -104,7 +105,7 @@ fn numbers(lines: &mut Vec<String>, [name, size]: [&str; 2], values: impl Iterat
     lines.push("};".to_owned());
 }
 
-/// A table of truth values.
+/// Adds a table of flags; `head` is its name with its sizes.
 fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<String>>) {
     lines.push(format!("static const bool {head} =\n{{"));
     lines.extend(rows.map(|row| format!("    {{{}}},", row.join(", "))));
@@ -112,7 +113,7 @@ fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<Str
     lines.push("};".to_owned());
 }
 
-/// For each fault whether each test reacts to it, as C and Rust write it.
+/// For each fault whether each test reacts to it: `true` or `false`, as C and Rust write it.
 pub(crate) fn reactions(detection: &Detection) -> Vec<Vec<String>> {
     let row =
         |fault: usize| detection.tests.iter().map(|test| test.reacts[fault].to_string()).collect();

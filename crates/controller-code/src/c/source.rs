@@ -40,7 +40,7 @@ impl Source<'_> {
         file_text(&lines)
     }
 
-    /// The functions with which an instance starts.
+    /// Adds the functions that start an instance.
     fn starts(&self, lines: &mut Vec<String>) {
         let (name, real) = (&self.request.prefix, self.real);
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
@@ -59,7 +59,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         ));
     }
 
-    /// The function that takes a sample: the named signals to the vectors of a sample, and back.
+    /// Adds the function that takes a sample. It copies the named signals into vectors, and the results back.
     fn step(&self, lines: &mut Vec<String>) {
         lines.extend([String::new(), self.signature(), "{".to_owned()]);
         lines
@@ -74,7 +74,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         lines.extend(["    return status;", "}"].map(str::to_owned));
     }
 
-    /// The last inputs that are used.
+    /// Adds the statements that store the inputs that are used.
     fn inputs(&self, lines: &mut Vec<String>) {
         let is_checked = self.controller.checks_measurements();
         for (owner, fields, vector) in [
@@ -94,7 +94,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         }));
     }
 
-    /// The choice of the gains at the start of a sample.
+    /// Adds the choice of the gains at the start of a sample; nothing without a reconfiguration.
     fn reconfigure(&self, lines: &mut Vec<String>) {
         let Some(reconfiguration) = &self.controller.reconfiguration else { return };
         let fall_back =
@@ -115,17 +115,17 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
 
     fn outputs(&self, lines: &mut Vec<String>) {
         let Self { controller, fields, .. } = self;
-        let mut copied = |target: &str, fields: &[String], source: &str| {
+        let mut copy = |target: &str, fields: &[String], source: &str| {
             let fields = fields.iter().enumerate();
             lines.extend(fields.map(|(k, field)| format!("    {target}{field} = {source}[{k}];")));
         };
-        copied("commands->", &fields.actuators, "state->u");
-        copied("estimates->x_hat_", &fields.states, "sample.x_value");
-        copied("estimates->f_hat_", &fields.faults, "sample.f_value");
+        copy("commands->", &fields.actuators, "state->u");
+        copy("estimates->x_hat_", &fields.states, "sample.x_value");
+        copy("estimates->f_hat_", &fields.faults, "sample.f_value");
         let losses: Vec<_> =
             controller.losses.iter().map(|loss| fields.faults[loss.fault].clone()).collect();
-        copied("estimates->E_hat_", &losses, "sample.lost");
-        copied("estimates->x_i_", &fields.integrals, "sample.x_i_value");
+        copy("estimates->E_hat_", &losses, "sample.lost");
+        copy("estimates->x_i_", &fields.integrals, "sample.x_i_value");
         if controller.reconfiguration.is_some() {
             lines.push("    *reconfiguration = state->reconfiguration;".to_owned());
         }

@@ -9,7 +9,7 @@ use crate::tables::has_constant_matrix;
 use aso_controller::design::Estimator;
 
 impl Source<'_> {
-    /// The kinds of signals, tests, sets of gains, ... that the design has.
+    /// The kinds of signals, tests, sets of gains, ... that the design has; integrals count as references.
     pub(super) fn kinds(&self) -> impl Iterator<Item = Kind> {
         let signals = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
         signals.chain(Kind::OTHERS).filter(|kind| kind.count(self.controller) > 0)

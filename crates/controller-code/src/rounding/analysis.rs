@@ -1,4 +1,4 @@
-//! What the errors of a sample do to the loop of plant and controller.
+//! The effect of the rounding errors of a sample on the loop of plant and controller.
 
 use std::ops::AddAssign as _;
 
@@ -13,17 +13,25 @@ use crate::numbers::{Memory, Numbers, Vectors};
 use crate::symbols::{Kind, Vector};
 use aso_controller::design::{Estimator, SlidingMode};
 
-/// Follows the equations of a sample.
+/// Follows the equations of a sample, and collects their rounding errors.
 pub(super) struct Analysis<'a> {
     controller: &'a Controller,
-    /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
+    /// A bound of the elements of `x_r`, states x signals; see [`super::residual_states`].
     state_of_filter: DMatrix<f64>,
-    known: Vec<(Vector, Elements)>,
+    /// The vectors in the order in which they are computed; the last entry of a vector is the present one.
+    history: Vec<(Vector, Elements)>,
     /// kappa: a row over the signals for each error.
     errors: Vec<RowDVector<f64>>,
-    /// The inputs v of a sliding-mode law, which have a row of zeros among the errors: their positions there,
-    /// and rho / (2 delta).
-    chords: Vec<(usize, f64)>,
+    /// The inputs v of a sliding-mode law.
+    chords: Vec<Chord>,
+}
+
+/// An input v of a sliding-mode law.
+struct Chord {
+    /// The position of its row among the errors, which is zero.
+    position: usize,
+    /// Half of the largest slope of a chord, rho / (2 delta).
+    half_slope: f64,
 }
 
 impl<'a> Analysis<'a> {
@@ -35,8 +43,8 @@ impl<'a> Analysis<'a> {
     }
 
     fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
-        let (known, errors, chords) = (Vec::new(), Vec::new(), Vec::new());
-        let mut analysis = Self { controller, state_of_filter, known, errors, chords };
+        let (history, errors, chords) = (Vec::new(), Vec::new(), Vec::new());
+        let mut analysis = Self { controller, state_of_filter, history, errors, chords };
         let [n, p] = [Kind::State, Kind::Measurement].map(|kind| analysis.count(kind));
         analysis.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
         let q = analysis.count(Kind::Fault);
@@ -69,20 +77,20 @@ impl<'a> Analysis<'a> {
             form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
         });
         analysis.start(Vector::Referred, |_| {});
-        // The measurements contain D times the commands of the sample before, which the controller takes off again:
-        // what remains is D times the rounding of these commands as values.
+        // The measurements contain D times the commands of the sample before, which the controller subtracts again: D
+        // times the rounding of these commands as values remains.
         analysis.start(Vector::StoredU, |_| {});
         analysis.start(Vector::StoredUT, |_| {});
         if controller.d.is_some() {
             let deviations = analysis.get(Vector::StoredU).numbers();
             let sums = deviations.into_iter().zip(analysis.get(Vector::UOp).numbers());
             let rounded: Vec<_> = sums.map(|(deviation, point)| deviation + point).collect();
-            analysis.learn(Vector::StoredU, Elements::of(&rounded, analysis.widths()));
+            analysis.record(Vector::StoredU, Elements::of(&rounded, analysis.widths()));
         }
         for vector in [Vector::Measured, Vector::Referred] {
             let mut rounded = analysis.get(vector);
             rounded.error = &rounded.magnitude * UNIT;
-            analysis.learn(vector, rounded);
+            analysis.record(vector, rounded);
         }
         analysis
     }
@@ -91,14 +99,15 @@ impl<'a> Analysis<'a> {
         kind.count(self.controller)
     }
 
-    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
+    /// Number of states of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
     pub(super) fn order(&self) -> usize {
         let [n, q, t, k] = [Kind::State, Kind::Fault, Kind::Integral, Kind::ResidualState]
             .map(|kind| self.count(kind));
         2 * n + q + t + k
     }
 
-    /// The columns of forms, with room for the errors of 6 vectors of each kind and for v, and the signals.
+    /// The number of columns of forms, with room for the errors of 6 vectors of each kind and for v, and that of
+    /// signals with 1.
     fn widths(&self) -> Widths {
         let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
         let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
@@ -111,10 +120,11 @@ impl<'a> Analysis<'a> {
         let mut elements = Elements::zero(self.count(vector.kind()), self.widths());
         fill(&mut elements.form);
         elements.magnitude = self.magnitude(vector);
-        self.known.push((vector, elements));
+        self.history.push((vector, elements));
     }
 
-    /// A vector as it is now; zero if no statement has computed it.
+    /// The present elements of a vector, or constants of the operating point; zero for a vector that is not computed
+    /// yet.
     fn get(&self, vector: Vector) -> Elements {
         let operating = match vector {
             Vector::XOp => Some(&self.controller.states),
@@ -133,7 +143,7 @@ impl<'a> Analysis<'a> {
             }
             return constant;
         }
-        let entry = self.known.iter().rev().find(|(other, _)| *other == vector);
+        let entry = self.history.iter().rev().find(|(other, _)| *other == vector);
         entry.map_or_else(zero, |(_, elements)| elements.clone())
     }
 
@@ -173,10 +183,10 @@ impl<'a> Analysis<'a> {
         magnitude
     }
 
-    /// Whether a vector is one that a current estimator corrects before a user sees it: its size follows from
-    /// the signals of the sample before.
+    /// Whether a vector is an estimate that a current estimator has not corrected yet: its size follows from the
+    /// signals of the sample before.
     fn is_predicted(&self, vector: Vector) -> bool {
-        let is_first = || !self.known.iter().any(|(other, _)| *other == vector);
+        let is_first = || !self.history.iter().any(|(other, _)| *other == vector);
         let is_current = self.controller.estimator == Estimator::Current;
         is_current
             && match vector {
@@ -189,7 +199,7 @@ impl<'a> Analysis<'a> {
             }
     }
 
-    /// The largest deviations of a kind of signals.
+    /// The largest deviations of the signals of a kind: rows of the identity, signals of the kind x all signals.
     fn unit(&self, kind: Kind) -> DMatrix<f64> {
         let (rows, signals) = (self.count(kind), self.widths().signals);
         let mut unit = DMatrix::zeros(rows, signals);
@@ -235,8 +245,8 @@ impl<'a> Analysis<'a> {
         all
     }
 
-    /// Takes the elements that a statement computes; their errors become elements of w.
-    fn learn(&mut self, vector: Vector, mut elements: Elements) {
+    /// Adds a computed vector to the history; its errors become elements of w.
+    fn record(&mut self, vector: Vector, mut elements: Elements) {
         elements.magnitude = self.magnitude(vector);
         for (i, error) in elements.error.row_iter().enumerate() {
             if error.amax() > 0.0 {
@@ -245,7 +255,7 @@ impl<'a> Analysis<'a> {
             }
         }
         elements.error.fill(0.0);
-        self.known.push((vector, elements));
+        self.history.push((vector, elements));
     }
 
     /// Follows the equations in the order of `Signals::estimate`, `Signals::set_commands` and `Signals::predict`.
@@ -264,106 +274,106 @@ impl<'a> Analysis<'a> {
         let has_direct_term = controller.p_f.is_some();
         let integral = if has_direct_term { Vector::FHatI } else { Vector::FHat };
         vectors.signals().set_deviations(&design, &state);
-        self.take(&mut vectors, [Vector::Y, Vector::XHat, Vector::YF, Vector::R]);
-        self.take_as(&mut vectors, Vector::FHatI, integral);
+        self.record_all(&mut vectors, [Vector::Y, Vector::XHat, Vector::YF, Vector::R]);
+        self.record_as(&mut vectors, Vector::FHatI, integral);
         if controller.d.is_some() {
             vectors.signals().remove_feedthrough(&design, &state);
-            self.take(&mut vectors, [Vector::Y]);
+            self.record_all(&mut vectors, [Vector::Y]);
         }
         vectors.signals().set_innovation(&design);
-        self.take(&mut vectors, [Vector::E]);
+        self.record_all(&mut vectors, [Vector::E]);
         if design.is_current {
             vectors.signals().correct_states(&design);
-            self.take(&mut vectors, [Vector::XHat]);
+            self.record_all(&mut vectors, [Vector::XHat]);
             if controller.sliding_mode.is_some() {
                 vectors.signals().set_sliding_variable(&design);
-                self.take_as(&mut vectors, Vector::FHatI, Vector::S);
+                self.record_as(&mut vectors, Vector::FHatI, Vector::S);
                 let mut injected = Elements::zero(self.count(Kind::Fault), self.widths());
                 self.inject(&mut injected);
                 vectors.get_mut(Vector::FHatI).clone_from_slice(&injected.numbers());
             } else {
                 vectors.signals().correct_faults(&design);
             }
-            self.take_as(&mut vectors, Vector::FHatI, integral);
+            self.record_as(&mut vectors, Vector::FHatI, integral);
             if has_direct_term {
                 vectors.signals().set_innovation(&design);
-                self.take(&mut vectors, [Vector::E]);
+                self.record_all(&mut vectors, [Vector::E]);
             }
         }
         vectors.signals().add_direct_term(&design, true);
         if has_direct_term {
-            self.take(&mut vectors, [Vector::FHat]);
+            self.record_all(&mut vectors, [Vector::FHat]);
         }
         vectors.signals().set_values(&design, &state);
         vectors.signals().set_commands(&design, &state, true);
-        self.take(&mut vectors, [Vector::XValue, Vector::FValue, Vector::U]);
+        self.record_all(&mut vectors, [Vector::XValue, Vector::FValue, Vector::U]);
         vectors.signals().set_command_values(&design);
-        self.take(&mut vectors, [Vector::Command]);
+        self.record_all(&mut vectors, [Vector::Command]);
         // Without limits u - v is exactly zero.
         vectors.get_mut(Vector::Excess).fill(Rounded::zero());
         vectors.signals().predict_states(&design);
         vectors.signals().predict_faults(&design, true);
         vectors.signals().predict_filter(&design);
         vectors.signals().predict_integrals(&design, &state);
-        self.take(
+        self.record_all(
             &mut vectors,
             [Vector::NextXHat, Vector::NextFHat, Vector::NextYF, Vector::NextXI],
         );
         if controller.detection.is_some() {
-            let of = |kind| vec![Rounded::zero(); kind];
-            let (mut next, mut residuals) =
-                (of(self.count(Kind::ResidualState)), of(self.count(Kind::Residual)));
+            let [mut next, mut residuals] = [Kind::ResidualState, Kind::Residual]
+                .map(|kind| vec![Rounded::zero(); self.count(kind)]);
             let x_r = self.get(Vector::StoredXR).numbers();
             let signals = vectors.signals();
             let inputs: [&[_]; 3] = [&x_r, signals.u, signals.y];
             numbers.filter_of_residuals().advance(inputs, false, &mut next, &mut residuals);
-            self.learn(Vector::Residual, Elements::of(&residuals, self.widths()));
-            self.learn(Vector::NextXR, Elements::of(&next, self.widths()));
+            self.record(Vector::Residual, Elements::of(&residuals, self.widths()));
+            self.record(Vector::NextXR, Elements::of(&next, self.widths()));
         }
     }
 
-    /// Takes vectors that the equations have computed; their errors become elements of w.
-    fn take<const N: usize>(&mut self, vectors: &mut Vectors<Rounded>, computed: [Vector; N]) {
-        for vector in computed {
-            self.take_as(vectors, vector, vector);
+    /// Records vectors that the equations have computed, and replaces them by the recorded ones.
+    fn record_all<const N: usize>(&mut self, vectors: &mut Vectors<Rounded>, names: [Vector; N]) {
+        for vector in names {
+            self.record_as(vectors, vector, vector);
         }
     }
 
-    /// The same for the vector `meaning`, which the equations have in the place of `place`.
-    fn take_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
+    /// Does the same for the vector `meaning`, which the equations store in `place`; nothing if the design does not
+    /// have it.
+    fn record_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
         let numbers = vectors.get_mut(place);
         if numbers.is_empty() {
             return;
         }
-        self.learn(meaning, Elements::of(numbers, self.widths()));
+        self.record(meaning, Elements::of(numbers, self.widths()));
         numbers.clone_from_slice(&self.get(meaning).numbers());
     }
 
-    /// Follows rho s / (|s| + delta): the chord of half the largest slope, and v.
+    /// Sets rho s / (|s| + delta): half the largest slope times s, plus v.
     fn inject(&mut self, injected: &mut Elements) {
         let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
         let s = self.get(Vector::S);
         injected.magnitude = self.magnitude(Vector::FHat);
         for (i, (rho, delta)) in rho.iter().zip(delta).enumerate() {
-            let half = rho / (2.0 * delta);
+            let half_slope = rho / (2.0 * delta);
             let position = self.errors.len();
-            injected.form.row_mut(i).copy_from(&(s.form.row(i) * half));
+            injected.form.row_mut(i).copy_from(&(s.form.row(i) * half_slope));
             injected.form[(i, self.order() + position)] = 1.0;
             self.errors.push(RowDVector::zeros(self.widths().signals));
-            self.chords.push((position, half));
-            // Of the product, the sum, the quotient and the constants, relative to the result.
+            self.chords.push(Chord { position, half_slope });
+            // The errors of product, sum, quotient and constants, relative to the result.
             let relative = 3.0 * UNIT + constant_error(*rho) / rho + constant_error(*delta) / delta;
             let rounding = injected.magnitude.row(i) * relative;
             injected.error.row_mut(i).add_assign(&rounding);
         }
     }
 
-    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of
-    /// [`Self::system`].
+    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of [`Self::system`];
+    /// s of a sliding-mode law is not among these outputs.
     ///
     /// # Errors
     ///
-    /// The reason why there is none.
+    /// The slope of the sliding-mode law changes too much for the small-gain theorem.
     pub(super) fn bound(&self, gains: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
         let linear = gains * self.kappa();
         let count = self.chords.len();
@@ -372,8 +382,8 @@ impl<'a> Analysis<'a> {
         }
         let outputs = gains.nrows() - count;
         let back = DMatrix::from_fn(gains.nrows(), count, |i, j| {
-            let (position, half) = self.chords[j];
-            gains[(i, position)] * half
+            let Chord { position, half_slope } = self.chords[j];
+            gains[(i, position)] * half_slope
         });
         let Some(loops) = without_loop(&back.rows(outputs, count).into_owned()) else {
             return Err("the slope of the sliding-mode law changes too much for one".to_owned());
@@ -382,8 +392,8 @@ impl<'a> Analysis<'a> {
         Ok(linear.rows(0, outputs) + back.rows(0, outputs) * of_s)
     }
 
-    /// Whether the bound of the differences of all signals, [`Self::bound`], is smaller than the signals: then
-    /// no rounding makes the loop unstable.
+    /// Whether [`Self::bound`], for the largest signals, is smaller than these signals: then rounding does not make the
+    /// loop unstable.
     pub(super) fn contracts(&self, bound: &DMatrix<f64>) -> bool {
         let [n, q, p, m, _, integrals] = Kind::ALL.map(|kind| self.count(kind));
         let residuals = self.count(Kind::Residual);
@@ -456,11 +466,11 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// (1 - M)^-1 of a matrix M without negative elements, if its spectral radius is below 1.
+/// (1 - M)^-1 of a matrix M without negative elements; `None` if its spectral radius is not below 1.
 fn without_loop(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let count = matrix.nrows();
     let inverse = (DMatrix::identity(count, count) - matrix).try_inverse()?;
-    // It is, if M x < x for some x > 0: here M x = x - 1.
+    // The spectral radius is below 1 if M x < x for some x > 0; here M x = x - 1.
     let x = &inverse * DVector::from_element(count, 1.0);
     x.iter().all(|entry| *entry >= 1.0 - 1e-9 && entry.is_finite()).then_some(inverse)
 }

@@ -1,4 +1,4 @@
-//! A number of the equations in single precision: what it is made of, and how exact it is.
+//! A number of the equations in single precision: its dependence on states and errors, its size, its rounding error.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -8,10 +8,10 @@ use nalgebra::{DMatrix, RowDVector};
 /// The relative rounding error of single precision.
 pub(super) const UNIT: f64 = 5.960_464_477_539_063e-8;
 
-/// The elements of a vector: what they are made of, and how exact they are.
+/// The elements of a vector: their dependence on states and errors, their size, their rounding errors.
 #[derive(Clone)]
 pub(super) struct Elements {
-    /// Elements x (states of the loop, then errors w): the difference from exact arithmetic.
+    /// Elements x (states of the loop, then errors w): the difference from exact arithmetic as a linear form.
     pub(super) form: DMatrix<f64>,
     /// Elements x signals: a bound of the absolute value.
     pub(super) magnitude: DMatrix<f64>,
@@ -41,7 +41,7 @@ impl Elements {
     pub(super) fn of(numbers: &[Rounded], widths: Widths) -> Self {
         let mut elements = Self::zero(numbers.len(), widths);
         for (i, number) in numbers.iter().enumerate() {
-            // A sum of products with 0 is 0.
+            // A constant is a sum of products with 0, which is 0.
             let Rounded::Signal(element) = number else { continue };
             elements.form.row_mut(i).copy_from(&element.form);
             elements.magnitude.row_mut(i).copy_from(&element.magnitude);
@@ -51,7 +51,7 @@ impl Elements {
     }
 }
 
-/// The columns of forms, and the signals with 1.
+/// The numbers of columns of forms, and of magnitudes and errors.
 #[derive(Clone, Copy)]
 pub(super) struct Widths {
     pub(super) forms: usize,
@@ -74,7 +74,7 @@ pub(super) enum Rounded {
 }
 
 impl Element {
-    /// An element of which nothing is known.
+    /// The element with an infinite error, of an operation that is not analysed.
     fn unknown(mut self) -> Rounded {
         self.error.fill(f64::INFINITY);
         Rounded::Signal(self)
@@ -150,7 +150,7 @@ impl Mul for Rounded {
 impl Div for Rounded {
     type Output = Self;
 
-    /// The quotient of a sliding-mode law has an analysis of its own.
+    /// A quotient with a signal is not analysed here; `Analysis` bounds that of a sliding-mode law itself.
     fn div(self, other: Self) -> Self {
         match (self, other) {
             (Self::Constant(a), Self::Constant(b)) => Self::Constant(a / b),
@@ -185,8 +185,8 @@ impl Number for Rounded {
     }
 }
 
-/// The error of a product with `entry`, relative to the other factor: of the constant and of the
-/// product.
+/// The error of a product with the constant `entry`, relative to the other factor: the rounding of the constant and of
+/// the product, which is exact for a power of two.
 pub(super) fn product_error(entry: f64) -> f64 {
     let is_power_of_two = entry.to_bits().trailing_zeros() >= 52;
     let product = if is_power_of_two { 0.0 } else { entry.abs() * UNIT };

@@ -38,23 +38,23 @@ impl Source<'_> {
         all
     }
 
-    /// The counters of the samples for which the last values of measurements are used, and of those since the
+    /// The counters of the samples for which the last values of measurements are used, and of the samples since the
     /// controller rested.
-    pub(super) fn fields_of_measurements(&self) -> Vec<Field> {
+    fn fields_of_measurements(&self) -> Vec<Field> {
         let held = field("held", "[u32; MEASUREMENTS]", "[0; MEASUREMENTS]");
         let running = field("running", "u32", "0");
         let held = self.controller.limits_holds().then_some(held);
         held.into_iter().chain(self.controller.counts_since_rest().then_some(running)).collect()
     }
 
-    /// All of these fields.
+    /// The fields of tests, of the choice of gains, of measurements, and of the law.
     pub(super) fn other_fields(&self) -> impl Iterator<Item = Field> {
         let of_tests = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
         of_tests.chain(self.fields_of_measurements()).chain(self.field_of_law())
     }
 
-    /// The law of the last commands: whether it compensates, the actuators that are gone, the set of gains. `None` before the
-    /// first commands and at rest.
+    /// The law of the last commands: whether it compensates, the actuators that are gone, the set of gains. The value
+    /// of the field is `None` before the first commands and at rest. No field if commands may jump.
     fn field_of_law(&self) -> Option<Field> {
         let kind = match self.controller.reconfiguration {
             None => "Option<bool>",
@@ -64,7 +64,7 @@ impl Source<'_> {
     }
 
     /// The fields of the choice of gains.
-    pub(super) fn fields_of_reconfiguration(&self) -> Vec<Field> {
+    fn fields_of_reconfiguration(&self) -> Vec<Field> {
         let Some(reconfiguration) = &self.controller.reconfiguration else { return Vec::new() };
         let mut all = vec![
             field("gone", "[bool; ACTUATORS]", "[false; ACTUATORS]"),

@@ -9,7 +9,7 @@ use crate::tables::operating_vectors;
 use aso_controller::design::Estimator;
 
 impl Source<'_> {
-    /// What the library takes from the sources that are the same for each design.
+    /// The imports of the library from the sources that are the same for each design.
     pub(super) fn imports(&self) -> String {
         let mut lines = Vec::new();
         if let Some(detection) = &self.controller.detection {
@@ -31,6 +31,7 @@ impl Source<'_> {
         lines.join("\n")
     }
 
+    /// Adds the function that takes a sample, and the functions that it calls.
     pub(super) fn step(&self, lines: &mut Vec<String>) {
         let Self { controller, fields, real, .. } = self;
         let (mut parameters, mut inputs) = (String::new(), String::new());
@@ -126,7 +127,7 @@ impl Controller {{
         self.outputs(lines);
     }
 
-    /// The sample in which a measurement is lost, and the start of the other case.
+    /// Adds the branch for a sample with a lost measurement, and opens the branch for all other samples.
     fn rest(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         lines.push("        if status.lost {\n            signals.rest(&design);".to_owned());
@@ -155,7 +156,7 @@ impl Controller {{
         if controller.detection.is_some() {
             lines.push("            self.x_r = [0.0; RESIDUAL_STATES];".to_owned());
             lines.push("            self.residual = [0.0; RESIDUALS];".to_owned());
-            // A decision stays.
+            // The decision stays, and the alarms from which it follows.
             let fields = self.fields_of_tests().into_iter();
             let cleared = fields.filter(|field| !["alarmed", "decision"].contains(&field.name));
             lines.extend(
@@ -166,12 +167,13 @@ impl Controller {{
         lines.push("        } else {".to_owned());
     }
 
-    /// The number of the sample from which the detection counts.
+    /// The counter of samples that the detection uses: since the controller rested if it can rest, else since the
+    /// start.
     fn running(&self) -> &'static str {
         if self.controller.counts_since_rest() { "self.running" } else { "self.sample" }
     }
 
-    /// The choice of the gains at the start of a sample.
+    /// Adds the choice of the gains at the start of a sample, and whether faults are estimated.
     fn reconfigure(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         let estimating = if controller.monitor { "true" } else { "compensating" };
@@ -213,7 +215,8 @@ impl Controller {{
         }
     }
 
-    /// The place in the grid, the operating point there, and the limits as deviations from it.
+    /// Adds the place in the grid, the operating point there, and the limits as deviations from it; nothing without a
+    /// schedule.
     fn follow_schedule(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         let Some(schedule) = &controller.schedule else { return };
@@ -245,7 +248,7 @@ impl Controller {{
         }
     }
 
-    /// The numbers of the design in this sample.
+    /// Adds the numbers of the design in this sample.
     fn design(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         let stated: Vec<_> = Matrix::all_stated(controller).collect();
@@ -302,7 +305,7 @@ impl Controller {{
         lines.push("        };".to_owned());
     }
 
-    /// The vectors of a sample.
+    /// Adds the vectors of a sample and the state.
     fn signals(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         lines.extend(Vector::of_sample(controller).map(|vector| {
@@ -331,7 +334,7 @@ impl Controller {{
         lines.push(format!("            y: &self.y,\n            r: &{r},\n        }};"));
     }
 
-    /// The equations, and what is kept.
+    /// Adds the equations of a sample, and the storage of its results.
     fn take_sample(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         lines.push(
@@ -402,6 +405,7 @@ impl Controller {{
         }
     }
 
+    /// Adds the statement that counts the sample; nothing if no time depends on the number.
     fn count_sample(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         if controller.counts_all() {
@@ -443,8 +447,9 @@ impl Controller {{
         let cases = controller.reconfiguration.iter().flat_map(|all| &all.cases);
         let lost = |case: &Case| match case.decision {
             None => "0.0".to_owned(),
-            Some((loss, ..)) => {
-                format!("estimates.E_hat_{}", fields.faults[controller.losses[loss].fault])
+            Some(decision) => {
+                let fault = controller.losses[decision.loss].fault;
+                format!("estimates.E_hat_{}", fields.faults[fault])
             }
         };
         let lost: Vec<_> = cases.map(lost).collect();
@@ -464,7 +469,7 @@ impl Controller {{
         self.places(lines);
     }
 
-    /// The methods that test the residuals and return the decision.
+    /// Adds the methods that test the residuals and return the decision; nothing without a detection.
     fn detect(&self, lines: &mut Vec<String>) {
         let Some(detection) = &self.controller.detection else { return };
         let tests = match detection.method {
@@ -514,7 +519,7 @@ impl Controller {{
         ));
     }
 
-    /// The functions of a schedule.
+    /// Adds the functions of a schedule; nothing without one.
     fn places(&self, lines: &mut Vec<String>) {
         if self.controller.schedule.is_none() {
             return;

@@ -20,7 +20,7 @@ impl Source<'_> {
         }
     }
 
-    /// When a measurement is used.
+    /// Adds the ranges and the longest holds of measurements; nothing without them.
     fn validity(&self, lines: &mut Vec<String>) {
         if !self.controller.checks_measurements() {
             return;
@@ -44,7 +44,7 @@ static VALIDITY: Validity<'static, {}> = Validity {{
         ));
     }
 
-    /// A vector, or a matrix row by row; the vectors or matrices of all points of a schedule or sets of gains.
+    /// Adds a vector, a matrix row by row, or the vectors or matrices of all points of a schedule or sets of gains.
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
         let Constants { name, rows, columns, layers, values, .. } = table;
         let real = self.real;
@@ -76,7 +76,8 @@ static VALIDITY: Validity<'static, {}> = Validity {{
         lines.push("];".to_owned());
     }
 
-    /// The tables of the tests that are no real numbers, and the filter of the residuals.
+    /// Adds the tables of the tests that are no real numbers, and the filter of the residuals; nothing without a
+    /// detection.
     fn tables_of_tests(&self, lines: &mut Vec<String>) {
         let Some(detection) = &self.controller.detection else { return };
         if detection.method == Method::Window {
@@ -145,7 +146,7 @@ fn of_set<T, const N: usize>(table: &[[T; N]; GAIN_SETS], set: u32) -> &[T] {{
             return;
         }
         let case = |case: &Case| {
-            let samples = case.decision.map_or(0, |decision| decision.2);
+            let samples = case.decision.map_or(0, |decision| decision.samples);
             format!(
                 "Case {{ actuator: {}, samples: {samples}, restarts: &{} }}",
                 case.actuator,

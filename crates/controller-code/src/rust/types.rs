@@ -64,7 +64,7 @@ pub struct Controller {"
         lines.push("}".to_owned());
     }
 
-    /// The structures of what was unusual in a sample, and of its results.
+    /// Adds the structures of the status of a sample, and of its results.
     fn outputs_structure(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         let reconfiguration = match controller.reconfiguration {
@@ -129,6 +129,7 @@ pub struct Outputs {{
         ));
     }
 
+    /// Adds the functions that start an instance.
     pub(super) fn start(&self, lines: &mut Vec<String>) {
         let Self { controller, real, .. } = self;
         let [x, u, y, r] = starts(controller).map(|(name, _)| name.to_ascii_uppercase());
@@ -196,8 +197,8 @@ impl Controller {{
         lines.push(format!("            y: {y},\n            u: {u},\n        }}\n    }}\n}}"));
     }
 
-    /// The structure with decision, residuals and statistics of a sample.
-    pub(super) fn detection_structure(&self, lines: &mut Vec<String>) {
+    /// Adds the structure with decision, residuals and statistics of a sample; nothing without a detection.
+    fn detection_structure(&self, lines: &mut Vec<String>) {
         if self.controller.detection.is_none() {
             return;
         }
@@ -236,8 +237,8 @@ impl Default for Detection {{
         ));
     }
 
-    /// The structure of what is known about the actuators in a sample.
-    pub(super) fn actuators_structure(&self, lines: &mut Vec<String>) {
+    /// Adds the structure with the inputs about actuators that are gone; nothing without a reconfiguration.
+    fn actuators_structure(&self, lines: &mut Vec<String>) {
         if self.controller.reconfiguration.is_none() {
             return;
         }

@@ -1,37 +1,38 @@
-//! Sections on what only some controllers have: other gains, a detection, a schedule.
+//! Sections on parts that only some controllers have: other gains, a detection, a schedule.
 
 use super::Vocabulary;
 use crate::Precision;
 use crate::controller::Controller;
 use crate::detection::Method;
 use crate::fields::Fields;
+use crate::reconfiguration::Decision;
 use crate::text::one_line;
 
-/// The gains without some actuators, and the meaning of the switches.
+/// The gains without some actuators, and the meaning of the inputs about actuators; empty without a reconfiguration.
 pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<String> {
     let Some(reconfiguration) = &controller.reconfiguration else { return Vec::new() };
     let names: Vec<_> = fields.switches(controller);
     let mut all = Vec::new();
     for (case, field) in reconfiguration.cases.iter().zip(&names) {
         let actuator = one_line(&controller.actuators[case.actuator].name);
-        let decided = case.decision.map_or_else(String::new, |(loss, most, samples)| {
+        let by_loss = case.decision.map_or_else(String::new, |decision| {
+            let Decision { loss, fraction, samples } = decision;
             let fault = &fields.faults[controller.losses[loss].fault];
             format!(
-                ", or since Estimates.E_hat_{fault} has been above {most:?} for {samples} samples, until the next \
-                 start"
+                ", or since Estimates.E_hat_{fault} has been above {fraction:?} for {samples} samples, \
+                 until the next start"
             )
         });
         all.push(format!(
-            "Actuators.{field}: {actuator} is gone{decided}. Its command is then {:?}.",
+            "Actuators.{field}: {actuator} is gone{by_loss}. Its command is then {:?}.",
             case.stuck_at
         ));
     }
     if reconfiguration.fallback.is_some() {
-        let uncovered =
-            "also in force where there are no gains without exactly the actuators that are gone";
-        let text =
-            "an unknown actuator has failed; the gains are those of the fall-back, which are";
-        all.push(format!("Actuators.fall_back: {text} {uncovered}."));
+        let text = "Actuators.fall_back: an unknown actuator has failed; the gains are those of the \
+                    fall-back, which are also in force where there are no gains without exactly the \
+                    actuators that are gone.";
+        all.push(text.to_owned());
     } else {
         let text = "Where there are no gains without exactly the actuators that are gone, those without the first \
                     of them are in force.";
@@ -45,7 +46,7 @@ pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<S
     all
 }
 
-/// The tests, and the meaning of the outputs of a detection.
+/// The tests, and the meaning of the outputs of a detection; empty without one.
 pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<String> {
     let Some(detection) = &controller.detection else { return Vec::new() };
     let faults: Vec<_> = detection
@@ -108,7 +109,7 @@ pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<St
     all
 }
 
-/// What follows the scheduling variable, and where it is held.
+/// How matrices and operating point depend on the scheduling variable; empty without a schedule.
 pub(super) fn schedule(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
     let Some(schedule) = &controller.schedule else { return Vec::new() };
     let ([first, last], count) = (schedule.range(), schedule.points.len());
