@@ -18,8 +18,8 @@ use using virtual void volatile wchar_t where while xor xor_eq yield";
 const RESERVED_FILES: &str = "\
 alloc aso aso_controller aux build com1 com2 com3 com4 com5 com6 com7 com8 com9 con core ctype \
 deps examples fenv incremental inttypes iso646 limits locale lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 \
-lpt8 lpt9 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool stddef stdint stdio stdlib \
-stdnoreturn std string test tgmath threads time uchar wchar wctype";
+lpt8 lpt9 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool stddef stdint \
+stdio stdlib stdnoreturn std string test tgmath threads time uchar wchar wctype";
 
 /// The most characters of the name of a controller: with `_init_at` it has the 31 characters that C99 guarantees for an
 /// external name.
