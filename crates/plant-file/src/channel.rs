@@ -1,4 +1,4 @@
-//! What the H-infinity norm weights: reads `weights` and `noise` of a plant file.
+//! The weights of an H-infinity norm: reads `weights` and `noise` of a plant file.
 
 use control::Domain;
 use control::lmi::weight_of_table;
@@ -10,11 +10,11 @@ use crate::read::{each, refuse};
 /// The entries of a plant file that belong to `h_infinity`.
 pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
 
-/// What the H-infinity norm weights.
+/// The weights of an H-infinity norm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Channel {
-    /// Factor of each output of the norm: of the errors of the faults' estimates for the observer, of
-    /// measurements, then commands for the feedback. Empty if all are 1.
+    /// Weight of each output of the norm. The outputs are, for the observer, the errors of the estimated faults; for
+    /// the feedback, the measurements, then the commands. Empty if all weights are 1.
     pub weights: Vec<ChannelWeight>,
     /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
     pub noise: Vec<ChannelWeight>,
@@ -27,20 +27,20 @@ pub struct ChannelWeight {
     pub signal: String,
     /// The weight over frequency.
     pub weight: Weight,
-    /// The largest factor between the weight and the table that states it.
+    /// The largest factor between the weight and the table that states it; none without a table.
     pub deviation: Option<f64>,
 }
 
-/// The signals that the norm of a gain is about.
+/// The signals of the norm of a gain.
 pub(crate) struct ChannelSignals<'a> {
     /// Names of its outputs.
     pub(crate) outputs: Vec<&'a str>,
-    /// Names of the measurements whose noise the norm can have.
+    /// Names of the measurements whose noise the norm can have; none for a state feedback.
     pub(crate) noises: Option<Vec<&'a str>>,
 }
 
 impl ChannelWeight {
-    /// The factor of a constant weight; 1 for one over frequency, which acts in addition.
+    /// The factor of a constant weight; 1 for a weight over frequency, whose states are added to the plant.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.weight.as_constant().unwrap_or(1.0)
@@ -59,7 +59,8 @@ impl Channel {
         self.weights.iter().chain(&self.noise)
     }
 
-    /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement.
+    /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement. Signals
+    /// without an entry in `weights` have the weight 1.
     pub(crate) fn read(
         table: &Table<'_>,
         signals: &ChannelSignals<'_>,
@@ -95,7 +96,7 @@ impl Channel {
     }
 }
 
-/// Reads one weight, or one for each measurement.
+/// Reads one weight for all measurements, or one for each.
 fn noises(
     entry: &Entry<'_>,
     names: &[&str],
@@ -107,7 +108,7 @@ fn noises(
     Ok(names.iter().zip(all).map(named).collect())
 }
 
-/// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`, the latter two with `order`.
+/// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`; both tables may state `order`, 1 or 2.
 fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight, PlaceError> {
     if !entry.is_table() {
         let weight = Weight::constant(entry.positive()?);
@@ -131,21 +132,21 @@ fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWe
     }
     let low = table.require("low", "the magnitude at low frequencies")?.positive()?;
     let meaning = "in rad/s, where the magnitude is the geometric mean of `low` and `high`";
-    let frequency = mapped(&table.require("frequency", meaning)?, domain)?;
+    let frequency = continuous_frequency(&table.require("frequency", meaning)?, domain)?;
     let high = table.require("high", "the magnitude at high frequencies")?.positive()?;
     let weight = Weight::lead_lag(low, frequency, high, order)
         .map_err(|error| entry.error(error.to_string()))?;
     Ok(ChannelWeight { signal, weight, deviation: None })
 }
 
-/// Reads pairs of a frequency and a magnitude, in ascending order of the frequency.
+/// Reads at least two pairs of a frequency and a magnitude, in ascending order of the frequency.
 fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>, PlaceError> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for member in entry.list()? {
         let [frequency, magnitude] = &member.list()?[..] else {
             return Err(member.error("expected [frequency in rad/s, magnitude]"));
         };
-        let point = (mapped(frequency, domain)?, magnitude.positive()?);
+        let point = (continuous_frequency(frequency, domain)?, magnitude.positive()?);
         if points.last().is_some_and(|last| last.0 >= point.0) {
             return Err(frequency.error("expected frequencies in ascending order"));
         }
@@ -157,8 +158,8 @@ fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>, Pla
     Ok(points)
 }
 
-/// Reads a frequency in rad/s, in a sampled design below pi / T, as that of the continuous weight.
-fn mapped(entry: &Entry<'_>, domain: Domain) -> Result<f64, PlaceError> {
+/// Reads a frequency in rad/s, in a sampled design below pi / T, and returns the frequency of the continuous weight.
+fn continuous_frequency(entry: &Entry<'_>, domain: Domain) -> Result<f64, PlaceError> {
     let stated = entry.positive()?;
     let frequency = bilinear_frequency(stated, domain);
     match domain {

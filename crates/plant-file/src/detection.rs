@@ -8,7 +8,7 @@ use crate::faults::Fault;
 use crate::read::{is_first, positive, refuse, within};
 use crate::signals::{Signal, name, position};
 
-/// What the detection of faults shall do.
+/// The requirements on the detection of faults.
 #[derive(Clone, Debug)]
 pub struct DetectionRequest {
     /// Where the file states it.
@@ -17,22 +17,22 @@ pub struct DetectionRequest {
     pub method: Method,
     /// Mean time between false alarms, s.
     pub false_alarm_interval: f64,
-    /// Whether each test shall react to one fault only, as far as possible.
+    /// Whether each test should react to one fault only, as far as possible.
     pub isolation: bool,
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
     pub noise: Vec<f64>,
-    /// Process noise of each state, in the same sense; None if the file states none.
+    /// Process noise of the states, in the same sense; `None` if the file states none.
     pub process_noise: Option<ProcessNoise>,
-    /// The size of each fault that shall be detected.
+    /// The size of each fault that should be detected.
     pub sizes: Vec<f64>,
-    /// Time between two tests of a continuous controller, s.
+    /// Time between two tests of a continuous controller, s; `None` if it is not stated, and in a sampled design.
     pub sample_time: Option<f64>,
-    /// Whether the tests allow for errors of the model.
+    /// The errors of the model that the tests allow for, if the file asks for it.
     pub model_error: Option<ModelError>,
-    /// Time in s within which the least detectable fault is detected.
+    /// Time in s within which the least detectable fault is detected, if stated.
     pub delay: Option<f64>,
-    /// Time in s from the start of a run to the first test.
+    /// Time in s from the start of a run to the first test, if stated.
     pub from: Option<f64>,
 }
 
@@ -41,19 +41,19 @@ pub struct DetectionRequest {
 pub enum Method {
     /// Cumulative sums.
     Cusum,
-    /// Chi-square of the mean over a window of this many s, if stated.
+    /// Chi-square of the mean over a window.
     ChiSquare {
-        /// Length of the window, s.
+        /// Length of the window, s, if stated.
         window: Option<f64>,
     },
 }
 
-/// The errors of the model that give no alarm: those of the tolerances of `[robustness]`.
+/// The errors of the model that give no alarm: the tolerances of `[robustness]`.
 #[derive(Clone, Debug)]
 pub struct ModelError {
     /// Factor of the largest residual, at least 1.
     pub margin: f64,
-    /// The largest deviation of each command from its operating point, if stated.
+    /// For each command the largest deviation from its operating point, if stated.
     pub commands: Vec<Option<f64>>,
     /// Where the file states it.
     pub place: Place,
@@ -75,7 +75,7 @@ pub struct Disturbance {
     pub name: String,
     /// Where it enters the plant.
     pub entry_point: DisturbanceEntry,
-    /// Largest absolute value.
+    /// Largest absolute value, if stated.
     pub bound: Option<f64>,
     /// Where the file states it.
     pub place: Place,
@@ -86,11 +86,11 @@ pub struct Disturbance {
 pub enum DisturbanceEntry {
     /// The column E of x' = A x + E d.
     Column(DVector<f64>),
-    /// It adds to this command.
+    /// It adds to the command at this position, from 0.
     Actuator(usize),
-    /// It adds to this measurement.
+    /// It adds to the measurement at this position, from 0.
     Sensor(usize),
-    /// An input of the plant's FMU.
+    /// It is this input of the plant's FMU.
     Input(String),
 }
 
@@ -178,7 +178,7 @@ fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
     }
 }
 
-/// Reads the noise of the measurements here, or of `[robustness]`.
+/// Reads `noise` of this table, otherwise of `[robustness]`: one number above 0 for all measurements, or one for each.
 fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec<f64>, PlaceError> {
     let robustness = file.get("robustness").map(|entry| entry.table()).transpose()?;
     let inherited = robustness.and_then(|table| table.get("noise"));
@@ -213,7 +213,7 @@ fn not_negative(entry: &Entry<'_>) -> Result<Vec<f64>, PlaceError> {
     }
 }
 
-/// Reads the size of each fault: of `sizes`, its `step`, or its `bound`.
+/// Reads the size of each fault: its entry of `sizes`, otherwise its `step`, otherwise its `bound`.
 fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
     let table = entry.table()?;
     let stated = table.get("sizes").map(|entry| entry.table()).transpose()?;
@@ -234,7 +234,7 @@ fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
     faults.iter().map(size).collect()
 }
 
-/// Reads the margin for errors of the model, and the bounds of the commands.
+/// Reads the margin for errors of the model, and the bounds of the commands; `None` without `model_error`.
 fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelError>, PlaceError> {
     let Some(entry) = table.get("model_error") else {
         return refuse(table, &["commands"], "it belongs to `model_error`").map(|()| None);
@@ -252,7 +252,8 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
     Ok(Some(ModelError { margin, commands, place: entry.place }))
 }
 
-/// Reads the list `[[disturbances]]`.
+/// Reads the list `[[disturbances]]`; empty if the file has none. Columns E of sampled matrices become those of the
+/// plant.
 pub(crate) fn disturbances(
     file: &Table<'_>,
     actuators: &[Signal],
@@ -271,8 +272,8 @@ pub(crate) fn disturbances(
         if let (DisturbanceEntry::Column(e), Model::Matrices { sampled: Some(sampled), .. }) =
             (&mut stated.entry_point, model)
         {
-            let held = sampled.held(&DMatrix::from_column_slice(e.len(), 1, e.as_slice()));
-            e.copy_from(&held.column(0));
+            let column = DMatrix::from_column_slice(e.len(), 1, e.as_slice());
+            e.copy_from(&sampled.input_columns(&column).column(0));
         }
         if all.iter().any(|other| other.name == stated.name) {
             return Err(member.error(format!("the name `{}` is there twice", stated.name)));

@@ -3,14 +3,15 @@
 use crate::read::{each, not_negative, positive, positive_within};
 use files::{Entry, Place, PlaceError, Table};
 
-/// A law with the parameters that the file states; the others follow from plant and observer.
+/// A law that estimates the faults, with the parameters that the file states; the others follow from plant and
+/// observer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// The augmented state observer of the paper.
     Augmented,
     /// A proportional and an integral part.
     ProportionalIntegral {
-        /// The proportional part relative to the default.
+        /// The proportional part, relative to the default one.
         proportional: Option<f64>,
     },
     /// Fast adaptive estimation.
@@ -29,7 +30,7 @@ pub enum Law {
     },
     /// Iterative learning.
     Learning {
-        /// The part of the last estimate that remains.
+        /// `K_1`, the fraction of the last estimate that remains.
         kept: Option<f64>,
     },
 }
@@ -121,15 +122,14 @@ impl Law {
             ],
         }
     }
-}
 
-impl Law {
-    /// Whether a plant file with this law may have the table `key`.
+    /// Whether a plant file with this law may have the table `key`: family, schedule, reconfiguration or fallback.
     #[must_use]
     pub fn allows(&self, key: &str) -> bool {
         match self {
             Self::Augmented => true,
-            // Stability between the points is that of linear equations, which a sliding-mode law does not have.
+            // Stability between the points of a schedule is proven for linear equations; a sliding-mode law is not
+            // linear.
             Self::SlidingMode { .. } => false,
             Self::ProportionalIntegral { .. }
             | Self::FastAdaptive { .. }
@@ -139,7 +139,7 @@ impl Law {
 }
 
 impl EstimationRequest {
-    /// Reads the table; without it the law is the augmented observer. `faults`: their number.
+    /// Reads the table; without it the law is the augmented observer. `faults`: the number of faults.
     pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
         let Some(entry) = file.get("estimation") else {
             return Ok(Self { law: Law::Augmented, place: file.place.clone() });

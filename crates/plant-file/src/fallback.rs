@@ -5,14 +5,14 @@ use crate::requirements::{Region, stated_region};
 use crate::signals::{Signal, positions};
 use files::{Entry, Place, PlaceError, Table};
 
-/// The failures that one feedback must serve without knowing which of them there is.
+/// The failures that one feedback must serve without knowing which of them has occurred.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FallbackRequest {
     /// The actuators that may fail, from 0, one at a time.
     pub actuators: Vec<usize>,
     /// The largest fraction of its effect that one of them may lose; 1 if it may be gone.
     pub loss: f64,
-    /// The region in which the eigenvalues must be in all cases; None if the file states none.
+    /// The region of the eigenvalues in all cases; `None` if the file states none.
     pub region: Option<Region>,
     /// Where the file states it.
     pub place: Place,

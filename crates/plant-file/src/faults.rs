@@ -24,8 +24,8 @@ pub enum EntryPoint {
     Actuator(usize),
     /// A measurement, from 0: the fault is added to it.
     Sensor(usize),
-    /// An actuator, from 0, that loses a fraction of its command. The fraction is estimated while
-    /// the command is well above `least_command`.
+    /// A loss of effectiveness: an actuator loses a fraction of its command. The fraction is estimated while the
+    /// command is well above `least_command`.
     Loss {
         /// The actuator, from 0.
         actuator: usize,
@@ -41,7 +41,7 @@ pub enum EntryPoint {
 pub struct Fault {
     /// Its name.
     pub name: String,
-    /// Its unit, as FMI writes it.
+    /// Its unit, as FMI writes it: the stated one, otherwise that of its actuator or sensor.
     pub unit: Option<String>,
     /// What it is, for a reader.
     pub description: String,
@@ -49,22 +49,22 @@ pub struct Fault {
     pub dynamics: FaultDynamics,
     /// Where it enters the plant.
     pub entry_point: EntryPoint,
-    /// Largest absolute value.
+    /// Largest absolute value, if stated.
     pub bound: Option<f64>,
-    /// Largest absolute rate, per s.
+    /// Largest absolute rate, per s, if stated.
     pub rate_bound: Option<f64>,
-    /// Largest step change.
+    /// Largest step change, if stated.
     pub step: Option<f64>,
-    /// The largest fraction of a loss of effectiveness for which the loop must be stable.
+    /// The largest fraction of a loss of effectiveness for which the loop must be stable, if stated.
     pub up_to: Option<f64>,
     /// Where the file states it.
     pub place: Place,
 }
 
-/// The entries that errors about faults point at.
+/// The entries of a plant file at which errors about faults point.
 pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
-/// Largest number of actuators with a stated loss.
+/// Largest number of faults with `up_to`.
 const MOST_LOSSES: usize = 4;
 const FAULT: [&str; 13] = [
     "name",
@@ -82,7 +82,8 @@ const FAULT: [&str; 13] = [
     "step",
 ];
 
-/// Reads `actuator_faults`, "all" or names, and the faults under `[[faults]]`.
+/// Reads all faults: those of `actuator_faults`, "all" or names, then those of `[[faults]]`; without `[[faults]]` one
+/// fault for each column of `F_a`, named f1, f2 and so on. An error if there is no fault.
 pub(crate) fn all_faults(
     file: &Table<'_>,
     actuators: &[Signal],
@@ -113,7 +114,7 @@ pub(crate) fn all_faults(
 
 /// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
 /// turn.
-pub(crate) fn faults(
+fn faults(
     entry: &Entry<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
@@ -207,7 +208,7 @@ fn entry_point(
     }
 }
 
-/// Reads the largest fraction of a loss of effectiveness.
+/// Reads `up_to`, the largest fraction of a loss of effectiveness; `None` if it is not stated.
 fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
     let Some(entry) = table.get("up_to") else {
         return Ok(None);
@@ -221,7 +222,7 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
 }
 
 /// Returns one additive fault for each actuator at `positions`.
-pub(crate) fn actuator_faults(
+fn actuator_faults(
     actuators: &[Signal],
     positions: &[usize],
     place: &Place,
@@ -238,7 +239,7 @@ pub(crate) fn actuator_faults(
 
 impl Fault {
     /// Returns a constant fault on the first column of F_a with no other data.
-    pub(crate) fn constant(place: &Place) -> Self {
+    fn constant(place: &Place) -> Self {
         Self {
             name: String::new(),
             unit: None,

@@ -31,7 +31,7 @@ use crate::fallback::FallbackRequest;
 use crate::faults::{EntryPoint, Fault, all_faults};
 use crate::loop_shape::LoopShape;
 use crate::matrix::matrix;
-use crate::model::{linearised, stated};
+use crate::model::{read_fmu_plant, read_matrices};
 use crate::names::check_names;
 use crate::pid::Pid;
 use crate::read::{each, is_first, positive, refuse};
@@ -54,11 +54,11 @@ pub struct PlantFile<'a> {
     source: &'a Source,
     /// The places of entries, for errors of later steps.
     places: BTreeMap<&'static str, Place>,
-    /// What the controller is, in a sentence of the user.
+    /// The description of the controller by the user; `None` if it is missing or empty.
     pub description: Option<String>,
     /// Start time of the compensation, s.
     pub t_on: f64,
-    /// Whether the faults are also estimated before the compensation starts.
+    /// Whether the faults are also estimated while they are not compensated.
     pub monitor: bool,
     /// The time constant, s, with which commands approach a new law; without it they jump.
     pub transfer_time: Option<f64>,
@@ -70,13 +70,13 @@ pub struct PlantFile<'a> {
     pub measurements: Vec<Signal>,
     /// The faults that are estimated.
     pub faults: Vec<Fault>,
-    /// Set points of measurements.
+    /// Set points of measurements, if there are any.
     pub references: Option<References>,
     /// The sampling of the controller; none in continuous time.
     pub sampling: Option<Sampling>,
-    /// Rates of the measurement filter, 1/s, one per measurement.
+    /// Rates of the measurement filter, 1/s, one per measurement; none without a filter.
     pub filter: Option<Vec<f64>>,
-    /// Number of states by which the observer approximates each delay.
+    /// Number of states with which the observer approximates each delay.
     pub delay_order: usize,
     /// The requirement on the state feedback.
     pub feedback: Request,
@@ -94,17 +94,17 @@ pub struct PlantFile<'a> {
     pub robustness: RobustnessLimits,
     /// Plants that the same gains serve, besides the one of the file.
     pub family: Vec<Variant>,
-    /// The points of operation between which gains are interpolated.
+    /// The operating points between which gains are interpolated, if the file states a schedule.
     pub schedule: Option<Schedule>,
     /// Whether the plant is a point of the schedule of another file.
     pub is_point: bool,
-    /// What acts on the plant and is not estimated.
+    /// Unknown inputs that are no faults.
     pub disturbances: Vec<Disturbance>,
-    /// The detection of faults.
+    /// The requirements on the detection of faults, if there are any.
     pub detection: Option<DetectionRequest>,
-    /// What the controller must be able to do without an actuator.
+    /// The requirements on the controller without actuators, if there are any.
     pub reconfiguration: Option<ReconfigurationRequest>,
-    /// What one feedback must be able to do without knowing which actuator has failed.
+    /// The requirements on one feedback that does not know which actuator has failed, if there are any.
     pub fallback: Option<FallbackRequest>,
 }
 
@@ -167,8 +167,8 @@ impl<'a> PlantFile<'a> {
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
         let sampling = sampling(file)?;
         let (model, [actuators, measurements]) = match file.get("plant") {
-            Some(plant) => linearised(source, file, &plant)?,
-            None => stated(file, sampling)?,
+            Some(plant) => read_fmu_plant(source, file, &plant)?,
+            None => read_matrices(file, sampling)?,
         };
         let faults = all_faults(file, &actuators, &measurements)?;
         let references = References::read(file, &measurements)?;
@@ -269,13 +269,13 @@ impl<'a> PlantFile<'a> {
         states.iter().chain(&self.actuators).chain(&self.measurements)
     }
 
-    /// The PI or PID controllers in place of a state feedback.
+    /// The PI, PID or other controllers of low order in place of a state feedback, if the file states them.
     #[must_use]
     pub fn pid(&self) -> Option<&Pid> {
         self.loop_shape.as_ref()?.pid.as_ref()
     }
 
-    /// The estimator of the observer; in continuous time and beside PI or PID controllers it predicts.
+    /// The estimator of the observer: `Prediction` in continuous time and beside controllers of low order.
     #[must_use]
     pub fn estimator(&self) -> Estimator {
         match self.sampling {
@@ -308,7 +308,8 @@ impl<'a> PlantFile<'a> {
         all.any(|signal| signal.limits.is_some() || signal.longest_hold.is_some())
     }
 
-    /// Checks what the controller can do with the ranges and the longest times of holds of the measurements.
+    /// Refuses ranges and longest holds of measurements in a continuous design with a schedule, and a longest hold of
+    /// too many samples.
     fn check_holds(&self) -> Result<(), PlaceError> {
         for signal in &self.measurements {
             let [_, range, hold] = &signal.places;
@@ -337,7 +338,7 @@ impl<'a> PlantFile<'a> {
         Ok(())
     }
 
-    /// Checks that F_a has one column per fault that enters through F_a.
+    /// Checks that F_a has one column per fault that enters through F_a, and that there is no F_a without such faults.
     fn check_columns(&self, file: &Table<'_>) -> Result<(), PlaceError> {
         let columns = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Column(_));
         let expected = self.faults.iter().filter(columns).count();
@@ -361,6 +362,7 @@ impl<'a> PlantFile<'a> {
     }
 }
 
+/// Reads `sample_time` and `estimator`; `None` in continuous time.
 fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
     let Some(entry) = file.get("sample_time") else {
         return refuse(file, &["estimator"], "the design has no `sample_time`").map(|()| None);
@@ -380,8 +382,8 @@ pub fn estimator(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Reads the rates of the measurement filter, which sensor faults require; the design examines whether
-/// anything else does.
+/// Reads the rates of the measurement filter; `None` without one. Sensor faults require it; the design checks whether
+/// it is required otherwise.
 fn filter(
     file: &Table<'_>,
     measurements: &[Signal],

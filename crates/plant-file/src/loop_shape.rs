@@ -9,7 +9,7 @@ use files::{Place, PlaceError, Table};
 
 const KEYS: [&str; 7] =
     ["bandwidth", "set_point", "peak", "roll_off", "effort", "structure", "pairs"];
-/// Entries that state the gains in another way, or loops that are not tuned.
+/// Entries of the file that are not possible together with `[loop]`.
 const OTHERS: [&str; 6] = ["feedback", "observer", "schedule", "family", "estimation", "D"];
 /// The peak of S and of T, if none is stated.
 const PEAK: f64 = 1.5;
@@ -17,28 +17,29 @@ const PEAK: f64 = 1.5;
 const ROLL_OFF: f64 = 10.0;
 /// The bandwidth of references, relative to that of the loop, if none is stated.
 const SET_POINT: f64 = 0.3;
-/// Bandwidths of feedback and observer with which the search starts, relative to that of the loop.
+/// Bandwidths of feedback and observer from which the search starts, relative to that of the loop.
 const STARTS: [(f64, f64); 6] =
     [(1.0, 4.0), (0.5, 4.0), (1.0, 8.0), (2.0, 8.0), (0.5, 2.0), (1.0, 1.0)];
-/// Largest bandwidth of the observer in rad per sample.
-const OBSERVER_PER_SAMPLE: f64 = 1.5;
-/// Largest bandwidth in rad per sample.
+/// Largest bandwidth of feedback and observer from which the search starts, in rad per sample.
+const START_PER_SAMPLE: f64 = 1.5;
+/// Largest bandwidth of the loop in rad per sample.
 const PER_SAMPLE: f64 = 0.5;
 
 /// The shape that a loop should have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopShape {
-    /// |S| is below w / bandwidth at low frequencies w, rad/s.
+    /// |S| is below w / `bandwidth` at low frequencies w, both in rad/s.
     pub bandwidth: f64,
-    /// The distance of a measurement from its integrated reference is below w / `set_point` at low frequencies w, rad/s.
+    /// The relative distance of a measurement from its integrated reference is below w / `set_point` at low
+    /// frequencies w, both in rad/s.
     pub set_point: f64,
-    /// |S| and |T| are below it at every frequency.
+    /// |S| and |T| are below `peak` at every frequency.
     pub peak: f64,
-    /// |T| is below `peak roll_off / w` above it, rad/s.
+    /// |T| is below `peak` x `roll_off` / w at frequencies w above `roll_off`, both in rad/s.
     pub roll_off: f64,
-    /// |K S| is below it at every frequency, if it is stated.
+    /// |K S| is below `effort` at every frequency, if it is stated.
     pub effort: Option<f64>,
-    /// PI or PID controllers in place of the state feedback.
+    /// PI, PID or other controllers of low order in place of the state feedback, if they are stated.
     pub pid: Option<Pid>,
     /// Where the file states it.
     pub place: Place,
@@ -83,19 +84,19 @@ impl LoopShape {
         Ok(Some(Self { bandwidth, set_point, peak, roll_off, effort, pid, place: entry.place }))
     }
 
-    /// The requests on feedback and observer of the designs with which the search starts.
+    /// The requests on feedback and observer from which the search starts, in the order of the search.
     #[must_use]
     pub fn starts(&self, domain: Domain) -> [[Request; 2]; STARTS.len()] {
         let most = match domain {
             Domain::Continuous => f64::INFINITY,
-            Domain::Sampled { period } => OBSERVER_PER_SAMPLE / period,
+            Domain::Sampled { period } => START_PER_SAMPLE / period,
         };
         STARTS.map(|(feedback, observer)| {
             [feedback, observer].map(|factor| self.request((factor * self.bandwidth).min(most)))
         })
     }
 
-    /// A request of a bandwidth in rad/s.
+    /// A request for a bandwidth of `rate` rad/s.
     fn request(&self, rate: f64) -> Request {
         let bandwidth = Bandwidth { rate: Some(rate), is_stated: true };
         let requirement = Requirement::Bandwidth(bandwidth);

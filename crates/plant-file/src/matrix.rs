@@ -3,7 +3,7 @@
 use files::{Entry, PlaceError};
 use nalgebra::DMatrix;
 
-/// Reads a matrix: a list of rows of the same length.
+/// Reads a matrix: a list of rows of the same length, with at least one row and one column.
 pub(crate) fn matrix(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
     let rows = entry.list()?;
     let mut values = Vec::new();

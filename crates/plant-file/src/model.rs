@@ -22,13 +22,14 @@ pub enum Model {
         b: DMatrix<f64>,
         /// C, p x n.
         c: DMatrix<f64>,
-        /// D, p x m.
+        /// D, p x m; zero if it is not stated.
         d: DMatrix<f64>,
-        /// F_a, n x q, of the faults by column.
+        /// F_a, n x q, with a column for each fault that enters by one; none if it is not stated.
         f_a: Option<DMatrix<f64>>,
         /// The states.
         states: Vec<Signal>,
-        /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant if there is one.
+        /// The sampled matrices, if the file states such; `a`, `b` and `f_a` are then those of the continuous plant
+        /// with these samples, if there is one, otherwise those of the file.
         sampled: Option<Box<SampledMatrices>>,
     },
     /// The matrices are linearised from an FMU.
@@ -36,7 +37,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// Why the plant is known in its samples only; None if it is a continuous one.
+    /// Why the plant is known in its samples only; `None` if it is known in continuous time.
     #[must_use]
     pub fn only_samples(&self) -> Option<&str> {
         match self {
@@ -53,16 +54,16 @@ pub struct PlantFmu {
     pub path: PathBuf,
     /// Values of variables at the operating point.
     pub operating_point: Vec<(String, f64)>,
-    /// Names of the states, for an FMU whose description does not list them.
+    /// Names of the states, for an FMU whose description does not list them; empty if not stated.
     pub states: Vec<String>,
     /// Shared libraries to load before the FMU.
     pub preload: Vec<String>,
-    /// Communication step, s, of an FMU that is linearised by steps.
+    /// Communication step, s, of an FMU that is linearised by steps, if stated.
     pub step: Option<f64>,
 }
 
-/// Reads a plant that is an FMU.
-pub(crate) fn linearised(
+/// Reads a plant that is an FMU; returns actuators and measurements, too.
+pub(crate) fn read_fmu_plant(
     source: &Source,
     file: &Table<'_>,
     plant: &Entry<'_>,
@@ -98,8 +99,8 @@ fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
     entry.list()?.iter().map(|member| member.text().map(str::to_owned)).collect()
 }
 
-/// Reads a plant whose matrices the file states.
-pub(crate) fn stated(
+/// Reads a plant whose matrices the file states; returns actuators and measurements, too.
+pub(crate) fn read_matrices(
     file: &Table<'_>,
     sampling: Option<Sampling>,
 ) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
@@ -121,22 +122,25 @@ pub(crate) fn stated(
     let f_a = file
         .get("F_a")
         .map(|entry| shaped(&entry, [n, matrix(&entry)?.ncols()], "states x faults"));
-    let states = counted(file, "states", "x", n, "states, the rows of A")?;
-    let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
+    let states = read_signals(file, "states", "x", n, "states, the rows of A")?;
+    let actuators =
+        read_signals(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =
-        counted(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
+        read_signals(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
     let f_a = f_a.transpose()?;
     let sampled = SampledMatrices::read(file, sampling, (&a, &b))?;
     let (a, b, f_a) = match &sampled {
         None => (a, b, f_a),
-        Some(sampled) => (sampled.a.clone(), sampled.b.clone(), f_a.map(|f_a| sampled.held(&f_a))),
+        Some(sampled) => {
+            (sampled.a.clone(), sampled.b.clone(), f_a.map(|f_a| sampled.input_columns(&f_a)))
+        }
     };
     let model = Model::Matrices { a, b, c, d, f_a, states, sampled };
     Ok((model, [actuators, measurements]))
 }
 
-/// Reads the signals under `key`; unnamed signals are called `letter` and a number.
-fn counted(
+/// Reads the `count` signals under `key`; without that entry their names are `letter` and a number from 1.
+fn read_signals(
     file: &Table<'_>,
     key: &str,
     letter: &str,

@@ -23,10 +23,10 @@ const DETECTION: [&str; 7] = [
     "detection_sample_time",
 ];
 
-/// Checks the names of actuators and measurements, which are variables of the controller FMU, and
-/// that no two faults have the same name.
+/// Checks the names of the variables of the controller FMU (actuators, measurements, references, the input of a
+/// schedule), the order of elements of arrays among them, and that faults and rates of ramps have different names.
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
-    let variables = OwnVariables::of(file);
+    let variables = ControllerVariables::of(file);
     let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
     let signals = file.actuators.iter().chain(&file.measurements).chain(references);
     for signal in signals.chain(schedule_input(file)) {
@@ -78,7 +78,7 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     check_fault_names(file)
 }
 
-/// The input of the controller FMU that selects its gains, if it is no measurement.
+/// The scheduling variable, if it is an input of its own.
 fn schedule_input<'a>(file: &'a PlantFile<'_>) -> Option<&'a Signal> {
     match &file.schedule.as_ref()?.variable {
         Variable::Input(signal) => Some(signal),
@@ -105,14 +105,15 @@ fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result
     Err(at_name(file, signal, message))
 }
 
+/// Checks that faults and rates of ramps have different names.
 fn check_fault_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     for (at, fault) in file.faults.iter().enumerate() {
-        let rate = |other: &Fault| {
+        let is_rate_of = |other: &Fault| {
             other.dynamics == FaultDynamics::Ramp && fault.name == format!("{}_rate", other.name)
         };
         let message = if file.faults[..at].iter().any(|other| other.name == fault.name) {
             format!("two faults have the name `{}`; expected different names", fault.name)
-        } else if let Some(other) = file.faults.iter().find(|other| rate(other)) {
+        } else if let Some(other) = file.faults.iter().find(|other| is_rate_of(other)) {
             format!(
                 "fault `{}` has the name of the rate of the ramp `{}`; expected another name",
                 fault.name, other.name
@@ -125,6 +126,7 @@ fn check_fault_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     Ok(())
 }
 
+/// An error at the name of `signal`, or at the lists of signals if the name has no place of its own.
 fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError {
     match &signal.places[0] {
         Some(place) => file.error_at(place, message),
@@ -134,16 +136,16 @@ fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError
 
 /// The number of elements of a scalar.
 const SCALAR: Option<usize> = Some(1);
-/// Stands for the number of elements of a matrix: any number above 1 makes it an array.
+/// The number of elements of a matrix, represented by 2: any number above 1 makes it an array.
 const MATRIX: Option<usize> = Some(2);
 
-/// The variables that the controller FMU has besides actuators and measurements, with the number of their elements, if
-/// it is known before linearisation: with one element a scalar, otherwise an array.
-struct OwnVariables(Vec<(&'static str, Option<usize>)>);
+/// The variables that the controller FMU has besides the signals of the plant file, each with the number of its
+/// elements: with one element a scalar, otherwise an array. `None` if the number is known only after linearisation.
+struct ControllerVariables(Vec<(&'static str, Option<usize>)>);
 
-impl OwnVariables {
+impl ControllerVariables {
     fn of(file: &PlantFile<'_>) -> Self {
-        let (states, fed) = match &file.model {
+        let (states, has_feedthrough) = match &file.model {
             Model::Matrices { a, d, .. } => (Some(a.nrows()), d.amax() > 0.0),
             Model::Fmu(_) => (None, file.filter.is_some()),
         };
@@ -152,16 +154,17 @@ impl OwnVariables {
         let ramps =
             file.faults.iter().filter(|fault| fault.dynamics == FaultDynamics::Ramp).count();
         let q = Some(file.faults.len() + ramps);
-        let lossy = |fault: &Fault| matches!(fault.entry_point, EntryPoint::Loss { .. });
-        let operating = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
-        let stated = states.is_none() || file.signals().any(operating);
-        let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
-        let (reconfigured, fallback) = (file.reconfiguration.is_some(), file.fallback.is_some());
-        let (detection, filtered) = (file.detection.is_some(), file.filter.is_some());
+        let is_loss = |fault: &Fault| matches!(fault.entry_point, EntryPoint::Loss { .. });
+        let is_shifted = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
+        let has_point = states.is_none() || file.signals().any(is_shifted);
+        let is_limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
+        let has_cases = file.reconfiguration.is_some();
+        let has_fallback = file.fallback.is_some();
+        let has_detection = file.detection.is_some();
         let law = &file.estimation.law;
-        let direct = matches!(law, Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. });
-        let sliding = matches!(law, Law::SlidingMode { .. });
-        let own_model = sliding || matches!(law, Law::Learning { .. });
+        let is_direct = matches!(law, Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. });
+        let is_sliding = matches!(law, Law::SlidingMode { .. });
+        let has_model = ramps > 0 || is_sliding || matches!(law, Law::Learning { .. });
         let mut all = Vec::new();
         let mut add = |is_present: bool, names: &[&'static str], count: Option<usize>| {
             all.extend(names.iter().filter(|_| is_present).map(|name| (*name, count)));
@@ -172,30 +175,31 @@ impl OwnVariables {
         add(true, &MATRICES, MATRIX);
         add(file.sampling.is_some(), &["T_s", "sample_clock"], SCALAR);
         add(file.schedule.is_some(), &["schedule_at"], SCALAR);
-        add(ramps > 0 || own_model, &["A_f"], MATRIX);
-        add(fed, &["D"], MATRIX);
+        add(has_model, &["A_f"], MATRIX);
+        add(has_feedthrough, &["D"], MATRIX);
         add(t.is_some(), &["H", "K_i", "F_i", "L_w", "N_r"], MATRIX);
         add(t.is_some(), &["x_i", "x_i_0", "r_op"], t);
-        add(detection, &DETECTION, SCALAR);
-        add(detection, &["residual", "statistic", "threshold"], None);
-        add(file.faults.iter().any(lossy), &["E_hat"], q);
+        add(has_detection, &DETECTION, SCALAR);
+        add(has_detection, &["residual", "statistic", "threshold"], None);
+        add(file.faults.iter().any(is_loss), &["E_hat"], q);
         add(file.transfer_time.is_some(), &["u_t"], m);
-        add(filtered, &["y_f", "filter"], p);
-        add(stated, &["x_op"], states);
-        add(stated, &["u_op"], m);
-        add(stated, &["y_op"], p);
-        add(direct, &["f_hat_i"], q);
-        add(direct, &["P_f"], MATRIX);
-        add(sliding, &["rho", "delta"], q);
-        add(limited, &["u_min", "u_max"], m);
-        add(reconfigured, &["actuator_gone", "u_stuck"], m);
+        add(file.filter.is_some(), &["y_f", "filter"], p);
+        add(has_point, &["x_op"], states);
+        add(has_point, &["u_op"], m);
+        add(has_point, &["y_op"], p);
+        add(is_direct, &["f_hat_i"], q);
+        add(is_direct, &["P_f"], MATRIX);
+        add(is_sliding, &["rho", "delta"], q);
+        add(is_limited, &["u_min", "u_max"], m);
+        add(has_cases, &["actuator_gone", "u_stuck"], m);
         add(file.checks_measurements(), &["measurement_held", "measurement_lost"], SCALAR);
-        add(reconfigured || fallback, &["reconfiguration"], SCALAR);
-        add(fallback, &["fall_back"], SCALAR);
+        add(has_cases || has_fallback, &["reconfiguration"], SCALAR);
+        add(has_fallback, &["fall_back"], SCALAR);
         Self(all)
     }
 
-    /// Whether `name` is one of these variables, their derivatives, or an element of their arrays.
+    /// Whether `name` is one of these variables, an element of one of these arrays, or, in continuous time, a
+    /// derivative.
     fn include(&self, name: &str) -> bool {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {

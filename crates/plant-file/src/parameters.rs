@@ -21,11 +21,11 @@ pub struct ParameterTolerance {
 pub enum Tolerance {
     /// Fraction of the value.
     Relative(f64),
-    /// Lowest and highest value.
+    /// Lowest and highest value; that they are around the value is checked when the FMU is linearised.
     Limits([f64; 2]),
 }
 
-/// Reads a table of parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
+/// Reads a table of one or more parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
 pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
     let one = |(name, entry): (&str, Entry<'_>)| {
         let tolerance = if entry.is_list() {

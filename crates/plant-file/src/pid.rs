@@ -7,7 +7,8 @@ use crate::signals::{Signal, position, position_of};
 use files::{Place, PlaceError, Table};
 use nalgebra::RowDVector;
 
-/// Entries of the file that need a state feedback, or have a filter beside that of the controllers.
+/// Entries of the file that are not possible with such controllers: a measurement filter, and entries that need a state
+/// feedback.
 const OTHERS: [&str; 3] = ["filter", "reconfiguration", "fallback"];
 
 /// The largest order of a controller's filter.
@@ -20,14 +21,15 @@ pub const MOST_ORDER: u32 = 6;
 /// ```
 ///
 /// for each command, with the measurement y, its reference r, and the measurement `y_f` behind a Butterworth filter of
-/// order n: 1 / (1 + s / w) of a PI controller, n = 1, and 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, n = 2.
+/// order n. The filter is 1 / (1 + s / w) in a PI controller, n = 1, and 1 / (1 + sqrt(2) s / w + s^2 / w^2) in a PID
+/// controller, n = 2. A PI controller has no derivative.
 ///
 /// Source: K. J. Astrom and T. Hagglund, Advanced PID control (2006), sections 3.3 and 3.4.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pid {
-    /// n, the number of states of each filter; derivatives up to that of order n - 1 are used.
+    /// n, the number of states of each filter; derivatives up to order n - 1 are used.
     pub order: usize,
-    /// The controllers.
+    /// The controllers, in the order of their commands; a command has at most one.
     pub pairs: Vec<Pair>,
     /// w, in rad/s.
     pub corner: f64,
@@ -35,17 +37,19 @@ pub struct Pid {
     pub place: Place,
 }
 
-/// The positions, from 0, of a command and of the measurement that it follows.
+/// A controller from a measurement to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
-    /// Of the command.
+    /// The position of the command, from 0.
     pub actuator: usize,
-    /// Of the measurement.
+    /// The position of the measurement, from 0.
     pub measurement: usize,
 }
 
 impl Pid {
-    /// Reads `structure` and `pairs` of `[loop]`; `None` if neither is stated. `corner`: w of the filters, in rad/s.
+    /// Reads `structure` and `pairs` of `[loop]`; `None` if neither is stated. Without `pairs`, which needs as many
+    /// actuators as measurements, each actuator has the measurement at its position. `corner`: w of the filters, in
+    /// rad/s.
     pub(crate) fn read(
         file: &Table<'_>,
         table: &Table<'_>,
@@ -104,7 +108,8 @@ impl Pid {
         Ok(Some(Self { order, pairs, corner, place: entry.place }))
     }
 
-    /// Checks that the references are those of the measurements that commands follow, and integrated.
+    /// Checks that the references are integrated, and that each is that of one measurement with a controller, and each
+    /// such measurement has one.
     pub(crate) fn check_references(
         &self,
         file: &Table<'_>,
@@ -120,15 +125,15 @@ impl Pid {
                 format!("the integrals of the controllers are those of references: {expected}");
             return Err(file.source.error(&self.place, message));
         };
-        let followed = |row: RowDVector<f64>| {
-            let mut used = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
-            used.next().map(|(at, _)| at).filter(|_| used.next().is_none())
+        let only_measurement = |row: RowDVector<f64>| {
+            let mut terms = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+            terms.next().map(|(at, _)| at).filter(|_| terms.next().is_none())
         };
         let mut all = Vec::new();
         for ((signal, row), place) in
             references.signals.iter().zip(references.h.row_iter()).zip(&references.places)
         {
-            let at = followed(row.into_owned());
+            let at = only_measurement(row.into_owned());
             let Some(at) = at.filter(|at| self.measurements().contains(at)) else {
                 let message =
                     format!("no controller has the reference `{}`: {expected}", signal.name);
@@ -146,7 +151,7 @@ impl Pid {
         }
     }
 
-    /// The filtered measurements: their positions, each once, in order.
+    /// The positions of the measurements with a controller, each once, in ascending order.
     #[must_use]
     pub fn measurements(&self) -> Vec<usize> {
         let mut all: Vec<_> = self.pairs.iter().map(|pair| pair.measurement).collect();

@@ -1,10 +1,10 @@
-//! What several tables of a plant file have in common: numbers in a range, one of two texts, one number for all.
+//! Reads entries that several tables of a plant file have: numbers in a range, one of two texts, one number for all.
 
 use std::ops::{RangeBounds, RangeInclusive};
 
 use files::{Entry, PlaceError, Table};
 
-/// Reads a number above 0, if the table has the entry.
+/// Reads a number above 0; `None` if the table does not have the entry.
 pub(crate) fn positive(table: &Table<'_>, key: &str) -> Result<Option<f64>, PlaceError> {
     table.get(key).map(|entry| entry.positive()).transpose()
 }
@@ -36,7 +36,7 @@ pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     within(entry, 0.0.., "expected no less than 0")
 }
 
-/// Reads a whole number.
+/// Reads a whole number in `range`.
 pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32, PlaceError> {
     let (least, most) = range.into_inner();
     let number = entry.number()?;
@@ -47,7 +47,7 @@ pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32
     Err(entry.error(format!("expected a whole number from {least} to {most}, found {number}")))
 }
 
-/// Reads one of two texts: whether it is the first.
+/// Reads one of two texts; returns whether it is the first one.
 pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<bool, PlaceError> {
     match entry.text()? {
         text if text == first || text == second => Ok(text == first),
@@ -55,7 +55,7 @@ pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<
     }
 }
 
-/// Reads one value for all of `count` signals, or a list of one for each: `what`, in words.
+/// Reads one value for all of `count` signals, or a list of one for each; `what` names the list in errors.
 pub(crate) fn each<'a, T: Clone>(
     entry: &Entry<'a>,
     count: usize,
@@ -72,7 +72,7 @@ pub(crate) fn each<'a, T: Clone>(
     members.iter().map(read).collect()
 }
 
-/// Refuses the first of `keys` that the table has.
+/// Refuses the first of `keys` that the table has, with `message`.
 pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<(), PlaceError> {
     match keys.iter().find_map(|key| table.get(key)) {
         Some(entry) => Err(entry.error(message)),
@@ -80,7 +80,7 @@ pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<
     }
 }
 
-/// Refuses `entry` together with one of `others` in the file.
+/// Refuses `entry` if the file has one of `others`.
 pub(crate) fn alone(
     entry: &Entry<'_>,
     file: &Table<'_>,

@@ -1,22 +1,23 @@
-//! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
+//! The table `[reconfiguration]` of a plant file: the requirements on the controller without actuators.
 
 use crate::faults::{EntryPoint, Fault};
 use crate::read::{alone, positive_within};
 use crate::signals::{Signal, positions};
 use files::{Place, PlaceError, Table};
 
-/// What the controller must be able to do without an actuator.
+/// The requirements on the controller without actuators.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReconfigurationRequest {
     /// The actuators that may be gone, from 0.
     pub actuators: Vec<usize>,
     /// How many of them may be gone together.
     pub together: usize,
-    /// The command at which each of them is then stuck, in its unit.
+    /// For each of these actuators the command at which it is stuck, in its unit.
     stuck_at: Vec<f64>,
-    /// The measurements to keep at the operating point, from 0.
+    /// The measurements to keep at the operating point, from 0; all of them if the file states none.
     pub keep: Vec<usize>,
-    /// An actuator counts as gone if its estimated loss is above the first number for the second, in s.
+    /// An actuator counts as gone after its estimated loss has been above the first number for the second, in s;
+    /// `None` if only an input of the FMU reports it.
     pub decision: Option<(f64, f64)>,
     /// Where the file states it.
     pub place: Place,
@@ -66,7 +67,8 @@ impl ReconfigurationRequest {
         position.map_or(0.0, |at| self.stuck_at[at])
     }
 
-    /// The sets of actuators that may be gone, each in ascending order: first each one alone.
+    /// The sets of actuators that may be gone together: first each actuator alone, then larger sets. The actuators of
+    /// a set are in ascending order.
     #[must_use]
     pub fn cases(&self) -> Vec<Vec<usize>> {
         let alone = self.actuators.iter().map(|actuator| vec![*actuator]);
@@ -78,19 +80,20 @@ impl ReconfigurationRequest {
     pub fn sets(&self, size: usize) -> Vec<Vec<usize>> {
         let mut ordered = self.actuators.clone();
         ordered.sort_unstable();
-        let extended = |sets: Vec<Vec<usize>>, _| {
-            let after = |set: &Vec<usize>| {
+        let extend = |sets: Vec<Vec<usize>>, _| {
+            let with_one_more = |set: &Vec<usize>| {
                 let later = ordered.iter().filter(|at| set.last().is_none_or(|last| *at > last));
                 let longer = later.map(|at| set.iter().copied().chain([*at]).collect::<Vec<_>>());
                 longer.collect::<Vec<_>>()
             };
-            sets.iter().flat_map(after).collect()
+            sets.iter().flat_map(with_one_more).collect()
         };
-        (0..size).fold(vec![Vec::new()], extended)
+        (0..size).fold(vec![Vec::new()], extend)
     }
 }
 
-/// Reads `together`; 1 if missing. `used`: the number of actuators that may be gone, of `all`.
+/// Reads `together`, how many actuators may be gone together; 1 if it is missing. `used`: the number of actuators that
+/// may be gone, of `all`. An error if these are more than [`MOST_SETS`] sets.
 fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceError> {
     let Some(entry) = table.get("together") else {
         return Ok(1);
@@ -119,7 +122,7 @@ fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceEr
     Ok(most_together)
 }
 
-/// Reads `stuck_at`, a table from actuators to commands; 0 if missing.
+/// Reads `stuck_at`, a table from actuators to commands; 0 for actuators that it does not name.
 fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<f64>, PlaceError> {
     let mut commands = vec![0.0; used.len()];
     let Some(entry) = table.get("stuck_at") else {
@@ -138,7 +141,7 @@ fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<
     Ok(commands)
 }
 
-/// Reads `loss` and `time`, which belong together and to actuators whose loss is estimated.
+/// Reads `loss` and `time`, which belong together and require a fault with `loss_of`; `None` without both.
 fn decision(
     table: &Table<'_>,
     used: &[usize],

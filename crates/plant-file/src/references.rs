@@ -10,19 +10,19 @@ use crate::signals::{Signal, description, name, position, position_of, unit};
 pub struct References {
     /// Signals of the controller FMU. Their operating points follow from those of the measurements.
     pub signals: Vec<Signal>,
-    /// H, t x p: what each reference is the set point of.
+    /// H, t x p: each reference is the set point of its row times the measurements.
     pub h: DMatrix<f64>,
-    /// The size of the step that the report shows, in the unit of the reference.
+    /// For each reference the size of the step that the report shows, in its unit, if stated.
     pub steps: Vec<Option<f64>>,
     /// Where each reference is stated.
     pub places: Vec<Place>,
-    /// Whether the distance from the references is integrated; otherwise they act by a feedforward.
+    /// Whether the distance from the references is integrated; otherwise they act by the feedforward only.
     pub integral: bool,
     /// Whether the references act on the commands by a constant gain.
     pub feedforward: bool,
-    /// Where `integral` and `feedforward` are stated; the table, where they are not.
+    /// Where `integral` and `feedforward` are stated; the place of the table if they are not.
     pub action_places: [Place; 2],
-    /// Time constant, in s, with which the integrals follow a command at its limit.
+    /// Time constant, in s, with which the integrals follow a command at its limit, if stated.
     pub windup_time: Option<f64>,
 }
 
@@ -45,11 +45,11 @@ impl References {
         if members.is_empty() {
             return Err(track.error("expected at least one measurement"));
         }
-        let by_integral = table.get("integral");
-        let integral = by_integral.as_ref().map_or(Ok(true), Entry::flag)?;
-        let stated = table.get("feedforward");
-        let feedforward = stated.as_ref().map_or(Ok(!integral), Entry::flag)?;
-        if let Some(entry) = stated.as_ref().filter(|_| !integral && !feedforward) {
+        let integral_entry = table.get("integral");
+        let integral = integral_entry.as_ref().map_or(Ok(true), Entry::flag)?;
+        let feedforward_entry = table.get("feedforward");
+        let feedforward = feedforward_entry.as_ref().map_or(Ok(!integral), Entry::flag)?;
+        if let Some(entry) = feedforward_entry.as_ref().filter(|_| !integral && !feedforward) {
             let message = "`integral` and `feedforward` are false, so that no reference acts on a command; \
                            expected one of them";
             return Err(entry.error(message));
@@ -65,7 +65,7 @@ impl References {
             places: Vec::new(),
             integral,
             feedforward,
-            action_places: [by_integral, stated]
+            action_places: [integral_entry, feedforward_entry]
                 .map(|stated| stated.map_or_else(|| entry.place.clone(), |entry| entry.place)),
             windup_time: windup_time.map(|entry| entry.positive()).transpose()?,
         };
@@ -82,7 +82,9 @@ impl References {
         Ok(Some(references))
     }
 
-    /// Returns the references with operating points and units from those of the measurements.
+    /// Returns the references with operating points and units. The operating points follow from those of the
+    /// measurements, `None` if none has one. A unit that is not stated is that of the measurements, if they have the
+    /// same one.
     #[must_use]
     pub fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
         let complete = |(at, signal): (usize, &Signal)| {
@@ -103,8 +105,8 @@ impl References {
     }
 }
 
-/// Reads a reference: the name of a measurement, or a table. Returns the signal, its row of H and the
-/// size of its step.
+/// Reads a reference: the name of a measurement, or a table. Returns the signal, its row of H and the size of its
+/// step, if stated.
 fn reference(
     entry: &Entry<'_>,
     measurements: &[Signal],
@@ -117,7 +119,7 @@ fn reference(
     }
     let table = entry.table()?;
     table.allow(&REFERENCE)?;
-    let own_name = table.get("name");
+    let name_entry = table.get("name");
     let mut signal = match (table.get("measurement"), table.get("combination")) {
         (Some(_), Some(second)) => {
             return Err(second.error("expected `measurement` or `combination`, found both"));
@@ -145,7 +147,7 @@ fn reference(
             Signal::named(String::new())
         }
     };
-    if let Some(entry) = own_name {
+    if let Some(entry) = name_entry {
         signal.name = name(&entry)?;
         signal.places[0] = Some(entry.place);
     }

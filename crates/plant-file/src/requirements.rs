@@ -29,11 +29,11 @@ pub enum Requirement {
     },
     /// A linear-quadratic regulator, or a Kalman filter, of a bandwidth.
     Bandwidth(Bandwidth),
-    /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
+    /// The least H-infinity norm, or a norm below a bound, with all eigenvalues in a region.
     HInfinity {
-        /// The largest norm; the least one without it.
+        /// The largest norm; `None` for the least one.
         bound: Option<f64>,
-        /// The region of the eigenvalues.
+        /// The region of the eigenvalues; that of all stable ones if none is stated.
         region: Region,
         /// The weights of inputs and outputs.
         channel: Channel,
@@ -43,18 +43,18 @@ pub enum Requirement {
 /// The bandwidth of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bandwidth {
-    /// In rad/s; None until it is chosen.
+    /// In rad/s; `None` until it is chosen.
     pub rate: Option<f64>,
     /// Whether the file states it.
     pub is_stated: bool,
 }
 
-/// A region of the left half plane: the intersection of the given parts.
+/// A region of the left half plane: the intersection of the stated parts; the whole half plane without any.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Region {
     /// Real parts are below the negative of this rate, 1/s.
     pub decay: Option<f64>,
-    /// Centre and radius, 1/s.
+    /// Centre on the real axis and radius of a disc, 1/s.
     pub disc: Option<(f64, f64)>,
     /// Largest angle from the negative real axis, in degrees.
     pub sector: Option<f64>,
@@ -67,19 +67,19 @@ pub struct Request {
     pub requirement: Requirement,
     /// Where the file states it.
     pub place: Place,
-    /// Name and place of the second weight.
+    /// Name and place of the second weight, R or V; none for other requirements.
     pub other: Option<(String, Place)>,
 }
 
 impl Request {
-    /// The request of a file without one, at its place.
+    /// A request for a bandwidth that is yet to be chosen, for a file that states none; `place`: that of the file.
     #[must_use]
     pub fn open(place: Place) -> Self {
         let requirement = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });
         Self { requirement, place, other: None }
     }
 
-    /// The bandwidth in rad/s, if it is the requirement and is chosen.
+    /// The bandwidth in rad/s; `None` if the requirement is another one or the bandwidth is yet to be chosen.
     #[must_use]
     pub fn bandwidth(&self) -> Option<f64> {
         match self.requirement {
@@ -88,7 +88,7 @@ impl Request {
         }
     }
 
-    /// Whether the bandwidth is to be chosen.
+    /// Whether the requirement is a bandwidth that is yet to be chosen.
     #[must_use]
     pub fn is_open(&self) -> bool {
         matches!(self.requirement, Requirement::Bandwidth(Bandwidth { rate: None, .. }))
@@ -96,7 +96,7 @@ impl Request {
 }
 
 impl Requirement {
-    /// The eigenvalues that are stated.
+    /// The eigenvalues that are stated; empty for other requirements.
     #[must_use]
     pub fn eigenvalues(&self) -> &[Complex<f64>] {
         match self {
@@ -105,7 +105,8 @@ impl Requirement {
         }
     }
 
-    /// The index of the first state without noise.
+    /// The index of the first state with a zero row in the first weight: for a Kalman filter, without noise. `None` if
+    /// there is no such state, and for requirements without weights.
     #[must_use]
     pub fn without_noise(&self) -> Option<usize> {
         match self {
@@ -119,7 +120,8 @@ impl Requirement {
 
 const KEYS: [&str; 5] = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
-/// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
+/// Reads `[feedback]` (`weights` Q, R) or `[observer]` (`weights` W, V): exactly one requirement; a region is one by
+/// itself, or restricts `h_infinity`.
 pub(crate) fn request(
     table: &Table<'_>,
     weights: [&str; 2],
@@ -136,7 +138,7 @@ pub(crate) fn request(
     }
     let region = table.get("region");
     if let Some(entry) = region.as_ref().filter(|_| sampled) {
-        refuse_unsampled(entry)?;
+        refuse_disc_and_sector(entry)?;
     }
     let Some((method, one)) = only_one(table, weights[0])? else {
         let Some(entry) = region else {
@@ -177,13 +179,13 @@ pub(crate) fn request(
     Ok(Request { requirement, place: one.place, other: second })
 }
 
-/// Rejects a disc or a sector for a sampled design: the map z = e^(s T) does not preserve their
-/// shape.
-fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
+/// Refuses a disc or a sector in a sampled design: the map z = e^(s T) does not preserve their shape.
+fn refuse_disc_and_sector(region: &Entry<'_>) -> Result<(), PlaceError> {
     refuse(&region.table()?, &["disc", "sector"], "a sampled design has a region by `decay` only")
 }
 
-/// Returns the only method of the table besides a region, with its key; several methods are an error.
+/// Returns the only method of the table besides a region, with its key; `None` without one. Several methods are an
+/// error.
 fn only_one<'a, 'k>(
     table: &Table<'a>,
     weight: &'k str,
@@ -199,7 +201,7 @@ fn only_one<'a, 'k>(
     }
 }
 
-/// Reads a bandwidth, which a sampled loop has below its Nyquist frequency.
+/// Reads a bandwidth, in a sampled design below pi / T.
 fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth, PlaceError> {
     let rate = entry.positive()?;
     match domain {
@@ -227,7 +229,7 @@ fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceEr
     }
 }
 
-/// Reads numbers, and `{ re = -3.0, im = 4.0 }` for a complex conjugate pair.
+/// Reads a list of numbers, and `{ re = -3.0, im = 4.0 }` for complex conjugate pairs.
 fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
     let mut all = Vec::new();
     for member in entry.list()? {
@@ -244,14 +246,15 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
     Ok(all)
 }
 
-/// Reads a region that is stated alone; that of a sampled design has a decay rate only.
+/// Reads a region; in a sampled design it has a decay rate only.
 pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
     if sampled {
-        refuse_unsampled(entry)?;
+        refuse_disc_and_sector(entry)?;
     }
     region(entry)
 }
 
+/// Reads a region with at least one of decay, disc and sector.
 fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
     let table = entry.table()?;
     table.allow(&["decay", "disc", "sector"])?;
@@ -264,11 +267,12 @@ fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
     Ok(Region { decay, disc, sector })
 }
 
-/// Reads an angle between 0 and 90 degrees.
+/// Reads an angle above 0 and below 90 degrees.
 fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     positive_within(entry, ..90.0, "expected less than 90 degrees")
 }
 
+/// Reads the centre and the radius of a disc that reaches the left half plane.
 fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     let table = entry.table()?;
     table.allow(&["center", "radius"])?;
@@ -284,7 +288,7 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
-/// Reads a bound of the norm, or the text "least" (`None`). If that is not possible, `remedy` says what it needs.
+/// Reads a bound of the norm, or the text "least" (`None`). `remedy`: what "least" needs, if it is not possible.
 fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
@@ -298,11 +302,12 @@ fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>, PlaceEr
     }
 }
 
-/// The part of the largest entry by which rounding may make a weight unsymmetric: that of a product of three matrices.
+/// The relative difference, to the largest entry, by which rounding may make a weight unsymmetric, in a product of
+/// three matrices.
 const UNSYMMETRIC: f64 = 1e-12;
 
-/// Reads a symmetric matrix, or a list of numbers as a diagonal matrix. Rounding is taken off a matrix that is
-/// symmetric but for it.
+/// Reads a symmetric matrix, or a list of numbers of at least 0 as a diagonal matrix. A matrix that rounding made
+/// unsymmetric becomes the mean of itself and its transpose.
 fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
     let members = entry.list()?;
     if members.iter().any(Entry::is_list) {
@@ -334,7 +339,8 @@ fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
 }
 
 impl Region {
-    /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
+    /// Whether an eigenvalue of the loop is in the region. For a sampled loop it is one in the z-plane, and only the
+    /// decay counts.
     #[must_use]
     pub fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
         let decay = self.decay.unwrap_or(0.0);

@@ -7,7 +7,7 @@ use crate::Model;
 use crate::parameters::{self, ParameterTolerance, fraction};
 use crate::read::{each, not_negative, whole, within};
 
-/// What the robustness of a design is tested with, and the limits of its verdict.
+/// The tolerances and the noise for which the robustness of a design is computed, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobustnessLimits {
     /// Relative tolerances of the entries of A, B, C and D.
@@ -20,10 +20,10 @@ pub struct RobustnessLimits {
     pub cases: u32,
     /// Seed of the random cases.
     pub seed: u32,
-    /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
-    /// sampled design.
+    /// Noise of each measurement: the root of its spectral density, or its standard deviation in a sampled design; 1
+    /// if it is not stated.
     pub noise: Vec<f64>,
-    /// Whether the file states it.
+    /// Whether the file states the noise.
     pub noise_is_stated: bool,
     /// Peak of S above which a design is amber.
     pub amber: f64,
@@ -56,7 +56,7 @@ impl RobustnessLimits {
         model: &Model,
         measurements: usize,
     ) -> Result<Self, PlaceError> {
-        // A sampled A has entries that mean nothing each, so that a part of each is no tolerance that anybody has.
+        // A single entry of a sampled A has no physical meaning, and hence no relative tolerance.
         let of_a = if model.only_samples().is_some() { 0.0 } else { TOLERANCE };
         let mut limits = Self {
             tolerance: [of_a, TOLERANCE, TOLERANCE, TOLERANCE],
@@ -159,7 +159,7 @@ fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>, Plac
     Ok(all)
 }
 
-/// Reads `A[2][1]`; rows and columns count from 1.
+/// Reads `A[2][1]`, row and column counted from 1; `None` if `text` is no such entry.
 fn plant_entry(text: &str) -> Option<PlantEntry> {
     let (name, rest) = text.split_once('[')?;
     let matrix = MATRICES.iter().position(|symbol| *symbol == name)?;
@@ -168,7 +168,7 @@ fn plant_entry(text: &str) -> Option<PlantEntry> {
     Some(PlantEntry { matrix, row: index(row)?, column: index(column)? })
 }
 
-/// Reads one number for A, B, C and D, or a table with a number for some of them.
+/// Reads one number for A, B, C and D, or a table with a number for some of them; 0 for the others.
 fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
     if !entry.is_table() {
         return Ok([fraction(entry)?; 4]);

@@ -9,10 +9,12 @@ use nalgebra::DMatrix;
 use crate::Sampling;
 use crate::read::{is_first, refuse};
 
-/// Part of the largest entries of row and column below which an entry of the logarithm is rounding.
+/// An entry of the logarithm is rounding below this fraction of the geometric mean of the largest entries in its row
+/// and column.
 const ROUNDING: f64 = 1e-13;
 
-/// Modulus below which an eigenvalue of a sampled A counts as zero: those of a chain of three registers are rounded to 1e-5.
+/// Modulus below which an eigenvalue of a sampled A counts as zero: rounding makes those of a chain of three registers
+/// 1e-5.
 const ZERO: f64 = 1e-4;
 
 /// The plant of sampled matrices: the continuous plant x' = A x + B u with these samples if there is one, otherwise the
@@ -25,14 +27,19 @@ pub struct SampledMatrices {
     pub b: DMatrix<f64>,
     /// The time domain of A and B.
     pub domain: Domain,
-    /// Why no continuous plant has the samples, in a sentence.
+    /// Why no continuous plant has these samples, in a sentence; `None` if there is one.
     pub only_samples: Option<String>,
     /// The integral of e^(A s) over a sample, n x n; the identity if `a` is in sampled time.
-    held: DMatrix<f64>,
+    hold_integral: DMatrix<f64>,
 }
 
 impl SampledMatrices {
-    /// Reads `matrices`; `pair`: A and B of the file. None if the matrices are continuous.
+    /// Reads `matrices`; `pair`: A and B of the file. `None` if the matrices are continuous.
+    ///
+    /// # Errors
+    ///
+    /// There is no `sample_time`, the file has a family or a schedule, or the logarithm of the matrices cannot be
+    /// computed.
     pub fn read(
         file: &Table<'_>,
         sampling: Option<Sampling>,
@@ -59,25 +66,27 @@ impl SampledMatrices {
                     b: pair.1.clone(),
                     domain: Domain::Sampled { period },
                     only_samples: Some(only_samples(pair.0, period)),
-                    held: identity,
+                    hold_integral: identity,
                 })));
             }
             result => result.map_err(refuse)?,
         };
         let a = without_rounding(&a);
-        let (_, held) = zero_order_hold(&a, &identity, period).map_err(refuse)?;
-        Ok(Some(Box::new(Self { a, b, domain: Domain::Continuous, only_samples: None, held })))
+        let (_, hold_integral) = zero_order_hold(&a, &identity, period).map_err(refuse)?;
+        let domain = Domain::Continuous;
+        Ok(Some(Box::new(Self { a, b, domain, only_samples: None, hold_integral })))
     }
 
-    /// The columns in the time of `a` and `b` that are `columns` in the samples.
-    pub fn held(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        // It has no zero eigenvalue where the logarithm exists.
-        let solved = self.held.clone().lu().solve(columns);
+    /// Converts columns of inputs in sampled time into those of the plant x' = a x + b u; they stay the same if `a` is
+    /// in sampled time.
+    pub fn input_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        // The integral has no zero eigenvalue if the logarithm exists.
+        let solved = self.hold_integral.clone().lu().solve(columns);
         solved.unwrap_or_else(|| columns.map(|_| f64::NAN))
     }
 }
 
-/// What follows where no continuous plant has the samples; zero eigenvalues are mostly those of a delay.
+/// Says why no continuous plant has the samples, and how to state a delay, from which zero eigenvalues mostly come.
 fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
     let eigenvalues = eigenvalues(a).unwrap_or_default();
     let zeros = eigenvalues.iter().filter(|value| value.norm() < ZERO).count();
@@ -105,7 +114,7 @@ fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
     )
 }
 
-/// A without the entries that are rounding of the logarithm: beside the largest ones of their row and column.
+/// A with 0 in place of entries that are rounding errors of the logarithm.
 fn without_rounding(a: &DMatrix<f64>) -> DMatrix<f64> {
     let size = |i: usize, j: usize| (a.row(i).amax() * a.column(j).amax()).sqrt();
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {

@@ -1,4 +1,4 @@
-//! The signals of a plant file: states, actuators, measurements and faults.
+//! The signals of a plant file: states, actuators and measurements.
 
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
@@ -6,7 +6,7 @@ use fmu_description::xml::is_character;
 use crate::read::{whole, within};
 use files::{Entry, Place, PlaceError, Table};
 
-/// A state, an actuator or a measurement.
+/// A state, an actuator, a measurement, a reference or a scheduling variable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signal {
     /// Its name.
@@ -17,17 +17,17 @@ pub struct Signal {
     pub description: String,
     /// The value at the operating point, if stated.
     pub operating: Option<f64>,
-    /// The limits of an actuator, the range of a measurement: smallest and largest value.
+    /// The smallest and the largest value: the limits of an actuator or the range of a measurement, if stated.
     pub limits: Option<[f64; 2]>,
-    /// The longest time in s for which the last value of a measurement may replace it.
+    /// The longest time in s for which the last value of a measurement may replace it, if stated.
     pub longest_hold: Option<f64>,
-    /// The time in s after which a command acts or a measurement arrives.
+    /// The time in s after which a command acts or a measurement arrives; 0 if not stated.
     pub delay: f64,
     /// The places of name, limits or range, and longest time of a hold, if the file states them.
     pub places: [Option<Place>; 3],
 }
 
-/// What a signal is, which decides what may be stated about it.
+/// The role of a signal, which decides which entries it may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A state.
@@ -39,13 +39,13 @@ pub enum Role {
 }
 
 impl Signal {
-    /// Creates a signal with a name only.
+    /// A signal with a name and nothing else.
     #[must_use]
     pub fn named(name: String) -> Self {
         Self { name, ..Self::default() }
     }
 
-    /// Fills missing fields from `other`.
+    /// The signal with unit and operating point of `other` if its own are missing.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -56,15 +56,16 @@ impl Signal {
     }
 }
 
-/// Number of states of the observer for each delay, unless stated.
+/// Number of states of the observer for each delay, if it is not stated.
 const DELAY_ORDER: usize = 3;
-/// The largest number of them.
+/// The largest number of states of the observer for each delay.
 const MOST_DELAY_ORDER: u32 = 8;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits", "delay"];
 const MEASUREMENT: [&str; 7] =
     ["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
-/// Reads the signals under `key`: texts (names) or tables.
+
+/// Reads a list of at least one signal, each a text (its name) or a table. Their names differ.
 pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
     let members = entry.list()?;
     if members.is_empty() {
@@ -92,28 +93,28 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
         Role::Actuator => &ACTUATOR,
         Role::Measurement => &MEASUREMENT,
     })?;
-    let limited = table.get(if role == Role::Measurement { "range" } else { "limits" });
+    let range = table.get(if role == Role::Measurement { "range" } else { "limits" });
     let longest_hold = table.get("longest_hold");
-    let named = table.require("name", "the name of the signal")?;
+    let name_entry = table.require("name", "the name of the signal")?;
     Ok(Signal {
-        name: name(&named)?,
+        name: name(&name_entry)?,
         unit: unit(&table)?,
         description: description(&table)?,
         operating: table.get("operating").map(|entry| entry.number()).transpose()?,
-        limits: limited.as_ref().map(limits).transpose()?,
+        limits: range.as_ref().map(limits).transpose()?,
         longest_hold: longest_hold.as_ref().map(Entry::positive).transpose()?,
         delay: table
             .get("delay")
             .map_or(Ok(0.0), |entry| within(&entry, 0.0.., "expected a time in s, 0 or more"))?,
         places: [
-            Some(named.place),
-            limited.map(|entry| entry.place),
+            Some(name_entry.place),
+            range.map(|entry| entry.place),
             longest_hold.map(|entry| entry.place),
         ],
     })
 }
 
-/// Reads a name of one line.
+/// Reads a name: a text of one line that is not empty.
 pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
@@ -126,7 +127,7 @@ pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     }
 }
 
-/// Reads the entry `description`, in which XML allows all characters.
+/// Reads the entry `description`, whose characters XML must allow; empty without it.
 pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     let Some(entry) = table.get("description") else {
         return Ok(String::new());
@@ -141,7 +142,7 @@ pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     }
 }
 
-/// Reads the entry `unit`, which has to be a unit of FMI.
+/// Reads the entry `unit`, which must be a unit of FMI; `None` without it.
 pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     let Some(entry) = table.get("unit") else {
         return Ok(None);
@@ -153,7 +154,8 @@ pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     }
 }
 
-/// Reads `delay_order`, the number of states by which the observer approximates each delay.
+/// Reads `delay_order`, the number of states with which the observer approximates each delay; an error if no signal has
+/// a delay.
 pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize, PlaceError> {
     let Some(entry) = file.get("delay_order") else { return Ok(DELAY_ORDER) };
     if signals.into_iter().flatten().all(|signal| signal.delay <= 0.0) {
@@ -162,6 +164,7 @@ pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<u
     Ok(whole(&entry, 1..=MOST_DELAY_ORDER)? as usize)
 }
 
+/// Reads a lower and an upper limit.
 fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
     match entry.numbers()?.as_slice() {
         &[low, high] if low < high => Ok([low, high]),
@@ -172,7 +175,7 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
     }
 }
 
-/// Returns the index of the signal that the entry names.
+/// Returns the position of the signal that the entry names; `what` says in errors what the signals are.
 pub(crate) fn position(
     entry: &Entry<'_>,
     signals: &[Signal],
@@ -181,7 +184,7 @@ pub(crate) fn position(
     position_of(entry.text()?, entry, signals, what)
 }
 
-/// Returns the index of the signal `name`; `entry` is for the error.
+/// Returns the position of the signal `name`; an error is at `entry`.
 pub(crate) fn position_of(
     name: &str,
     entry: &Entry<'_>,
@@ -194,7 +197,7 @@ pub(crate) fn position_of(
     })
 }
 
-/// Reads names of signals, or the text "all".
+/// Reads names of signals, each once, or the text "all"; returns the positions of at least one signal.
 pub(crate) fn positions(
     entry: &Entry<'_>,
     signals: &[Signal],
@@ -223,7 +226,7 @@ pub(crate) fn positions(
     Ok(all)
 }
 
-/// Whether all signals have the same unit, or none.
+/// Whether all signals have the same unit, or none has one.
 #[must_use]
 pub fn same_unit(signals: &[Signal]) -> bool {
     signals.iter().all(|signal| signal.unit == signals[0].unit)

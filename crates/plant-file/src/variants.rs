@@ -9,10 +9,11 @@ use crate::references::References;
 use crate::signals::{Signal, description, name, unit};
 use crate::{Model, PlantFile};
 
-/// Entries that replace those of the plant of the file.
+/// Matrices that replace those of the plant of the file.
 const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];
 /// The operating point of a plant that matrices describe.
 const OPERATING: [&str; 3] = ["x_op", "u_op", "y_op"];
+/// The operating point of an FMU.
 const POINT: &str = "operating_point";
 
 /// A plant besides the one of the file.
@@ -23,7 +24,7 @@ pub struct Variant {
     /// Where the file states it.
     pub place: Place,
     model: Model,
-    /// `u_op` and `y_op`.
+    /// `u_op` and `y_op`, if stated.
     operating: [Option<Vec<f64>>; 2],
 }
 
@@ -32,18 +33,18 @@ pub struct Variant {
 pub struct Schedule {
     /// What the gains depend on.
     pub variable: Variable,
-    /// Largest rate of the variable, per s.
+    /// Largest rate of the variable, per s, if stated.
     pub rate_bound: Option<f64>,
-    /// In ascending order; at least two.
+    /// The points of the grid, at least two, in ascending order.
     pub points: Vec<SchedulePoint>,
-    /// The position of the point with the plant of the file.
+    /// The position, from 0, of the point with the plant of the file.
     pub nominal: usize,
 }
 
 /// The variable that selects the gains.
 #[derive(Clone)]
 pub enum Variable {
-    /// A measurement, from 0.
+    /// The measurement at this position, from 0.
     Measurement(usize),
     /// An input of the controller.
     Input(Signal),
@@ -70,13 +71,15 @@ impl Schedule {
 }
 
 impl PlantFile<'_> {
-    /// Whether the gains are interpolated with those of other points.
+    /// Whether the file has a schedule, or is a point of the schedule of another file.
     #[must_use]
     pub fn is_scheduled(&self) -> bool {
         self.schedule.is_some() || self.is_point
     }
 
-    /// The file with another plant, without family and schedule.
+    /// The file with the plant of `variant`, without family and schedule. Operating values of actuators and
+    /// measurements that the variant does not state are those of the file; for an FMU they follow from its
+    /// linearisation.
     #[must_use]
     pub fn with(&self, variant: &Variant) -> Self {
         let mut file = self.clone();
@@ -98,7 +101,7 @@ impl PlantFile<'_> {
     }
 }
 
-/// Reads `[[family]]`.
+/// Reads `[[family]]`, plants with names that differ; empty without it.
 pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
     let message = "expected `family` (one gain) or `schedule` (gains by a variable)";
@@ -130,7 +133,7 @@ pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, Pl
     Ok(variants)
 }
 
-/// Reads `[schedule]`.
+/// Reads `[schedule]`; `None` without it.
 pub(crate) fn schedule(
     file: &Table<'_>,
     model: &Model,
@@ -139,9 +142,9 @@ pub(crate) fn schedule(
     let Some(entry) = file.get("schedule") else { return Ok(None) };
     let table = entry.table()?;
     table.allow(&["variable", "unit", "description", "rate_bound", "points"])?;
-    let named =
+    let name_entry =
         table.require("variable", "a measurement, or the name of an input of the controller")?;
-    let variable_name = name(&named)?;
+    let variable_name = name(&name_entry)?;
     let variable = match measurements.iter().position(|signal| signal.name == variable_name) {
         Some(at) => {
             let message = format!("the measurement `{variable_name}` states it");
@@ -151,19 +154,20 @@ pub(crate) fn schedule(
         None => Variable::Input(Signal {
             unit: unit(&table)?,
             description: description(&table)?,
-            places: [Some(named.place.clone()), None, None],
+            places: [Some(name_entry.place.clone()), None, None],
             ..Signal::named(variable_name)
         }),
     };
-    let listed = table.require("points", "the plants at two or more values of the variable")?;
-    let (points, nominal) = points(&listed, model)?;
+    let list = table.require("points", "the plants at two or more values of the variable")?;
+    let (points, nominal) = points(&list, model)?;
     Ok(Some(Schedule { variable, rate_bound: positive(&table, "rate_bound")?, points, nominal }))
 }
 
-fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {
+/// Reads the points of a schedule; returns the position of the one with the plant of the file, too.
+fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {
     let mut all: Vec<SchedulePoint> = Vec::new();
     let mut nominal = None;
-    for member in &listed.list()? {
+    for member in &list.list()? {
         let table = member.table()?;
         let keys = allowed(model, &["at"], true);
         table.allow(&keys)?;
@@ -183,14 +187,14 @@ fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usiz
         all.push(SchedulePoint { at: value, plant });
     }
     if all.len() < 2 {
-        return Err(listed.error(format!("expected at least two points, found {}", all.len())));
+        return Err(list.error(format!("expected at least two points, found {}", all.len())));
     }
     let missing = "expected exactly one point with only `at`: the plant of this file";
-    let nominal = nominal.ok_or_else(|| listed.error(missing))?;
+    let nominal = nominal.ok_or_else(|| list.error(missing))?;
     Ok((all, nominal))
 }
 
-/// `first`, then the entries that a variant of `model` may have.
+/// `first`, then the entries that a variant of `model` may have; with `operating` also those of an operating point.
 fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'static str> {
     let mut keys = first.to_vec();
     match model {
@@ -203,6 +207,7 @@ fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'stat
     keys
 }
 
+/// Reads a plant: the plant of the file with the entries of `table`.
 fn variant(
     table: &Table<'_>,
     name: String,
@@ -244,7 +249,7 @@ fn variant(
     Ok(Variant { name, place, model, operating })
 }
 
-/// Reads a list of `count` numbers.
+/// Reads a list of `count` numbers; `None` if the table does not have it.
 fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>>, PlaceError> {
     let Some(entry) = table.get(key) else { return Ok(None) };
     let values = entry.numbers()?;
@@ -254,7 +259,7 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
     Err(entry.error(format!("expected {count} numbers, found {}", values.len())))
 }
 
-/// Checks that the members of a family reach their references.
+/// Refuses references without integral action in a file with a family: its members would not reach them.
 pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let references = file
         .references
