@@ -50,8 +50,8 @@ pub struct ParameterCases {
 }
 
 impl ParameterCases {
-    /// The cases are uniform and independent: a part `uncovered` of the box is missed by all of them with
-    /// probability (1 - uncovered)^cases.
+    /// Computes `uncovered` for this number of cases, which are uniform and independent: all of them miss a part
+    /// `uncovered` of the box with probability (1 - uncovered)^cases = 0.01.
     #[must_use]
     pub fn new(cases: usize, seed: u32) -> Self {
         #[expect(clippy::cast_precision_loss, reason = "a number of cases")]
@@ -90,11 +90,12 @@ pub struct Test {
 pub struct DecoupledInput {
     /// Its name.
     pub name: String,
-    /// Whether no course of it acts on the residuals; otherwise a constant one does not, in steady state.
+    /// Whether the input does not act on the residuals at all; otherwise a constant one does not act on them in steady
+    /// state.
     pub exact: bool,
-    /// Size of the step of which `largest_mean` is the effect; none if the file states none.
+    /// Size of the step that causes `largest_mean`; none if the file states none, and the size is 1.
     pub size: Option<f64>,
-    /// The largest mean of the residuals after a step by `size`, or by 1, in standard deviations.
+    /// The largest mean of the residuals after this step, in standard deviations.
     pub largest_mean: f64,
 }
 

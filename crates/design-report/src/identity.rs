@@ -1,4 +1,4 @@
-//! The identity of a design: what a file says about the plant that it was made for.
+//! The identity of a design: the text with which a file names the plant that it was written for.
 
 use crate::Report;
 use crate::robustness::{Level, Verdict};
@@ -22,7 +22,7 @@ pub fn identity(report: &Report) -> String {
     format!("aso-ftc design for {} ({hash:016x})", printable(&report.plant_file))
 }
 
-/// Returns the comment at the start of a design file.
+/// Returns the comment at the start of a design file: identity, verdict, and the reasons of one that is not green.
 #[must_use]
 pub fn heading(identity: &str, verdict: &Verdict) -> String {
     let mut text = format!("# Written by {identity}.\n# Verdict: {}.\n", verdict.level.word());
@@ -34,7 +34,7 @@ pub fn heading(identity: &str, verdict: &Verdict) -> String {
     text
 }
 
-/// Replaces control characters, which a comment may not contain.
+/// Replaces control characters, which a comment may not contain, by spaces.
 fn printable(text: &str) -> String {
     text.replace(|sign: char| sign.is_control(), " ")
 }

@@ -72,8 +72,7 @@ pub struct Report {
     pub frequency: Vec<Frequency>,
     /// Stability under loss of effectiveness, one entry per such fault.
     pub effectiveness: Vec<Effectiveness>,
-    /// What is proven about losses of effectiveness up to stated fractions; none if `up_to` is not
-    /// stated.
+    /// The proofs about losses of effectiveness up to stated fractions; none if `up_to` is not stated.
     pub losses: Option<LossReport>,
     /// The controllers without each actuator that may be gone; none if `reconfiguration` is not stated.
     pub reconfiguration: Option<ReconfigurationReport>,
@@ -145,9 +144,9 @@ pub struct Matrix {
 /// u = N_r r - K y_f + K_i integral of (r - y) dt - K_d y_f' - K_2 y_f'' - ...
 /// ```
 ///
-/// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate: 1 / (1 + s / w) of a PI
-/// controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, a Butterworth filter of order n of a controller of
-/// order n.
+/// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate: 1 / (1 + s / w) of
+/// a PI controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller, a Butterworth filter of order n of a
+/// controller of order n.
 #[derive(Clone, Serialize, JsonSchema)]
 pub struct PidController {
     /// The name of the command.
@@ -175,7 +174,7 @@ pub struct Check {
     pub condition: String,
     /// Whether it holds.
     pub holds: bool,
-    /// The numerical value behind the condition: a rank, a distance.
+    /// The number that the condition is about, such as a rank or a distance; none if there is no such number.
     pub value: Option<f64>,
     /// Explanation of the number.
     pub explanation: String,
@@ -211,7 +210,7 @@ pub struct Loop {
 pub struct NormReport {
     /// From where to where, in words.
     pub channel: String,
-    /// The norm, with weights and noise; at most 1e-4 of it too large.
+    /// The norm, with weights and noise; at most 1e-4 of it above the true value.
     pub norm: f64,
     /// A bound of the norm that the bounded real lemma proves, verified by eigenvalues; none if that
     /// fails in double precision, or for more than 30 states.
@@ -295,8 +294,8 @@ pub struct EstimationErrors {
     pub unit: Option<String>,
     /// Lasting error of a constant fault of 1.
     pub constant: f64,
-    /// Time in s after a sudden fault of 1 from which the error stays within 2 % of its largest value
-    /// of the lasting one.
+    /// Time in s after a sudden fault of 1 from which the distance of the error from its lasting value is at most 2 %
+    /// of the largest such distance.
     pub step_settling: f64,
     /// Largest error after a sudden fault of 1.
     pub step_peak: f64,
@@ -458,15 +457,15 @@ pub struct ReferenceStep {
     pub rise_time: Option<f64>,
     /// Largest value beyond the reference, as a part of the step; 0 if there is none.
     pub overshoot: f64,
-    /// Settling time in s: what follows then stays within 2 % of the step.
+    /// Settling time in s: from then on the output that follows differs from the reference by at most 2 % of the step.
     pub settling_time: f64,
-    /// What is left of the step after a long time, as a part of it.
+    /// The difference of the reference from the output after a long time, as a part of the step.
     pub steady_state_error: f64,
     /// The commands, as deviations from the operating point.
     pub commands: Vec<CommandPeak>,
     /// The largest movement of the other outputs that follow references, as deviations.
     pub others: Vec<Number>,
-    /// The largest step, positive and negative, whose commands stay within the limits; null if no limit
+    /// The largest negative and the largest positive step whose commands stay within the limits; null if no limit
     /// restricts it.
     #[schemars(with = "[Option<f64>; 2]")]
     pub largest_step: [f64; 2],
@@ -500,8 +499,8 @@ pub struct Curve {
     pub peak: f64,
     /// Time of the largest absolute value, in s.
     pub peak_time: f64,
-    /// Settling time in s: the signal then stays within 2 % of its peak, or, for an estimate, of
-    /// its final value.
+    /// Settling time in s: from then on the distance of the signal from its final value is at most 2 % of the largest
+    /// such distance.
     pub settling_time: f64,
     /// Times in s.
     pub times: Vec<f64>,
@@ -546,7 +545,7 @@ pub struct Variable {
     pub description: String,
 }
 
-/// A result as it is serialized, for the schema.
+/// The serialized form of a result, for the schema.
 #[derive(JsonSchema)]
 #[schemars(untagged)]
 #[expect(dead_code, reason = "describes the form only")]
@@ -585,7 +584,7 @@ fn close(schema: &mut serde_json::Value) {
     }
 }
 
-/// Serializes a value, or `{ "reason": ... }` if there is none.
+/// Serializes the value, or `{ "reason": ... }` for an error.
 fn or_reason<T: Serialize, S: Serializer>(
     outcome: &Result<T, String>,
     serializer: S,

@@ -7,7 +7,7 @@ use crate::number::rounded;
 use crate::robustness::Number;
 use crate::{OrReason, or_reason};
 
-/// What is proven about losses of effectiveness up to the fractions that the plant file states.
+/// The proofs about losses of effectiveness up to the fractions that the plant file states.
 #[derive(Serialize, JsonSchema)]
 pub struct LossReport {
     /// The actuators with `up_to` and this fraction.
@@ -37,7 +37,7 @@ pub struct LossLoop {
 /// How large constant losses may become.
 #[derive(Serialize, JsonSchema)]
 pub struct ConstantLoss {
-    /// The losses from which on the loop is unstable; if `stable`, the largest losses that were tested.
+    /// The losses beyond which the loop is unstable; if `stable`, the largest losses that were tested.
     pub losses: Vec<Number>,
     /// Whether the loop is stable for all losses that were tested.
     pub stable: bool,
@@ -71,7 +71,7 @@ pub struct LossProof {
 /// The bound of a state under a disturbance, for all losses up to the stated ones.
 #[derive(Serialize, JsonSchema)]
 pub struct LossPeak {
-    /// What moves the state: the name of a fault, or of an actuator, which loses a part of its command at the
+    /// The cause of the deviation: the name of a fault, or of an actuator, which loses a part of its command at the
     /// operating point.
     pub disturbance: String,
     /// The largest absolute value of the disturbance.

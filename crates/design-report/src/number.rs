@@ -1,6 +1,7 @@
 //! Rounds numbers, and formats them with five digits.
 
-/// Returns the number with five digits, more for whole numbers.
+/// Formats a number with five digits, or more for whole numbers below 1e7 and for numbers from 1e5 to 1e6. NaN is
+/// `undefined`.
 #[must_use]
 pub fn rounded(value: f64) -> String {
     if value == 0.0 {
@@ -31,7 +32,7 @@ fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// Rounds to the nearest 1, 2 or 5 times a power of ten, on the logarithmic scale.
+/// Rounds a number above 0 to the nearest 1, 2 or 5 times a power of ten, on the logarithmic scale.
 #[must_use]
 pub fn round(x: f64) -> f64 {
     let exponent = x.log10().floor();

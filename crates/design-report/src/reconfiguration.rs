@@ -6,11 +6,11 @@ use serde::Serialize;
 use crate::robustness::Number;
 use crate::{OrReason, or_reason};
 
-/// What the controller does without an actuator.
+/// The controllers without actuators.
 #[derive(Serialize, JsonSchema)]
 pub struct ReconfigurationReport {
-    /// An actuator counts as gone if its estimated loss of effectiveness is above the first number for
-    /// the second, in s; none if only the inputs of the FMU say so.
+    /// An actuator counts as gone after its estimated loss of effectiveness has been above the first number for the
+    /// second, in s; none if only inputs of the FMU report it.
     pub by_estimate: Option<[f64; 2]>,
     /// One entry for each actuator that may be gone.
     pub without: Vec<WithoutActuator>,

@@ -12,10 +12,12 @@ use crate::{Frequency, Matrix, OrReason, or_reason};
 pub enum Level {
     /// All checks hold and all limits are met.
     Green,
-    /// The peak of S is above the lower limit.
+    /// A peak of S is above the lower limit, something is not proven or could not be computed, or a controller for lost
+    /// actuators is missing or needs commands beyond limits.
     Amber,
-    /// A check does not hold, the peak of S is above the upper limit, or parameters within their
-    /// tolerances make the loop unstable.
+    /// A check does not hold, a peak of S is above the upper limit, or the loop is or may become unstable: with a
+    /// member of a family, a point of a schedule, parameters within their tolerances, stated losses, or the delays
+    /// themselves.
     Red,
 }
 
@@ -38,7 +40,8 @@ pub struct Verdict {
     pub level: Level,
     /// The reasons for a level other than green, in sentences.
     pub reasons: Vec<String>,
-    /// What changes peaks of S and instability within tolerances: computed for slower and faster gains.
+    /// Changes of the plant file that lower peaks of S or remove instability within tolerances; computed for slower and
+    /// faster gains.
     pub remedies: Vec<Remedy>,
     /// The limits that the levels follow from.
     pub limits: Limits,
@@ -56,11 +59,9 @@ pub struct Remedy {
 }
 
 impl Verdict {
-    /// Adds a reason; the level is the worse one.
+    /// Adds a reason; the level becomes the worse one of the present level and `level`.
     pub fn add(&mut self, level: Level, reason: String) {
-        if self.level != Level::Red && level != Level::Green {
-            self.level = level;
-        }
+        self.level = self.level.max(level);
         self.reasons.push(reason);
     }
 }
@@ -123,8 +124,8 @@ pub struct ExactDelays {
     /// Peaks of the largest singular value of S with the delays themselves, in the units of the plant file: at the
     /// commands, at the measurements.
     pub s_peaks: [f64; 2],
-    /// The largest spectral radius of K (G - H) S over the frequencies, with G the plant with the delays themselves and H the
-    /// approximated one. Below 1 the loop is stable with the delays themselves.
+    /// The largest spectral radius of K (G - H) S over the frequencies, with G the plant with the delays themselves
+    /// and H the approximated one. Below 1 the loop is stable with the delays themselves.
     pub difference: f64,
     /// Its frequency, rad/s.
     pub frequency: f64,
@@ -165,8 +166,9 @@ pub struct LoopPoint {
 pub struct PeakSensitivity {
     /// `input` (commands) or `output` (measurements).
     pub point: String,
-    /// A, B and C: each entry that is not structural, times the derivative with respect to it. A
-    /// change of the entry by 1 % changes the peak by 0.01 times this number.
+    /// For A, B and C, and D if the plant has one: each entry that is not structural, times the derivative with
+    /// respect to it; 0 for structural entries. A change of the entry by 1 % changes the peak by 0.01 times this
+    /// number.
     pub matrices: Vec<Matrix>,
 }
 
@@ -261,7 +263,7 @@ pub struct VaryingEntries {
 pub struct ToleranceResult {
     /// Number of entries that vary; 0 if `parameters` vary.
     pub entries: u32,
-    /// These entries; those of one item vary together.
+    /// The entries that vary; those of one item vary by the same factor.
     pub varying: Vec<VaryingEntries>,
     /// The parameters of the FMU that vary; empty if the entries vary.
     pub parameters: Vec<Parameter>,
@@ -278,7 +280,7 @@ pub struct ToleranceResult {
     /// stable. Parameters are followed to their limits, 1; entries to 16.
     #[schemars(with = "Option<f64>")]
     pub first_unstable: f64,
-    /// A, B and C of the worst plant.
+    /// A, B and C of the worst plant, and D if the plant has one.
     pub worst: Vec<Matrix>,
 }
 
@@ -305,20 +307,21 @@ pub struct ToleranceProof {
 const NAMED: usize = 12;
 
 impl ToleranceResult {
-    /// Whether something varies.
+    /// Whether an entry or a parameter varies.
     #[must_use]
     pub fn is_examined(&self) -> bool {
         self.entries > 0 || !self.parameters.is_empty()
     }
 
-    /// Whether a case within the tolerances is unstable.
+    /// Whether the worst plant or a random case within the tolerances is unstable.
     #[must_use]
     pub fn is_unstable(&self) -> bool {
         self.is_examined()
             && (self.worst_instability >= 0.0 || self.stable.is_some_and(|part| part < 1.0))
     }
 
-    /// What varies, and how far: `±10 % of A[2][1], B[2][1]`, many entries by their number.
+    /// The entries and parameters that vary, and how far: `±10 % of A[2][1], B[2][1]`, `m from 0.9 to 1.1`. More than
+    /// [`NAMED`] entries with one tolerance are counted for each matrix.
     #[must_use]
     pub fn range(&self) -> String {
         let limits = |parameter: &Parameter| {
@@ -334,19 +337,19 @@ impl ToleranceResult {
         for size in sizes {
             let names = single.iter().filter(|item| item.tolerance.total_cmp(&size).is_eq());
             let names: Vec<_> = names.flat_map(|item| &item.entries).map(String::as_str).collect();
-            parts.push(format!("±{} % of {}", rounded(100.0 * size), listed(&names)));
+            parts.push(format!("±{} % of {}", rounded(100.0 * size), name_or_count(&names)));
         }
         for item in common {
             let names: Vec<_> = item.entries.iter().map(String::as_str).collect();
             let size = rounded(100.0 * item.tolerance);
-            parts.push(format!("±{size} % of {} together", listed(&names)));
+            parts.push(format!("±{size} % of {} together", name_or_count(&names)));
         }
         parts.join("; ")
     }
 }
 
-/// The entries, or the number of them in each matrix.
-fn listed(names: &[&str]) -> String {
+/// The names of entries; of more than [`NAMED`] entries the number in each matrix.
+fn name_or_count(names: &[&str]) -> String {
     if names.len() <= NAMED {
         return names.join(", ");
     }
