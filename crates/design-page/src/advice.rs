@@ -9,7 +9,8 @@ use design_report::robustness::{LoopPoint, Robustness};
 /// A linear-quadratic design is worth a try if its peak of S is below this part of that of the design.
 const BETTER: f64 = 0.9;
 
-/// Returns what to change, one entry for each kind of reason of the verdict.
+/// Returns what to change: a sentence if a check does not hold, then the computed remedies, each change once; without
+/// remedies general advice on peaks of S and on tolerances.
 pub(super) fn advice(report: &Report) -> Vec<Markup> {
     let mut advice = Vec::new();
     if report.checks.iter().any(|check| !check.holds) {
@@ -29,7 +30,7 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
             @for line in &remedy.lines { div { code { (line) } } }
         });
     }
-    // Without other designs that were computed.
+    // Remedies are computed for this design, and replace the general advice.
     if let Some(robustness) = &report.robustness
         && remedies.is_empty()
     {
@@ -45,10 +46,10 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
     advice
 }
 
-/// How the peaks of S above `limit` become smaller; none if there are none.
+/// How to lower the peaks of S above `limit`; `None` if there are none.
 fn lower_peaks(robustness: &Robustness, limit: f64) -> Option<Markup> {
     let high: Vec<_> = robustness.points.iter().filter(|point| point.judged > limit).collect();
-    let other = |point: &LoopPoint| {
+    let linear_quadratic = |point: &LoopPoint| {
         let name = format!("peak of S at the {}", point.point);
         let compared = robustness.comparison.iter().find(|compared| compared.name == name)?;
         compared.linear_quadratic.filter(|peak| *peak < BETTER * point.s_peak)
@@ -59,9 +60,9 @@ fn lower_peaks(robustness: &Robustness, limit: f64) -> Option<Markup> {
             @for (index, point) in high.iter().enumerate() {
                 @if index > 0 { ", " }
                 "at the " (point.point) " it is " (number(point.judged))
-                @if let Some(peak) = other(point) { " (" (number(peak)) " for the linear-quadratic design of the same speed)" }
+                @if let Some(peak) = linear_quadratic(point) { " (" (number(peak)) " for the linear-quadratic design of the same speed)" }
             }
-            @if high.iter().any(|point| other(point).is_some()) {
+            @if high.iter().any(|point| linear_quadratic(point).is_some()) {
                 ". State " code { "feedback.Q" } ", " code { "feedback.R" } " and " code { "observer.W" } ", " code { "observer.V" }
                 " in place of eigenvalues"
             } @else {

@@ -120,16 +120,15 @@ fn numbers(caption: &str, rows: &[(&str, f64)]) -> Markup {
     table(caption, &["quantity", "value"], &rows)
 }
 
-/// Returns the row names of L_x and L_f; numbers if they do not match.
+/// Returns the row names of L_x and L_f as names of `count` errors; numbers from 1 if there are not as many rows.
 fn error_names(report: &Report, count: usize) -> Vec<String> {
     let rows = |gain| report.gains.iter().filter(move |matrix| matrix.name == gain);
     let named: Vec<String> =
         rows("L_x").chain(rows("L_f")).flat_map(|matrix| matrix.rows.clone()).collect();
-    let fits = named.len() == count;
-    if fits { named } else { (1..=count).map(|k| k.to_string()).collect() }
+    if named.len() == count { named } else { (1..=count).map(|k| k.to_string()).collect() }
 }
 
-/// Returns P with the row names of L_x and L_f, or with numbers.
+/// Returns P with the names of the errors for rows and columns.
 fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> Matrix {
     let names = error_names(report, values.len());
     Matrix {

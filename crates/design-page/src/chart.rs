@@ -90,7 +90,7 @@ impl Chart<'_> {
         }
     }
 
-    /// Draws a line through points in any order; a point that is not finite interrupts it.
+    /// Draws a line through points in any order; a point whose first coordinate is NaN interrupts it.
     pub(super) fn outline(&self, points: &[(f64, f64)], class: &str) -> Markup {
         let place =
             |(x, y): &(f64, f64)| format!("{:.1} {:.1}", self.x.place(*x), self.y.place(*y));
@@ -103,13 +103,13 @@ impl Chart<'_> {
         html! { path.(class) d=(strokes.map(stroke).collect::<String>()) {} }
     }
 
-    /// Draws a vertical line.
+    /// Draws a vertical line; nothing outside of the range of the axis.
     pub(super) fn upright(&self, at: f64, class: &str) -> Markup {
         let ((bottom, top), x) = (self.y.pixels(), self.x.place(at));
         html! { @if self.x.contains(at) { (line([x, top], [x, bottom], class)) } }
     }
 
-    /// Draws a horizontal line.
+    /// Draws a horizontal line; nothing outside of the range of the axis.
     pub(super) fn level(&self, at: f64, class: &str) -> Markup {
         let ((left, right), y) = (self.x.pixels(), self.y.place(at));
         html! { @if self.y.contains(at) { (line([left, y], [right, y], class)) } }
@@ -121,7 +121,7 @@ pub(super) fn line([x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) -> Marku
     html! { line.(class) x1=(tenth(x1)) y1=(tenth(y1)) x2=(tenth(x2)) y2=(tenth(y2)) {} }
 }
 
-/// Formats a coordinate in a figure.
+/// Formats a coordinate in a figure, with one decimal.
 pub(super) fn tenth(value: f64) -> PreEscaped<String> {
     PreEscaped(format!("{value:.1}"))
 }

@@ -43,6 +43,7 @@ pub fn comparison(comparison: &Comparison) -> String {
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
 }
 
+/// A table with a row for each law and fault; a law that does not exist has one row.
 fn overview(comparison: &Comparison) -> Markup {
     let mut rows = Vec::new();
     for law in &comparison.laws {

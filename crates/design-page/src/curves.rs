@@ -29,7 +29,7 @@ pub(super) fn frequencies<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Mark
     }
 }
 
-/// Shows singular values; `limit`: the largest frequency of a sampled loop.
+/// Shows singular values; `limit`: the largest frequency of a sampled loop, which is marked if the plot reaches it.
 pub(super) fn frequency<'a>(
     id: String,
     response: &'a Frequency,
@@ -64,7 +64,7 @@ pub(super) fn frequency<'a>(
     }
 }
 
-/// Describes the largest singular value over frequency in words.
+/// Describes the largest singular value over frequency in words; empty without values.
 fn describe(response: &Frequency) -> String {
     let (frequencies, all) = (&response.frequencies, &response.singular_values);
     let values =
@@ -72,11 +72,11 @@ fn describe(response: &Frequency) -> String {
     let Some(peak) = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])) else {
         return String::new();
     };
-    let say = |k: usize| format!("{} at {} rad/s", rounded(values[k]), rounded(frequencies[k]));
+    let at = |k: usize| format!("{} at {} rad/s", rounded(values[k]), rounded(frequencies[k]));
     let last = values.len() - 1;
     let largest =
-        if [0, last].contains(&peak) { String::new() } else { format!(", largest {}", say(peak)) };
-    format!("From {} to {}{largest}.", say(0), say(last))
+        if [0, last].contains(&peak) { String::new() } else { format!(", largest {}", at(peak)) };
+    format!("From {} to {}{largest}.", at(0), at(last))
 }
 
 /// Shows the responses to a change of each fault on a logarithmic time axis.
@@ -117,8 +117,9 @@ fn response<'a>(id: &str, response: &'a StepResponse, plots: &mut Plots<'a>) -> 
     };
     let caption = format!("Peaks and settling after a change of {}", response.fault);
     let mut entries = vec![(line_sample("mark"), "settled, within 2 %".to_owned())];
-    let sized = |curve: &Curve| response.parts.len() == 1 && curve.unit == response.unit;
-    if response.curves.iter().any(sized) {
+    let has_unit_of_change =
+        |curve: &Curve| response.parts.len() == 1 && curve.unit == response.unit;
+    if response.curves.iter().any(has_unit_of_change) {
         entries.push((line_sample("size"), "size of the change, in the same unit".to_owned()));
     }
     html! {
@@ -126,7 +127,8 @@ fn response<'a>(id: &str, response: &'a StepResponse, plots: &mut Plots<'a>) -> 
         div.figures.small {
             @for (index, curve) in response.curves.iter().enumerate() {
                 @let after = format!("a change of {}", response.fault);
-                (self::curve(format!("{id}-{}", index + 1), curve, &after, sized(curve).then_some(response.size), plots))
+                @let size = has_unit_of_change(curve).then_some(response.size);
+                (self::curve(format!("{id}-{}", index + 1), curve, &after, size, plots))
             }
         }
         (legend(&entries))

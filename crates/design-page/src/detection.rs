@@ -55,7 +55,7 @@ fn decoupled(inputs: &[DecoupledInput]) -> String {
     inputs.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Says which parameters of an FMU the means by model errors are for.
+/// Says for which parameters of an FMU the means by model errors were computed; nothing without such parameters.
 fn examined(section: &Detection) -> Markup {
     let Some(cases) = &section.parameter_cases else { return html! {} };
     html! {

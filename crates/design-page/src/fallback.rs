@@ -68,7 +68,7 @@ fn cases(cases: &[FallbackCase]) -> Markup {
     }
 }
 
-/// A table with a row for each signal and a column for each case.
+/// A table with a row for each signal and a column for each case; empty without cases.
 fn at_rest(
     title: &str,
     cases: &[FallbackCase],

@@ -50,7 +50,7 @@ pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
 pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
     let unit = schedule.unit.as_deref().unwrap_or("1");
     let members: Vec<_> = schedule.points.iter().map(|point| &point.closed).collect();
-    let (instant, figure, less) = match report.sampling {
+    let (instant, figure, unit_of_figure) = match report.sampling {
         Some(_) => ("At each sample", "modulus", ", less 1,"),
         None => ("At each instant", "real part", ", in 1/s,"),
     };
@@ -65,7 +65,7 @@ pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
         (noise(&members))
         (operating(report, schedule))
         p {
-            "Between the points: the largest " (figure) " of the eigenvalues of the interpolated loop" (less)
+            "Between the points: the largest " (figure) " of the eigenvalues of the interpolated loop" (unit_of_figure)
             " is " (number(schedule.worst_instability)) " at " (schedule.variable) " = "
             (number(schedule.worst_at)) ", the worst of " (schedule.checked) " constant values. "
             strong { "This is a check of these values, not a proof." }
@@ -131,7 +131,7 @@ fn tolerance(member: &MemberReport) -> Option<&ToleranceResult> {
     member.margins.as_ref()?.tolerance.as_ref()
 }
 
-/// The effect of the measurement noise, a column for each member.
+/// The effect of the measurement noise, with a column for each member whose loop is stable; empty without any.
 fn noise(members: &[&MemberReport]) -> Markup {
     let stable: Vec<_> = members
         .iter()
@@ -189,7 +189,8 @@ fn integral_names(report: &Report) -> Vec<String> {
     names.map(|name| format!("integral of {name}")).collect()
 }
 
-/// The states of plant and controller together.
+/// The names of the states of plant and controller together: those of the plant, filtered measurements, estimates,
+/// integrals.
 fn loop_names(report: &Report) -> Vec<String> {
     let mut names = state_names(report);
     let Some(k_x) = report.gains.iter().find(|gain| gain.name == "K_x") else { return names };
@@ -207,19 +208,19 @@ fn loop_names(report: &Report) -> Vec<String> {
 }
 
 fn p_matrix(id: &str, names: &[String], certificate: &CommonCertificate) -> Markup {
-    named(id, "P", names, &certificate.p)
+    lyapunov_matrix(id, "P", names, &certificate.p)
 }
 
 fn rate_matrices(report: &Report, schedule: &ScheduleReport, bounded: &RateCertificate) -> Markup {
     let names = loop_names(report);
     html! {
         @for (index, (point, p)) in schedule.points.iter().zip(&bounded.p).enumerate() {
-            (named(&format!("schedule-P-{}", index + 1), &format!("P at {}", point.at), &names, p))
+            (lyapunov_matrix(&format!("schedule-P-{}", index + 1), &format!("P at {}", point.at), &names, p))
         }
     }
 }
 
-fn named(id: &str, name: &str, names: &[String], values: &[Vec<f64>]) -> Markup {
+fn lyapunov_matrix(id: &str, name: &str, names: &[String], values: &[Vec<f64>]) -> Markup {
     let labelled = Matrix {
         name: name.to_owned(),
         meaning: "Lyapunov matrix".to_owned(),

@@ -9,7 +9,7 @@ use super::table::{Cell, Columns, table, table_of};
 use design_report::number::rounded;
 use design_report::{Loop, LowerBoundFor, NormReport, Plant, Region, Report};
 
-/// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
+/// Returns the required and the actual eigenvalues of a loop, mapped by `place`; no group without eigenvalues.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
     [("required", Sign::Ring, &system.required), ("reached", Sign::Cross, &system.eigenvalues)]
         .into_iter()
@@ -18,6 +18,7 @@ fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
         .collect()
 }
 
+/// Returns the eigenvalues mapped by `place`, without those whose real part is then not finite.
 fn group(name: &'static str, sign: Sign, poles: &[Pole], place: impl Fn(Pole) -> Pole) -> Group {
     let places = poles.iter().map(|pole| place(*pole)).filter(|place| place[0].is_finite());
     Group { name, sign, poles: places.collect() }
@@ -87,6 +88,7 @@ pub(super) fn poles(report: &Report) -> Markup {
     }
 }
 
+/// Shows the required region of the eigenvalues; nothing without one.
 fn region(name: &str, region: Option<&Region>) -> Markup {
     let Some(region) = region else { return html! {} };
     html! {
@@ -173,7 +175,7 @@ pub(super) fn conditioning<'a>(report: &'a Report) -> Markup {
     }
 }
 
-/// Shows the weights over frequency of these norms.
+/// Shows the weights over frequency of these norms; nothing without any.
 fn weights(report: &Report) -> Markup {
     let polynomial =
         |all: &[f64]| all.iter().map(|one| format!("{one:.5e}")).collect::<Vec<_>>().join(", ");
@@ -200,15 +202,15 @@ fn weights(report: &Report) -> Markup {
     html! { @if !rows.is_empty() { (table("Weights over frequency", &heads, &rows)) } }
 }
 
-/// What a lower bound holds for, in the table.
-fn bound_for(all: LowerBoundFor) -> &'static str {
-    match all {
+/// The gains and filters for which a lower bound holds, in the table.
+fn bound_for(scope: LowerBoundFor) -> &'static str {
+    match scope {
         LowerBoundFor::Filters => "all filters",
         LowerBoundFor::Disc => "disc",
     }
 }
 
-/// Shows the norms of gains that were designed by them, with their bounds.
+/// Shows the norms of gains that were designed by them, with their bounds; nothing without such gains.
 fn norms<'a>(report: &'a Report) -> Markup {
     let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
     let norms = loops.into_iter().filter_map(|(name, system)| Some((name, system.norm.as_ref()?)));

@@ -11,12 +11,12 @@ use design_report::losses::{LossLoop, LossPeak, LossReport, described};
 pub(super) fn losses(report: &Report) -> Markup {
     html! {
         (effectiveness(report))
-        @if let Some(losses) = &report.losses { (stated(losses)) }
+        @if let Some(losses) = &report.losses { (proofs(losses)) }
     }
 }
 
-/// What is proven about losses up to the stated fractions.
-fn stated(losses: &LossReport) -> Markup {
+/// The proofs about losses up to the stated fractions.
+fn proofs(losses: &LossReport) -> Markup {
     html! {
         p {
             "The plant file states losses up to " (described(&losses.stated)) ". A loss may have any value \

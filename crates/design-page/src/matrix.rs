@@ -7,7 +7,7 @@ use super::table::scrolled;
 use design_report::Matrix;
 use design_report::number::rounded;
 
-/// Returns the matrices as tables, each followed by its text; identifiers on the page start with
+/// Returns the matrices as tables, each followed by its text in three languages; identifiers on the page start with
 /// `id`.
 pub(super) fn matrices(id: &str, matrices: &[Matrix]) -> Markup {
     html! {
@@ -104,7 +104,8 @@ fn matlab(matrix: &Matrix) -> String {
     format!("{} = [\n{}\n];\n", variable(&matrix.name), rows(matrix, ["", "", ";\n"]))
 }
 
-/// Returns a variable name that Python and MATLAB accept.
+/// Returns a variable name that Python and MATLAB accept: `_` in place of other characters, after an `M` if it would
+/// not start with a letter.
 fn variable(name: &str) -> String {
     let plain = |sign: char| if sign.is_ascii_alphanumeric() { sign } else { '_' };
     let text: String = name.chars().map(plain).collect();

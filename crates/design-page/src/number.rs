@@ -4,12 +4,12 @@ use maud::{Markup, html};
 
 use design_report::number::rounded;
 
-/// Returns the shortest text that parses to the same number in TOML, numpy and MATLAB.
+/// Returns the shortest text that parses to the same finite number in TOML, numpy and MATLAB.
 pub(super) fn exact(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// Formats a complex number; `part` formats each part.
+/// Formats a complex number, a real one without its imaginary part; `part` formats each part.
 pub(super) fn complex([re, im]: [f64; 2], part: fn(f64) -> String) -> String {
     if im == 0.0 {
         return part(re);

@@ -37,7 +37,7 @@ impl Plane {
         }
     }
 
-    /// Returns the eigenvalue ln z / T of the equivalent continuous system, 1/s.
+    /// Returns the eigenvalue of the equivalent continuous system, 1/s: ln z / T in the z-plane.
     pub(super) fn rate(self, [re, im]: Pole) -> Pole {
         match self {
             Self::Continuous => [re, im],
@@ -56,27 +56,27 @@ impl Plane {
         }
     }
 
-    /// Returns the real part of the slowest eigenvalue of a loop, 1/s.
+    /// Returns the real part of the slowest eigenvalue of a loop, 1/s; `None` without eigenvalues.
     pub(super) fn slowest(self, system: &Loop) -> Option<f64> {
         system.eigenvalues.iter().map(|pole| self.rate(*pole)[0]).max_by(f64::total_cmp)
     }
 }
 
-/// A required eigenvalue and an actual one.
+/// A required eigenvalue and an actual one; one of them may be missing.
 type Pair = (Option<Pole>, Option<Pole>);
 
 /// Pairs each required eigenvalue of a loop with the nearest remaining actual one, then lists the other actual
 /// eigenvalues.
 pub(super) fn pairs(system: &Loop) -> Vec<Pair> {
-    let mut left = system.eigenvalues.clone();
+    let mut remaining = system.eigenvalues.clone();
     let mut pairs = Vec::new();
     for required in &system.required {
         let distance = |pole: &Pole| (pole[0] - required[0]).hypot(pole[1] - required[1]);
-        let nearest =
-            (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b])));
-        pairs.push((Some(*required), nearest.map(|index| left.remove(index))));
+        let nearest = (0..remaining.len())
+            .min_by(|a, b| distance(&remaining[*a]).total_cmp(&distance(&remaining[*b])));
+        pairs.push((Some(*required), nearest.map(|index| remaining.remove(index))));
     }
-    pairs.extend(left.into_iter().map(|pole| (None, Some(pole))));
+    pairs.extend(remaining.into_iter().map(|pole| (None, Some(pole))));
     pairs
 }
 

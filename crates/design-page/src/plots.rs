@@ -24,7 +24,7 @@ pub(super) enum Quantity {
 #[derive(Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mark {
-    /// A vertical line at a time or frequency: from it on the signal has settled, or the sampling has its limit.
+    /// A vertical line: at the time from which the signal has settled, or at the largest frequency of a sampled loop.
     At(f64),
     /// A horizontal line at the size of a change.
     Size(f64),
@@ -74,9 +74,10 @@ impl<'a> Plots<'a> {
     ///
     /// All plots of an axis are on one grid, the sorted list of all their times or frequencies, since most of them
     /// have the same ones. The block has four lists: the grid of the times and the grid of the frequencies (64 bits);
-    /// plot after plot, of each point how far its place is from the place of the point before in the grid (32 bits,
-    /// signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is stored as all
-    /// first bytes, little endian, then all second bytes and so on, since neighbours differ little in most of them.
+    /// plot after plot, for each point the difference of its position in the grid from that of the point before, or
+    /// from 0 (32 bits, signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is
+    /// stored as all first bytes, little endian, then all second bytes and so on, since neighbours differ little in
+    /// most of them. Points that an axis with decades cannot show are left out.
     pub(super) fn json(&self) -> String {
         let grids = [Quantity::Time, Quantity::Frequency].map(|quantity| self.grid(quantity));
         let mut steps = Vec::new();
@@ -109,14 +110,14 @@ impl<'a> Plots<'a> {
         let data = Data {
             grids: grids.map(|grid| grid.len()),
             bits,
-            plots: self.0.iter().map(Plot::listed).collect(),
+            plots: self.0.iter().map(Plot::header).collect(),
             block: STANDARD.encode(compress_to_vec_zlib(&block, LEVEL)),
         };
         let text = serde_json::to_string(&data).unwrap_or_default();
         text.replace('<', "\\u003c").replace('&', "\\u0026")
     }
 
-    /// Returns all places of an axis, in order.
+    /// Returns all places on an axis, each once, in ascending order.
     fn grid(&self, quantity: Quantity) -> Vec<f64> {
         let plots = self.0.iter().filter(|plot| plot.quantity == quantity);
         let mut grid: Vec<f64> = plots.flat_map(|plot| plot.shown(plot.places)).collect();
@@ -127,14 +128,15 @@ impl<'a> Plots<'a> {
 }
 
 impl Plot<'_> {
-    /// Returns the members of a list at the places that an axis with decades can show.
+    /// Returns the members of a list at the places that an axis with decades can show: those that are finite and above
+    /// 0.
     fn shown(&self, list: &[f64]) -> impl Iterator<Item = f64> {
         let members = self.places.iter().zip(list);
         members.filter(|(at, _)| **at > 0.0 && at.is_finite()).map(|(_, member)| *member)
     }
 
-    fn listed(&self) -> Listed<'_> {
-        Listed {
+    fn header(&self) -> Header<'_> {
+        Header {
             id: &self.id,
             axis: self.quantity,
             logarithmic: self.logarithmic,
@@ -147,17 +149,20 @@ impl Plot<'_> {
     }
 }
 
+/// The JSON of all plots.
 #[derive(Serialize)]
 struct Data<'a> {
     /// The lengths of the grids: time, frequency.
     grids: [usize; 2],
+    /// The bits of a value of a curve: 64 or 32.
     bits: u8,
-    plots: Vec<Listed<'a>>,
+    plots: Vec<Header<'a>>,
     block: String,
 }
 
+/// A plot in the JSON, without its numbers.
 #[derive(Serialize)]
-struct Listed<'a> {
+struct Header<'a> {
     id: &'a str,
     axis: Quantity,
     logarithmic: bool,

@@ -10,7 +10,7 @@ use design_report::Region;
 use figure::axis::Axis;
 
 const SIZE: Size = Size { width: 440.0, height: 370.0 };
-/// Ratio of the eigenvalues above which the axes are logarithmic.
+/// Ratio of the largest to the smallest eigenvalue above which the axes are logarithmic.
 const LINEAR_UP_TO: f64 = 30.0;
 
 /// The marker of a group of eigenvalues.
@@ -50,6 +50,7 @@ pub(super) struct Group {
     pub(super) poles: Vec<[f64; 2]>,
 }
 
+/// A map of groups of eigenvalues in a plane, with the boundary of a required region.
 pub(super) struct Map<'a> {
     pub(super) id: &'a str,
     pub(super) title: &'a str,
@@ -115,7 +116,7 @@ impl Map<'_> {
             Plane::Continuous => ("real part in 1/s", "imaginary part in 1/s"),
             Plane::Sampled(_) => ("real part of z", "imaginary part of z"),
         };
-        let listed = |group: &Group| {
+        let sentence = |group: &Group| {
             let poles: Vec<_> = group
                 .poles
                 .iter()
@@ -123,7 +124,7 @@ impl Map<'_> {
                 .collect();
             format!("{}: {}", group.name, poles.join(", "))
         };
-        let description = self.groups.iter().map(listed).collect::<Vec<_>>().join("; ");
+        let description = self.groups.iter().map(sentence).collect::<Vec<_>>().join("; ");
         let chart =
             Chart { id, title, description: &description, size: SIZE, x, y, x_label, y_label };
         html! {
@@ -200,6 +201,7 @@ impl Map<'_> {
     }
 }
 
+/// The smallest and the largest value.
 fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))

@@ -26,7 +26,8 @@ pub(super) fn reconfiguration(section: &ReconfigurationReport) -> Markup {
     }
 }
 
-/// A table of the sets of actuators that have no gains of their own: when they are gone, the controller falls back.
+/// A table of the sets of actuators without gains of their own: while they are gone, the fall-back is in force. Nothing
+/// without such sets.
 fn by_fallback(cases: &[ServedByFallback]) -> Markup {
     let columns: Columns<'_, ServedByFallback, 3> = [
         ("without", |case| (&case.actuators.join(", ")).into()),

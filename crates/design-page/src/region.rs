@@ -8,8 +8,9 @@ use design_report::Region;
 /// Number of points along a part of the boundary.
 const STEPS: u16 = 400;
 
-/// Returns points of `plane` along the boundary of each part of the region, densest near the real
-/// axis. In the z-plane only frequencies up to half the sample rate are shown.
+/// Returns points of `plane` along the boundary of each part of the region (decay, disc, each side of the sector),
+/// densest near the real axis. Points beyond the largest frequency of the plane are NaN: 1e9 rad/s, or half the sample
+/// rate.
 pub(super) fn boundary(region: &Region, plane: Plane) -> Vec<Vec<(f64, f64)>> {
     let mut parts = Vec::new();
     let both_sides = |share: f64| (2.0 * share - 1.0).powi(3);
@@ -34,7 +35,7 @@ pub(super) fn boundary(region: &Region, plane: Plane) -> Vec<Vec<(f64, f64)>> {
     parts
 }
 
-/// Returns a frequency beyond all frequencies of interest; in the z-plane, half the sample rate.
+/// Returns the largest frequency of a plane in rad/s: beyond all frequencies of interest, or half the sample rate.
 fn far(plane: Plane) -> f64 {
     match plane {
         Plane::Continuous => 1e9,
@@ -42,6 +43,7 @@ fn far(plane: Plane) -> f64 {
     }
 }
 
+/// Returns the points of `point(share)` for shares from 0 to 1, mapped into `plane`.
 fn along(plane: Plane, point: impl Fn(f64) -> [f64; 2]) -> Vec<(f64, f64)> {
     (0..=STEPS)
         .map(|step| {

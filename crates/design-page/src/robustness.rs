@@ -12,10 +12,10 @@ use design_report::robustness::{
 };
 use design_report::{Matrix, Report};
 
-/// Number of parameters in the table of the sensitivities.
+/// Largest number of entries in the table of the sensitivities.
 const SHOWN: usize = 12;
 
-/// Shows what the delays themselves change.
+/// Shows the peaks of S and the stability with the delays themselves; nothing for a plant without delays.
 fn delays(robustness: &Robustness) -> Markup {
     let Some(delays) = &robustness.delays else { return Markup::default() };
     let [at_commands, at_measurements] = delays.s_peaks;
@@ -184,7 +184,7 @@ fn comparison(robustness: &Robustness) -> Markup {
     }
 }
 
-/// Shows the parameters with the largest effect on the peaks of S.
+/// Shows the entries of the plant with the largest effect on the peaks of S, at most [`SHOWN`].
 fn parameters(report: &Report, robustness: &Robustness) -> Markup {
     let entries = |sensitivity: &PeakSensitivity| -> Vec<(String, f64)> {
         let named = |matrix: &Matrix| -> Vec<(String, f64)> {
@@ -266,7 +266,7 @@ fn tolerances(report: &Report, tolerances: &ToleranceResult) -> Markup {
     }
 }
 
-/// What is proven for the cases that were not tried.
+/// The proof for the cases that were not tried; nothing if nothing varies.
 fn proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) -> Markup {
     html! {
         @if tested.is_examined() {

@@ -1,18 +1,20 @@
-//! Tables that can be copied.
+//! Tables of texts and numbers.
 
 use design_report::number::rounded;
 use maud::{Markup, html};
 
 use super::number::{complex, exact, rounded_part};
 
-/// The content of a cell.
+/// The content of a cell; an empty text is `Missing`.
 pub(super) enum Cell {
     Text(String),
     Number(f64),
     /// A percentage of a whole.
     Percentage(f64),
     Complex([f64; 2]),
+    /// Whether a condition holds.
     Holds(bool),
+    /// No value, shown as a dash.
     Missing,
 }
 
@@ -72,8 +74,8 @@ impl Cell {
     }
 }
 
-/// Returns a table whose first column names its rows. Empty columns are left out; a table without
-/// rows is empty.
+/// Returns a table whose first column names its rows. Other columns without a value are left out; a table without rows
+/// is empty.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
     let is_number =

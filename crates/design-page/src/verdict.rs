@@ -12,9 +12,9 @@ pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);
     let count = report.checks.len();
     let level = if failures.is_empty() { report.verdict.level } else { Level::Red };
-    // The checks have their explanations.
-    let checked = |reason: &&String| !reason.starts_with("does not hold: ");
-    let reasons: Vec<_> = report.verdict.reasons.iter().filter(checked).collect();
+    // `failures` has the checks that do not hold, with their explanations.
+    let is_other = |reason: &&String| !reason.starts_with("does not hold: ");
+    let reasons: Vec<_> = report.verdict.reasons.iter().filter(is_other).collect();
     let advice = if level == Level::Green { Vec::new() } else { advice(report) };
     html! {
         div.verdict .passed[level == Level::Green] .warned[level == Level::Amber]
@@ -53,7 +53,7 @@ pub(super) fn verdict(report: &Report) -> Markup {
     }
 }
 
-/// The limits that the verdict follows from, and what is not certified.
+/// The limits of the verdict, the tolerances, and the certificates that do not exist.
 fn limits(report: &Report) -> Markup {
     let limits = &report.verdict.limits;
     html! {
@@ -81,7 +81,7 @@ fn limits(report: &Report) -> Markup {
     }
 }
 
-/// The three figures that matter: those of the robustness, or the speeds of a loop without it.
+/// The three most important figures: of the robustness, or without it the slowest eigenvalues and the settling time.
 fn figures(report: &Report) -> Markup {
     let plane = Plane::of(report);
     let Some(robustness) = &report.robustness else {
@@ -119,7 +119,7 @@ fn figures(report: &Report) -> Markup {
     }
 }
 
-/// Says that all checks hold.
+/// Says that all checks hold, and both loops are stable.
 fn holding(checks: usize) -> String {
     match checks {
         0 => "both loops are stable; nothing else was checked.".to_owned(),
@@ -141,6 +141,7 @@ fn sign(level: Level) -> &'static str {
     }
 }
 
+/// The checks that do not hold, with their explanations, and the loops that are not stable.
 fn failures(report: &Report) -> Vec<(&str, &str)> {
     let plane = Plane::of(report);
     let unstable = |system: &Loop, name| {
@@ -163,10 +164,10 @@ fn key_numbers(report: &Report) -> Markup {
     html! {
         dl.key {
             (key("Plant", &html! {
-                (counted(plant.states.len(), "state")) ", "
-                (counted(plant.actuators.len(), "actuator")) ", "
-                (counted(plant.measurements.len(), "measurement")) ", "
-                (counted(plant.faults.len(), "fault"))
+                (plural(plant.states.len(), "state")) ", "
+                (plural(plant.actuators.len(), "actuator")) ", "
+                (plural(plant.measurements.len(), "measurement")) ", "
+                (plural(plant.faults.len(), "fault"))
             }))
             (key("Controller", &html! {
                 @match &report.sampling {
@@ -207,7 +208,7 @@ fn key(name: &str, value: &Markup) -> Markup {
     html! { div { dt { (name) } dd { (value) } } }
 }
 
-fn counted(count: usize, name: &str) -> Markup {
+fn plural(count: usize, name: &str) -> Markup {
     html! { (count) " " (name) @if count != 1 { "s" } }
 }
 
@@ -219,7 +220,7 @@ fn slowest(name: &str, system: &Loop, plane: Plane) -> Markup {
     }
 }
 
-/// Shows the curve with the longest settling time over all faults.
+/// Shows the longest settling time of all curves after changes of faults; nothing without curves.
 fn settling(report: &Report) -> Markup {
     let curves = report.steps.iter().flat_map(|step| &step.curves);
     let last = curves.max_by(|a, b| a.settling_time.total_cmp(&b.settling_time));
