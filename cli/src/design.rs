@@ -179,8 +179,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     inputs.extend(design.model.as_deref().map(|path| ("the plant's FMU", path)));
     check_distinct(&inputs, &outputs)?;
     if !options.force {
-        for (_, path) in
-            outputs.iter().filter(|(_, path)| !code.is_runtime(path, &design.identity))
+        for (_, path) in outputs.iter().filter(|(_, path)| !code.is_runtime(path, &design.identity))
         {
             check_identity(path, &design.identity)?;
         }

@@ -321,7 +321,7 @@ impl ToleranceResult {
     }
 
     /// The entries and parameters that vary, and how far: `±10 % of A[2][1], B[2][1]`, `m from 0.9 to 1.1`. More than
-    /// [`NAMED`] entries with one tolerance are counted for each matrix.
+    /// 12 entries with one tolerance are counted for each matrix.
     #[must_use]
     pub fn range(&self) -> String {
         let limits = |parameter: &Parameter| {

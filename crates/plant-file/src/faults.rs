@@ -222,11 +222,7 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
 }
 
 /// Returns one additive fault for each actuator at `positions`.
-fn actuator_faults(
-    actuators: &[Signal],
-    positions: &[usize],
-    place: &Place,
-) -> Vec<Fault> {
+fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place) -> Vec<Fault> {
     let fault = |&at: &usize| Fault {
         name: format!("f_{}", actuators[at].name),
         unit: actuators[at].unit.clone(),

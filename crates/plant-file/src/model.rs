@@ -123,8 +123,7 @@ pub(crate) fn read_matrices(
         .get("F_a")
         .map(|entry| shaped(&entry, [n, matrix(&entry)?.ncols()], "states x faults"));
     let states = read_signals(file, "states", "x", n, "states, the rows of A")?;
-    let actuators =
-        read_signals(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
+    let actuators = read_signals(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =
         read_signals(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
     let f_a = f_a.transpose()?;
