@@ -48,7 +48,7 @@ impl Measure {
     /// Creates the measure of a variable from the description of its FMU.
     pub(super) fn of_variable(variable: &ScalarVariable, description: &ModelDescription) -> Self {
         match &variable.kind {
-            Kind::Real(real) => {
+            Kind::Real(real) | Kind::Float32(real) => {
                 let unit = real.unit.as_ref().map(|name| {
                     let known = description.units.iter().find(|unit| unit.name == *name);
                     (name.clone(), known.and_then(|unit| unit.base))
@@ -242,5 +242,20 @@ pub(super) fn contradiction(stated: &Measure, declared: &Measure) -> Option<Stri
             stated.name(),
             declared.name()
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::RealType;
+
+    use super::*;
+
+    #[test]
+    fn a_float32_has_the_unit_of_its_variable() {
+        let real = RealType { unit: Some("mm".to_owned()), ..RealType::default() };
+        let variable = ScalarVariable { kind: Kind::Float32(real), ..ScalarVariable::default() };
+        let measure = Measure::of_variable(&variable, &ModelDescription::default());
+        assert_eq!(measure.unit, Some(("mm".to_owned(), None)));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use fmu_description::{Causality, Position};
+use fmu_description::{Causality, Kind, Position};
 
 use super::conversion::{ConversionChain, Measure};
 use super::error::{SspError, semantic_error};
@@ -244,17 +244,17 @@ fn terminal(tree: &Tree, vertex: &Vertex) -> Terminal {
 
 /// Checks that the transformation suits the type of the target variable.
 fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<(), SspError> {
-    let expected = match transformation {
+    let kind = tree.variable(&edge.to).map(|variable| &variable.kind);
+    let (fits, expected) = match transformation {
         Transformation::Identity => return Ok(()),
-        Transformation::Linear { .. } => ["Real", "Real"],
-        Transformation::Integer(_) => ["Integer", "Enumeration"],
-        Transformation::Boolean { .. } => ["Boolean", "Boolean"],
+        Transformation::Linear { .. } => (kind.and_then(Kind::as_real).is_some(), "Real"),
+        Transformation::Integer(_) => (kind.and_then(Kind::as_integer).is_some(), "Integer"),
+        Transformation::Boolean { .. } => (matches!(kind, Some(Kind::Boolean(_))), "Boolean"),
     };
-    let kind = tree.variable(&edge.to).map_or("unknown", |variable| variable.kind.element());
-    if expected.contains(&kind) {
+    if fits {
         return Ok(());
     }
-    let expected = expected[0];
+    let kind = kind.map_or("unknown", Kind::element);
     let sentence =
         format!("{} is of type {kind}, the transformation is for {expected}", tree.name(&edge.to));
     Err(at(tree, edge.system, edge.at, sentence))

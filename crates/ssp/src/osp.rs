@@ -196,7 +196,9 @@ impl Loader {
         self.known(simulator).map(|(index, _)| &self.files.fmus[*index].description)
     }
 
-    /// Connects two variables, or a variable and a signal, from output to input.
+    /// Connects two variables, or a variable and a signal, from output to input. Returns an error sentence if an
+    /// end does not exist, if both are outputs or both are inputs, or if the input of a linear transformation
+    /// already has a source.
     fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
         let (source, target) = match (self.is_source(first)?, self.is_source(second)?) {
             (true, false) => (first, second),
@@ -212,7 +214,12 @@ impl Loader {
         };
         match (linear(source), linear(target)) {
             (Some(k), _) => self.linear[k].1.targets.push(target.terminal()),
-            (None, Some(k)) => self.linear[k].1.source = Some(source.terminal()),
+            (None, Some(k)) => {
+                let second = source.terminal();
+                if let Some(first) = self.linear[k].1.source.replace(second.clone()) {
+                    return Err(format!("{target} is connected twice, to {first} and to {second}"));
+                }
+            }
             (None, None) => {
                 let (from, to) = (source.terminal(), target.terminal());
                 self.link(from, to, Transformation::Identity);

@@ -181,8 +181,14 @@ impl Binder<'_> {
         }
         let kind =
             self.tree.connector(target.node, &target.connector).map(|connector| connector.kind);
-        let is_input = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
-        if is_input { self.set_downstream(target, value) } else { self.set_upstream(target, value) }
+        match kind {
+            Some(
+                ConnectorKind::Input
+                | ConnectorKind::Parameter
+                | ConnectorKind::StructuralParameter,
+            ) => self.set_downstream(target, value),
+            _ => self.set_upstream(target, value),
+        }
     }
 
     /// Sets all variables that the connector drives.

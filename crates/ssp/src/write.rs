@@ -102,7 +102,9 @@ impl Exporter {
             return Err(missing(&name, "a name that no other element has", "a second one"));
         }
         let base = ElementBase { name, connectors, bindings, ..base };
-        self.elements.push(Element::Component(Component { base, source, ..Component::default() }));
+        let implementation = element.implementation;
+        let component = Component { base, source, implementation, ..Component::default() };
+        self.elements.push(Element::Component(component));
         Ok(())
     }
 
@@ -239,7 +241,7 @@ impl Exporter {
             missing(terminal.to_string(), expected, "none of that name")
         })?;
         Ok(match &variable.kind {
-            Kind::Real(real) => real.unit.as_deref(),
+            Kind::Real(real) | Kind::Float32(real) => real.unit.as_deref(),
             _ => None,
         })
     }

@@ -129,17 +129,13 @@ impl Number {
         kind: &Kind,
         items: Option<&[(String, i32)]>,
     ) -> Result<String, String> {
+        let (is_real, is_integer) = (kind.as_real().is_some(), kind.as_integer().is_some());
         match (kind, self) {
-            (Kind::Real(_), Number::Real(_) | Number::Integer(_))
-            | (Kind::Integer(_) | Kind::Enumeration(_), Number::Integer(_))
-            | (Kind::Boolean(_), Number::Boolean(_))
-            | (Kind::String(_), Number::Text(_)) => Ok(self.to_text()),
-            (Kind::Integer(_), Number::Real(value))
-                if value.fract() == 0.0 && value.abs() < 2e9 =>
-            {
-                Ok(format!("{value:.0}"))
+            (Kind::Boolean(_), Number::Boolean(_)) | (Kind::String(_), Number::Text(_)) => {
+                Ok(self.to_text())
             }
-            (Kind::Integer(_), Number::Item(_, Some(value))) => Ok(value.to_string()),
+            (_, Number::Real(_) | Number::Integer(_)) if is_real => Ok(self.to_text()),
+            (_, Number::Integer(_)) if is_integer => Ok(self.to_text()),
             (Kind::Enumeration(_), Number::Item(item, value)) => {
                 let number = number_of(item, items).or(if items.is_none() { *value } else { None });
                 number.map(|number| number.to_string()).ok_or_else(|| {
@@ -147,6 +143,15 @@ impl Number {
                     let names: Vec<&str> = names.collect();
                     format!("expected an item of {}, found {item:?}", names.join(", "))
                 })
+            }
+            (_, Number::Item(_, Some(value))) if is_integer => Ok(value.to_string()),
+            (kind, Number::Real(value))
+                if is_integer
+                    && !matches!(kind, Kind::Enumeration(_))
+                    && value.fract() == 0.0
+                    && value.abs() < 2e9 =>
+            {
+                Ok(format!("{value:.0}"))
             }
             _ => {
                 let (kind, text) = (kind.element(), self.to_text());
@@ -165,5 +170,29 @@ impl Number {
             Number::Binary => "binary data".to_owned(),
             Number::Unsupported(words) => words.clone(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::{IntegerType, RealType};
+
+    use super::*;
+
+    #[test]
+    fn numbers_fit_variables_of_all_widths_of_fmi_3() {
+        let (single, wide) =
+            (Kind::Float32(RealType::default()), Kind::UInt64(IntegerType::default()));
+        for (number, kind, expected) in [
+            (Number::Real(2.5), &single, "2.5"),
+            (Number::Integer(3), &single, "3"),
+            (Number::Integer(3), &wide, "3"),
+            (Number::Real(4.0), &wide, "4"),
+            (Number::Item("low".to_owned(), Some(1)), &wide, "1"),
+        ] {
+            assert_eq!(number.text(kind, None).as_deref(), Ok(expected));
+        }
+        let sentence = Number::Real(2.5).text(&wide, None).unwrap_err();
+        assert_eq!(sentence, "expected a value of type UInt64, found 2.5");
     }
 }

@@ -3,6 +3,8 @@
 use std::fs;
 use std::io::Write as _;
 
+use fmu_description::Version;
+use fmu_description::package::{Package, platforms_of};
 use ssp::structure::{ConnectorKind, Dimension, Element, ParameterValue, Type};
 use ssp::{open, read_ssd, read_ssv, render_ssd, render_ssv};
 use zip::ZipWriter;
@@ -87,6 +89,36 @@ fn what_fmi_2_does_not_have_is_named_and_refused_where_it_is_connected() {
         let text = bench.refusal(&root(&component("a", "a.fmu", "", bindings), ""), "");
         assert!(text.ends_with(&format!("expected a value of type Real, found {words}")), "{text}");
     }
+}
+
+/// An FMU of FMI 3.0 with these variables.
+fn fmu_of_fmi_3(bench: &Bench, model: &str, variables: &str, structure: &str) {
+    let mut package = Package::new(format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="t"><CoSimulation modelIdentifier="{model}"/><UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit><Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit></UnitDefinitions><ModelVariables><Float64 name="time" valueReference="0" causality="independent"/>{variables}</ModelVariables><ModelStructure>{structure}</ModelStructure></fmiModelDescription>"#
+    ))
+    .for_version(Version::V3);
+    let library = format!("binaries/{}/{model}.so", platforms_of(Version::V3)[0]);
+    package.add(library, "not a library");
+    package.write(&bench.path(&format!("{model}.fmu"))).unwrap();
+}
+
+#[test]
+fn numbers_of_every_width_of_fmi_3_have_units_and_transformations() {
+    let bench = Bench::new();
+    let outputs = r#"<Float32 name="y" valueReference="1" causality="output" unit="mm"/>
+<Int8 name="n" valueReference="2" causality="output"/>"#;
+    let structure = r#"<Output valueReference="1"/><Output valueReference="2"/>"#;
+    fmu_of_fmi_3(&bench, "a", outputs, structure);
+    let inputs = r#"<Float32 name="u" valueReference="1" causality="input" unit="m" start="0"/>
+<UInt16 name="n" valueReference="2" causality="input" start="0"/>"#;
+    fmu_of_fmi_3(&bench, "b", inputs, "");
+    let elements = component("a", "a.fmu", "y output\nn output", "")
+        + &component("b", "b.fmu", "u input\nn input", "");
+    let mapping = r#"<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>"#;
+    let connections = connection("a.y", "b.u", "", "") + &connection("a.n", "b.n", mapping, "");
+    let opened = bench.open(&root(&elements, &connections), "").unwrap();
+    let expected = ["a.y -> b.u * 0.001 + 0.0", "a.n -> b.n [(1, 2)]"];
+    assert_eq!(links(&opened.assembly), expected);
 }
 
 #[test]

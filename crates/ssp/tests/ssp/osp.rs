@@ -133,6 +133,11 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
             "line 9, column 14: s.in[2] is no signal of the function, expected in[0], ... or out",
         ),
         (
+            r#"<LinearTransformation name="f"/>"#,
+            on("f", "in") + "\n" + &on("f", "in"),
+            "line 10, column 1: f.in is connected twice, to a.y and to a.y",
+        ),
+        (
             "",
             connection("VariableGroup", &[group("a"), group("b")]),
             "line 9, column 14: a has no variable group \"g\", expected one in a_OspModelDescription.xml beside its FMU or beside the system structure",

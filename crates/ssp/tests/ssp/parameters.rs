@@ -220,6 +220,20 @@ fn a_connector_of_a_system_passes_its_value_on_to_what_it_is_connected_to() {
 }
 
 #[test]
+fn a_structural_parameter_of_a_system_sets_what_it_is_connected_to() {
+    let bench = bench();
+    let inner = system(
+        "s",
+        "size structuralParameter",
+        &component("c", "a.fmu", "q parameter", ""),
+        &connection("size", "c.q", "", ""),
+    );
+    let outer = bindings(&[binding("", &real("s.size", "3"), "")]);
+    let opened = bench.open(&(outer + &root(&inner, "")), "").unwrap();
+    assert_eq!(settings(&opened.assembly), ["s.c.q = 3.0"]);
+}
+
+#[test]
 fn values_and_mappings_may_stand_in_files_of_their_own_and_inside_the_fmu() {
     let bench = bench();
     bench.file("sets/a%20b.ssv", "");

@@ -227,7 +227,8 @@ fn assembly(bench: &Bench) -> Assembly {
 #[test]
 fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
     let bench = Bench::new();
-    let assembly = assembly(&bench);
+    let mut assembly = assembly(&bench);
+    assembly.elements[0].implementation = Implementation::CoSimulation;
     let (first, second) = (bench.path("new/first.ssp"), bench.path("second.ssp"));
     write(&assembly, Some(0.5), &first).unwrap();
     write(&assembly, Some(0.5), &second).unwrap();
@@ -248,6 +249,10 @@ fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
         opened.assembly.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["a", "my b", "again"]);
     assert_eq!(opened.assembly.elements[0].fmu, opened.assembly.elements[2].fmu);
+    let interfaces: Vec<_> =
+        opened.assembly.elements.iter().map(|element| element.implementation).collect();
+    let expected = [Implementation::CoSimulation, Implementation::Any, Implementation::Any];
+    assert_eq!(interfaces, expected);
     // An opened assembly, whose FMUs are folders, is written again.
     let third = bench.path("third.ssp");
     write(&opened.assembly, Some(0.5), &third).unwrap();
