@@ -1,15 +1,13 @@
 //! Unit conversions and transformations along connections (SSP 1.0.1, section 4.5.2).
 
-use std::borrow::Cow;
-
 use fmu_description::unit::BaseUnit;
 use fmu_description::{Kind, ModelDescription, ScalarVariable, SimpleType};
 
 use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
 use slave::Transformation;
 
-/// Relative difference of factors below which two units of the same name count as equal: one of the
-/// files states fewer digits.
+/// Two units of the same name count as equal if the factor of their conversion differs from 1, and its offset
+/// from 0, by less than this: one of the files states fewer digits.
 const SAME_FACTOR: f64 = 1e-6;
 
 /// The unit or enumeration of the values at a connector.
@@ -80,9 +78,9 @@ impl Measure {
 /// Returns factor and offset that convert values from the unit of `from` to the unit of `to`; both
 /// units satisfy `base = factor * unit + offset`.
 ///
-/// The result is (1, 0) if one side has no unit, or if both units have the same name and equal
-/// definitions. It is `None` if a definition is missing. It is an error sentence if the units measure
-/// different quantities.
+/// The result is (1, 0) if one side has no unit. For units of the same name it is (1, 0), too, unless both
+/// are defined, measure the same quantity and differ in factor or offset. For units of different names it is
+/// `None` if a definition is missing, and an error sentence if they measure different quantities.
 pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
     const SAME: (f64, f64) = (1.0, 0.0);
     let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {
@@ -108,7 +106,7 @@ pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>
 pub(super) struct ConversionChain {
     pub(super) measure: Measure,
     pub(super) transformation: Transformation,
-    /// Conversions that were skipped, a sentence each.
+    /// One sentence for each conversion that was skipped.
     pub(super) warnings: Vec<String>,
 }
 
@@ -119,7 +117,8 @@ impl ConversionChain {
     }
 
     /// Appends a connection to a connector with the measure `there`: first the unit conversion, unless
-    /// it is suppressed, then the transformation.
+    /// it is suppressed, then the transformation. Returns an error sentence if the units measure different
+    /// quantities, if an enumeration lacks an item, or if transformations of different types follow each other.
     pub(super) fn append(
         self,
         conversion: &Conversion,
@@ -159,7 +158,8 @@ fn linear(factor: f64, offset: f64) -> Transformation {
     }
 }
 
-/// Replaces the names of enumeration items in a transformation by their numbers.
+/// Replaces the names of enumeration items in a transformation by their numbers; returns an error sentence if an
+/// item is unknown. A Boolean that the mapping does not name keeps its value.
 fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transformation, String> {
     Ok(match stated {
         Stated::Linear { factor, offset } => linear(*factor, *offset),
@@ -188,20 +188,20 @@ fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transform
     })
 }
 
-/// Returns the items of an enumeration with numbers of 32 bits, the integers of SSP.
+/// Returns the items of an enumeration; leaves out items whose number does not fit the 32-bit integers of SSP.
 pub(super) fn items_of(declared: &SimpleType) -> Vec<(String, i32)> {
     let small = |(name, value): &(String, i64)| Some((name.clone(), i32::try_from(*value).ok()?));
     declared.items.iter().filter_map(small).collect()
 }
 
-fn listed<'a>(items: &[&'a str]) -> Cow<'a, str> {
+fn listed(items: &[&str]) -> String {
     if items.is_empty() {
-        return "an enumeration, which neither the connector nor the FMU states".into();
+        return "an enumeration, which neither the connector nor the FMU states".to_owned();
     }
-    format!("the enumeration {}", items.join(", ")).into()
+    format!("the enumeration {}", items.join(", "))
 }
 
-/// Composes two transformations: `second` after `first`.
+/// Composes two transformations: `second` after `first`. Returns an error sentence if they are for different types.
 pub(super) fn then(
     first: Transformation,
     second: Transformation,
@@ -233,7 +233,8 @@ fn mapped(pairs: &[(i32, i32)], value: i32) -> i32 {
     pairs.iter().find(|(source, _)| *source == value).map_or(value, |(_, target)| *target)
 }
 
-/// Returns a warning if the file and the FMU state different units for a connector.
+/// Returns a warning if the file and the FMU state different units for a connector, or units of different names
+/// of which one is not defined.
 pub(super) fn contradiction(stated: &Measure, declared: &Measure) -> Option<String> {
     match between(stated, declared) {
         Ok(Some((factor, offset))) if (factor, offset) == (1.0, 0.0) => None,

@@ -10,7 +10,7 @@ use fmu_description::{ParseError, Position};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SspError {
-    /// The XML is not well-formed.
+    /// The file is not XML that can be read.
     #[error(transparent)]
     Xml(#[from] ParseError),
     /// An element has content that SSP does not allow.
@@ -51,10 +51,10 @@ pub enum SspError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// An archive (SSP or FMU) cannot be read.
+    /// An archive (SSP or FMU) cannot be read or written.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// The file exceeds a limit of the reader.
+    /// A file or an archive exceeds a limit.
     #[error("expected at most {limit} {what}, found more{help}")]
     Limit {
         /// The limit.
@@ -77,7 +77,7 @@ pub enum SspError {
 }
 
 impl SspError {
-    /// Adds the name of `file` to an error that has none.
+    /// Adds the name of `file` to an error about the content of a file; returns other errors unchanged.
     #[must_use]
     pub fn in_file(self, file: impl Into<PathBuf>) -> Self {
         match self {

@@ -29,8 +29,9 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Appends the conversion of this connection, and those between the unit that a component states
-    /// and the unit that the system structure which is its source states for the same connector.
+    /// Appends the conversion of this connection. If an end is a component whose source is another system structure,
+    /// also converts between the unit that the component states for the connector and the unit that the system
+    /// structure states.
     fn convert(&self, tree: &Tree, chain: ConversionChain) -> Result<ConversionChain, String> {
         let outside = |vertex: &Vertex| {
             let stated = (self.system != vertex.node).then(|| tree.measure_outside(vertex));
@@ -79,7 +80,8 @@ impl Side {
         }
     }
 
-    /// Returns how often values at the connector may change: 0 never, 1 before the run, 2 during it.
+    /// Returns when values at the connector may change: 0 never, 1 before the run, 2 during it. An unspecified
+    /// connector counts as 0 as a source and as 2 as a target, so that it can be connected to every kind.
     fn rate(&self, as_source: bool) -> u32 {
         use ConnectorKind::{
             CalculatedParameter, Constant, Parameter, StructuralParameter, Unspecified,
@@ -92,7 +94,7 @@ impl Side {
         }
     }
 
-    /// Returns whether a connection from here to `other` is allowed (tables of section 5.3.2.1, SSP 1.0
+    /// Returns whether this connector may be the source of `other` (tables of section 5.3.2.1, SSP 1.0
     /// and 2.0).
     fn can_drive(&self, other: &Side) -> bool {
         let both = (self.kind, other.kind) == (ConnectorKind::Inout, ConnectorKind::Inout);
@@ -107,7 +109,8 @@ impl Side {
 }
 
 impl Flow {
-    /// Determines the direction of every connection and builds the graph.
+    /// Determines the direction of every connection and builds the graph. Returns an error if the ends of a connection
+    /// do not exist or do not fit, or if a connector has two sources; warns about ends that contradict their FMU.
     pub(super) fn new(tree: &Tree, warnings: &mut Vec<String>) -> Result<Self, SspError> {
         let mut flow = Flow { edges: Vec::new(), inbound: HashMap::new() };
         for (system, node) in tree.nodes.iter().enumerate() {
@@ -157,7 +160,8 @@ impl Flow {
         Ok(())
     }
 
-    /// Returns the path of edges to `target`, from an FMU or a connector without inbound connection.
+    /// Returns the path of edges to `target`, from an FMU or a connector without inbound connection; empty if
+    /// `target` has none. A ring of connections without an FMU is an error.
     pub(super) fn upstream(&self, tree: &Tree, target: &Vertex) -> Result<Vec<&Edge>, SspError> {
         let mut path = Vec::new();
         let mut vertex = target;
@@ -194,7 +198,8 @@ impl Flow {
     }
 
     /// Returns the links between FMUs, in the order of the connections that end at an FMU. Warns about
-    /// inputs whose source nothing drives, unless `is_set` says that a parameter binding sets them.
+    /// inputs whose source nothing drives, unless `is_set` returns true for them, and about units that are not
+    /// converted. Returns an error for a ring of connections or a conversion that is not possible.
     pub(super) fn links(
         &self,
         tree: &Tree,
@@ -260,7 +265,8 @@ fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<()
     Err(at(tree, edge.system, edge.at, sentence))
 }
 
-/// Resolves an end of a connection in `system`.
+/// Resolves an end of a connection in `system`; warns if it contradicts its FMU. Returns an error sentence if the
+/// element, the connector or the variable does not exist or cannot be connected.
 fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Result<Side, String> {
     let node = match &end.element {
         None => system,
@@ -315,7 +321,7 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
     Ok(Side { vertex, kind, of_system })
 }
 
-/// Returns the connector kind of an FMI 2.0 causality.
+/// Returns the connector kind of a causality; `None` for local variables and the independent variable.
 pub(super) fn kind_of(causality: Causality) -> Option<ConnectorKind> {
     match causality {
         Causality::Input => Some(ConnectorKind::Input),

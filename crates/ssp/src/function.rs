@@ -135,12 +135,12 @@ fn variable(reference: usize, name: String, causality: Causality) -> ScalarVaria
     }
 }
 
-/// Converts a position to a value reference.
+/// Converts a position to a value reference or index.
 fn number(position: usize) -> u32 {
     u32::try_from(position).unwrap_or(u32::MAX)
 }
 
-/// The value of an input at the last communication point and its derivatives there.
+/// The value of an input at the communication point reached, and the derivatives set for the step from there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Polynomial {
     value: f64,
@@ -159,7 +159,7 @@ pub struct FunctionSlave {
 }
 
 impl FunctionSlave {
-    /// Returns the component `component` of the output.
+    /// Returns the component `component` of the output at the communication point reached.
     fn sum(&self, component: usize) -> f64 {
         let inputs = self.inputs.iter().skip(component).step_by(self.dimension);
         // The sum of one value is this value, -0 included.

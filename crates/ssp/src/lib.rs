@@ -45,16 +45,19 @@ pub struct Opened {
     /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked
     /// FMUs, which exist as long as [`Opened::folders`].
     pub assembly: Assembly,
-    /// `DefaultExperiment`; all fields are `None` if the file has none.
+    /// Start time, stop time and base step that the file states. An OSP file without `BaseStepSize` has a
+    /// base step of 0.1 s.
     pub experiment: DefaultExperiment,
-    /// Elements with the communication step in s that an annotation `osp:StepSizeHint` proposes.
+    /// Names of elements with the communication step in s that the file proposes for them: the annotation
+    /// `osp:StepSizeHint`, or `stepSize` of an OSP file, rounded down to a multiple of the base step.
     pub steps: Vec<(String, f64)>,
     /// Whether the file requests libcosim's fixed-step algorithm: all FMUs step from the same values,
-    /// inputs are constant within a step, and no step is repeated.
+    /// inputs are constant within a step, and no step is repeated. True for every OSP file, and for an SSD
+    /// with `osp:FixedStepAlgorithm` unless this program has written it.
     pub fixed_step: bool,
-    /// Warnings about the files; none of them prevents a run.
+    /// Warnings about the files.
     pub warnings: Vec<String>,
-    /// The unpacked files, removed on drop. Unload the libraries of the FMUs before.
+    /// The unpacked files, removed on drop. Unload the libraries of the FMUs before dropping them.
     pub folders: Folders,
 }
 
@@ -78,7 +81,8 @@ pub struct Folders {
 ///
 /// # Errors
 ///
-/// [`SspError`] with file, line and column.
+/// [`SspError`] if a file cannot be read or exceeds a limit, if an FMU has no library for this platform,
+/// or, with line and column, if the content of a file is invalid, contradictory or not supported.
 pub fn open(path: &Path) -> Result<Opened, SspError> {
     let is_xml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"));
     if is_xml || osp::is_osp_folder(path) {
@@ -87,11 +91,12 @@ pub fn open(path: &Path) -> Result<Opened, SspError> {
     open_variant(path, None)
 }
 
-/// Loads a system structure like [`open`], but uses the SSD called `variant` at the root of the SSP.
+/// Loads an SSP archive or a folder like [`open`], but uses its SSD called `variant`; `None` selects
+/// `SystemStructure.ssd`. If `path` is an SSD file, `variant` is ignored. OSP files are not supported.
 ///
 /// # Errors
 ///
-/// [`SspError`] with file, line and column, also if there is no such SSD.
+/// Same as [`open`], also if there is no such SSD.
 pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspError> {
     let (mut tree, document) = load::load(path, variant)?;
     let mut warnings = std::mem::take(&mut tree.warnings);
@@ -135,7 +140,8 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
     Ok(Opened { assembly, experiment, steps, fixed_step, warnings, folders })
 }
 
-/// Warns about connectors that contradict the variables of their FMUs.
+/// Warns about connectors of components that name no variable of their FMU, have a type that FMI 2.0 does
+/// not have, or contradict the unit or type of their variable.
 fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
     for (index, node) in tree.nodes.iter().enumerate() {
         let Content::Fmu(_) = node.content else { continue };

@@ -48,7 +48,7 @@ pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Docum
     loader.system(&document.structure.system, &document, place)?;
     let Loader { tree, files: Files { fmus, shown, folders, warnings, .. }, .. } = loader;
     let variables = fmus.iter().map(|fmu| {
-        // A name that two variables have stands for the first one.
+        // Of several variables with the same name, the first one counts.
         let all = fmu.description.variables.iter().enumerate().rev();
         all.map(|(position, variable)| (variable.name.clone(), position)).collect()
     });
@@ -256,7 +256,8 @@ impl Loader {
         Ok(node)
     }
 
-    /// Resolves a reference: searches the dictionary in the surrounding system, then further out.
+    /// Adds a reference to a signal dictionary: searches the dictionary in the parent system, then further out. Returns
+    /// an error if there is none.
     fn reference(
         &mut self,
         reference: &DictionaryReference,
@@ -280,7 +281,8 @@ impl Loader {
         Ok(node)
     }
 
-    /// Loads the files of the bindings; `component` is the base of URIs relative to the component.
+    /// Loads the files of the bindings. `component` is the base of URIs relative to the component; without
+    /// it, a binding with such a URI is an error.
     fn bindings(
         &mut self,
         bindings: &[ParameterBinding],
@@ -308,13 +310,14 @@ impl Loader {
     }
 }
 
-/// Returns an error sentence if the FMU cannot run here, before its library is loaded.
+/// Returns an error sentence if the FMU has neither source code nor a library for this platform, or no interface
+/// that a system can use. Loads no library.
 pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
     // A library may be built from source code when the FMU is opened.
     if fmu.has_sources() && identifier(fmu).is_some() { Ok(()) } else { check_library(fmu) }
 }
 
-/// Returns an error sentence if the FMU has no library for this platform.
+/// Returns an error sentence if the FMU has no library for this platform or no interface that a system can use.
 fn check_library(fmu: &Unpacked) -> Result<(), String> {
     let identifier = identifier(fmu).ok_or_else(|| {
         "the FMU lacks an interface, expected the element CoSimulation or ModelExchange".to_owned()
@@ -322,14 +325,14 @@ fn check_library(fmu: &Unpacked) -> Result<(), String> {
     fmu.library(identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 
-/// The name of the library that a system uses.
+/// Returns the name of the library: that of co-simulation, otherwise that of model exchange, if the FMU has either.
 fn identifier(fmu: &Unpacked) -> Option<&str> {
     let (simulation, exchange) = (&fmu.description.co_simulation, &fmu.description.model_exchange);
     let exchange = || exchange.as_ref().map(|flags| flags.model_identifier.as_str());
     simulation.as_ref().map(|flags| flags.model_identifier.as_str()).or_else(exchange)
 }
 
-/// Returns the system with the identifier `id` at any depth.
+/// Returns the first system with the identifier `id`, `system` or one at any depth in it, if there is one.
 fn with_id<'a>(system: &'a System, id: &str) -> Option<&'a System> {
     if system.base.id.as_deref() == Some(id) {
         return Some(system);

@@ -34,7 +34,7 @@ pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
     let path = if path.is_dir() { path.join(DEFAULT) } else { path.to_owned() };
     let outside = Base { folder: PathBuf::new(), shown: PathBuf::new(), archive: None };
     let target = Target::new(path.clone(), path.clone());
-    let mut loader = Loader { base: outside.below(&target), ..Loader::default() };
+    let mut loader = Loader { base: outside.of_file(&target), ..Loader::default() };
     let document = loader.files.read(&target, document::read)?;
     loader.add(&document).map_err(|error| error.in_file(&path))?;
     let Loader { files: Files { fmus, folders, warnings, .. }, assembly, steps, .. } = loader;
@@ -119,8 +119,8 @@ impl Loader {
         Ok(())
     }
 
-    /// Determines the step of a simulator. As in libcosim it is the largest multiple of the base
-    /// step that does not exceed the stated step.
+    /// Adds the step of a simulator that states one. As in libcosim it is the largest multiple of the base
+    /// step that does not exceed the stated step, at least one base step; another step than stated gives a warning.
     fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
         let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
         let ticks = |time: f64| (time / TICK).round();
@@ -136,11 +136,11 @@ impl Loader {
         self.steps.push((simulator.name.clone(), step));
     }
 
-    /// Returns the variable groups of an FMU, from a file beside the FMU or beside the system
-    /// structure.
+    /// Returns the variable groups of an FMU, from a file beside the FMU or else beside the system
+    /// structure; none if there is no such file.
     fn groups(&mut self, fmu: &Target, model: &str) -> Result<Vec<Group>, SspError> {
         let name = format!("{model}_OspModelDescription.xml");
-        let beside = [self.base.below(fmu), self.base.clone()];
+        let beside = [self.base.of_file(fmu), self.base.clone()];
         let files = beside.map(|base| Target::new(base.folder.join(&name), base.shown.join(&name)));
         match files.iter().find(|file| file.path.is_file()) {
             Some(file) => self.files.read(file, groups::read),
@@ -166,7 +166,7 @@ impl Loader {
     }
 
     fn group(&self, end: &End) -> Result<&Group, String> {
-        let (index, groups) = self.known(&end.owner)?;
+        let (index, groups) = self.simulator_entry(&end.owner)?;
         groups::find(groups, &end.name).ok_or_else(|| {
             let model = &self.files.fmus[*index].description.model_name;
             format!(
@@ -177,7 +177,8 @@ impl Loader {
         })
     }
 
-    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group.
+    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group, without
+    /// those of nested groups.
     fn signals(&self, signals: &End, variables: &End) -> Result<Vec<[End; 2]>, String> {
         let group = self.group(variables)?;
         let components = (0..group.variables.len()).map(|k| {
@@ -187,13 +188,13 @@ impl Loader {
         Ok(components.collect())
     }
 
-    fn known(&self, simulator: &str) -> Result<&(usize, Vec<Group>), String> {
-        let known = self.simulators.get(simulator);
-        known.ok_or_else(|| format!("there is no simulator {simulator:?}"))
+    fn simulator_entry(&self, simulator: &str) -> Result<&(usize, Vec<Group>), String> {
+        let entry = self.simulators.get(simulator);
+        entry.ok_or_else(|| format!("there is no simulator {simulator:?}"))
     }
 
     fn description(&self, simulator: &str) -> Result<&ModelDescription, String> {
-        self.known(simulator).map(|(index, _)| &self.files.fmus[*index].description)
+        self.simulator_entry(simulator).map(|(index, _)| &self.files.fmus[*index].description)
     }
 
     /// Connects two variables, or a variable and a signal, from output to input. Returns an error sentence if an

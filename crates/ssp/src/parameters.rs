@@ -103,8 +103,8 @@ impl Binder<'_> {
         let mut known: HashMap<&str, &Parameter> = HashMap::new();
         let mut repeated = BTreeSet::new();
         for parameter in &values.parameters {
-            let before = known.insert(&parameter.name, parameter);
-            if before.is_some_and(|before| before.value != parameter.value) {
+            let earlier = known.insert(&parameter.name, parameter);
+            if earlier.is_some_and(|earlier| earlier.value != parameter.value) {
                 repeated.insert(parameter.name.as_str());
             }
         }
@@ -193,15 +193,15 @@ impl Binder<'_> {
 
     /// Sets all variables that the connector drives.
     fn set_downstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
-        let mut waiting = vec![target];
+        let mut stack = vec![target];
         let mut steps = self.flow.edges.len();
         let mut ends = Vec::new();
-        while let Some(vertex) = waiting.pop() {
+        while let Some(vertex) = stack.pop() {
             for next in self.targets.get(vertex).into_iter().flatten() {
                 steps = steps.checked_sub(1).ok_or("a ring of connections")?;
                 match self.tree.nodes[next.node].content {
                     Content::Fmu(_) => ends.push((*next).clone()),
-                    _ => waiting.push(next),
+                    _ => stack.push(next),
                 }
             }
         }
@@ -220,7 +220,7 @@ impl Binder<'_> {
     }
 
     /// Sets the start value of the output that drives the connector, so that the connector gets
-    /// `value`.
+    /// `value`. Does nothing if no FMU drives the connector.
     fn set_upstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
         let is_fmu =
@@ -264,10 +264,11 @@ impl Binder<'_> {
     }
 }
 
-/// Finds all connectors of `node` with the hierarchical name `name`, which need not be unique.
+/// Adds all variables and connectors below `node` with the hierarchical name `name` to `vertices`. A name may
+/// stand for several of them, because names of elements may contain dots.
 fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
-    let here = &tree.nodes[node];
-    match here.content {
+    let element = &tree.nodes[node];
+    match element.content {
         Content::Fmu(_) => {
             let vertex = Vertex { node, connector: name.to_owned() };
             if tree.variable(&vertex).is_some() {
@@ -279,7 +280,7 @@ fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
                 vertices.push(Vertex { node, connector: name.to_owned() });
             }
             for (position, _) in name.match_indices('.') {
-                if let Some(child) = here.children.get(&name[..position]) {
+                if let Some(child) = element.children.get(&name[..position]) {
                     find(tree, *child, &name[position + 1..], vertices);
                 }
             }
@@ -289,7 +290,7 @@ fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
 }
 
 /// Returns whether a variable may be set before the initialization: an input, or a variable with a
-/// start value.
+/// start value or with `initial` exact or approx, unless [`ScalarVariable::never_set`] excludes it.
 fn settable(variable: &ScalarVariable) -> bool {
     let initial = variable.initial_in_force();
     variable.never_set().is_none()

@@ -15,11 +15,12 @@ use definitions::{conversion, definitions, value_type};
 /// Parses an SSD file.
 ///
 /// Versions 1.x and 2.x are accepted. Geometry, metadata and annotations are skipped, except the
-/// step sizes of `com.opensimulationplatform`.
+/// step sizes of `com.opensimulationplatform`. Warnings are dropped; [`crate::open`] returns them.
 ///
 /// # Errors
 ///
-/// [`SspError`] with line and column, the expected and the found content.
+/// [`SspError`] with line and column if the file is not well-formed or has content that SSP does not allow;
+/// also if it exceeds a limit.
 pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
     ssd(bytes).map(|(read, _)| read)
 }
@@ -51,10 +52,10 @@ pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
     ssb(bytes).map(|(read, _)| read)
 }
 
-/// The parsed content, and warnings with positions about wrong or unknown content.
+/// The parsed content, and warnings with positions about undeclared prefixes and unknown content.
 type Read<T> = Result<(T, Vec<String>), SspError>;
 
-/// Reads the tree of a file; returns warnings about broken rules and unknown content, too.
+/// Parses the XML of a file and checks it against the schema; also returns warnings.
 fn read(bytes: &[u8], space: &str, root: &str) -> Read<Node> {
     let (node, mut warnings) = xml::read(bytes, space, root)?;
     schema::check(&node, &mut warnings);
@@ -137,7 +138,8 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     }))
 }
 
-/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`.
+/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a
+/// single value.
 fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
     if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
         let values = node.children_named("Value").map(|value| value.required("value"));

@@ -106,7 +106,7 @@ fn connector(connector: &Connector) -> Tag {
     }
 }
 
-/// Adds the elements that state the type.
+/// Adds the elements that state the type; of an array, only the dimensions.
 fn of_type(tag: Tag, kind: &Type) -> Tag {
     let element = match kind {
         Type::Real(unit) => Tag::new("ssc:Real").maybe("unit", unit.as_deref()),
@@ -278,7 +278,7 @@ fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
     tag.list(&format!("{space}:Enumerations"), enumerations).list(&format!("{space}:Units"), units)
 }
 
-/// Writes the step size into the annotation that libcosim reads.
+/// Writes the times as attributes, and the step size as the annotation that libcosim reads.
 fn experiment(experiment: &DefaultExperiment) -> Tag {
     let time = |time: Option<f64>| time.map(number);
     let step = experiment.step_size.map(|size| {

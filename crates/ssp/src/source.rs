@@ -8,11 +8,11 @@ use percent_encoding::percent_decode_str;
 /// The base of relative URIs in a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Base {
-    /// The folder, or a folder below it after [`Base::below`].
+    /// The folder at which relative URIs start.
     pub(super) folder: PathBuf,
     /// The folder for messages: `plant.ssp/resources` instead of a temporary folder.
     pub(super) shown: PathBuf,
-    /// The unpacked archive that URIs must not leave.
+    /// The folder of the unpacked archive that contains the file; URIs must not leave it.
     pub(super) archive: Option<PathBuf>,
 }
 
@@ -37,14 +37,14 @@ impl Target {
 }
 
 impl Base {
-    /// Returns the base of a file in the unpacked archive `folder`, shown as `shown`.
+    /// Returns the base of the files at the root of the unpacked archive `folder`, shown as `shown`.
     pub(super) fn archive(folder: &Path, shown: &Path) -> Self {
         let (folder, shown) = (folder.to_owned(), shown.to_owned());
         Base { archive: Some(folder.clone()), folder, shown }
     }
 
     /// Returns the base for URIs in the file `target`.
-    pub(super) fn below(&self, target: &Target) -> Self {
+    pub(super) fn of_file(&self, target: &Target) -> Self {
         let folder = |path: &Path| path.parent().map(Path::to_path_buf).unwrap_or_default();
         Base {
             folder: folder(&target.path),
@@ -130,7 +130,7 @@ impl Base {
     }
 }
 
-/// Returns the URI of the file in `proxyfmu://localhost?file=a.fmu`.
+/// Returns the URI of the file in `proxyfmu://localhost?file=a.fmu`; `None` for other URIs.
 fn proxied(uri: &str) -> Option<&str> {
     let scheme = scheme(uri).filter(|scheme| scheme.eq_ignore_ascii_case("proxyfmu"))?;
     let (_, query) = uri[scheme.len()..].split_once('?')?;
@@ -146,7 +146,7 @@ fn decoded(text: &str) -> Result<String, String> {
     Ok(decoded.into_owned())
 }
 
-/// Returns the scheme of an absolute URI (RFC 3986, section 3.1).
+/// Returns the scheme of an absolute URI (RFC 3986, section 3.1); `None` for a relative one.
 fn scheme(uri: &str) -> Option<&str> {
     let (scheme, _) = uri.split_once(':')?;
     let mut characters = scheme.chars();

@@ -66,7 +66,7 @@ pub struct DefaultExperiment {
 /// `System` (section 5.3).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct System {
-    /// What every element has.
+    /// Name, connectors and parameter bindings.
     pub base: ElementBase,
     /// `Elements`.
     pub elements: Vec<Element>,
@@ -81,7 +81,7 @@ pub struct System {
 pub struct ElementBase {
     /// `name`, unique within the parent system.
     pub name: String,
-    /// `id`, unique in the file.
+    /// `id`. The source `#id` of a component refers to the first system with this `id`.
     pub id: Option<String>,
     /// `Connectors`.
     pub connectors: Vec<Connector>,
@@ -134,7 +134,7 @@ impl Element {
 /// `Component` (section 5.4).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
-    /// What every element has.
+    /// Name, connectors and parameter bindings.
     pub base: ElementBase,
     /// `type`.
     pub content: Content,
@@ -175,7 +175,7 @@ pub enum Implementation {
 /// `SignalDictionaryReference` (section 5.5).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DictionaryReference {
-    /// What every element has.
+    /// Name, connectors and parameter bindings.
     pub base: ElementBase,
     /// `dictionary`: name of a dictionary of the parent system or of one further out.
     pub dictionary: String,
@@ -188,7 +188,7 @@ pub struct DictionarySource {
     pub name: String,
     /// The dictionary.
     pub content: Source<SignalDictionary>,
-    /// Where it begins.
+    /// Position in the file.
     pub at: Place,
 }
 
@@ -265,9 +265,9 @@ pub enum Transformation {
     },
     /// `BooleanMappingTransformation`: source and target of each entry.
     Boolean(Vec<(bool, bool)>),
-    /// `IntegerMappingTransformation`.
+    /// `IntegerMappingTransformation`: source and target of each entry.
     Integer(Vec<(i32, i32)>),
-    /// `EnumerationMappingTransformation`: names of items.
+    /// `EnumerationMappingTransformation`: item names of source and target of each entry.
     Enumeration(Vec<(String, String)>),
 }
 
@@ -280,7 +280,7 @@ pub struct ParameterBinding {
     pub values: Source<ParameterSet>,
     /// `ParameterMapping`; if present, only mapped parameters are applied.
     pub mapping: Option<Source<ParameterMapping>>,
-    /// Where it begins.
+    /// Position in the file.
     pub at: Place,
 }
 
@@ -289,11 +289,12 @@ pub struct ParameterBinding {
 pub enum Source<T> {
     /// In this file.
     Inline(T),
-    /// In a file of its own.
+    /// In another file.
     File {
         /// `source`, a URI.
         uri: String,
-        /// `sourceBase` is `component`: relative to the component, not to the SSD.
+        /// Whether `sourceBase` is `component`: the URI is relative to the component, not to the SSD. Ignored for
+        /// signal dictionaries.
         in_component: bool,
     },
 }
@@ -312,7 +313,7 @@ pub struct ParameterSet {
 /// `Parameter`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// `name`, unique in its set.
+    /// `name`. Of several parameters with the same name, the last one applies.
     pub name: String,
     /// The value.
     pub value: ParameterValue,

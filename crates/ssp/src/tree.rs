@@ -54,7 +54,7 @@ pub(super) struct Node {
     pub(super) bindings: Vec<Binding>,
     /// Step in s that an annotation proposes.
     pub(super) step_size: Option<f64>,
-    /// `implementation`, if the FMU offers this interface.
+    /// `implementation` if the FMU offers this interface, otherwise [`Implementation::Any`].
     pub(super) implementation: Implementation,
     pub(super) content: Content,
 }
@@ -117,7 +117,7 @@ impl Tree {
         Vertex { node, connector: name.to_owned() }
     }
 
-    /// Returns the description of the node's FMU.
+    /// Returns the description of the node's FMU; `None` if the node is not an FMU.
     pub(super) fn description(&self, node: usize) -> Option<&ModelDescription> {
         match self.nodes[node].content {
             Content::Fmu(index) => Some(&self.fmus[index].description),
@@ -125,32 +125,32 @@ impl Tree {
         }
     }
 
-    /// Returns the FMU variable of a connector.
+    /// Returns the FMU variable of a connector; `None` if the node is not an FMU or has no such variable.
     pub(super) fn variable(&self, vertex: &Vertex) -> Option<&ScalarVariable> {
         let Content::Fmu(fmu) = self.nodes[vertex.node].content else { return None };
         let position = *self.variables[fmu].get(&vertex.connector)?;
         self.fmus[fmu].description.variables.get(position)
     }
 
-    /// Whether the FMU of a node cannot have the types of FMI 3.0.
+    /// Returns whether the node is an FMU of FMI 1.0 or 2.0, which do not have the types of FMI 3.0.
     pub(super) fn is_before_fmi3(&self, node: usize) -> bool {
         self.description(node).is_some_and(|description| description.version() != Version::V3)
     }
 
-    /// Whether a connector is a terminal of its FMU, which stands for the variables that are its members.
+    /// Returns whether a connector is a terminal of an FMU; its connection connects all members of the terminal.
     pub(super) fn is_terminal(&self, vertex: &Vertex) -> bool {
         let terminals =
             self.description(vertex.node).map(|description| description.terminals.iter());
         terminals.is_some_and(|mut all| all.any(|terminal| terminal.name == vertex.connector))
     }
 
-    /// Returns the connector as its file declares it.
+    /// Returns the connector as its file declares it; `None` if the file does not declare it.
     pub(super) fn connector(&self, node: usize, name: &str) -> Option<&Connector> {
         let node = &self.nodes[node];
         node.connector_positions.get(name).map(|&position| &node.connectors[position])
     }
 
-    /// Returns the unit or enumeration of a connector: as the file states it, and as the FMU states
+    /// Returns the unit or enumeration of a connector twice: as the file states it, and as the FMU states
     /// it.
     pub(super) fn measures(&self, vertex: &Vertex) -> (Measure, Measure) {
         let node = &self.nodes[vertex.node];
@@ -169,8 +169,8 @@ impl Tree {
         stated.or(declared)
     }
 
-    /// Returns the unit or enumeration that the component states whose source is the system of this
-    /// connector, if there is such a component.
+    /// Returns the unit or enumeration that the component which refers to this system states for the
+    /// connector; `None` if no component refers to the system or if it does not have the connector.
     pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
         let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
         let connector = connectors.iter().find(|connector| connector.name == vertex.connector)?;

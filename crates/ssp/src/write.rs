@@ -29,14 +29,16 @@ pub(super) const TOOL: &str = "aso-ftc";
 /// Writes `assembly` as the SSP archive `target`; creates the folder of `target`.
 ///
 /// The FMUs go into `resources`. The settings of each element go into a parameter set `settings` in
-/// a file of its own, bound to the component. Connectors are the connected variables and the
+/// a separate file, bound to the component. Connectors are the connected variables and the
 /// outputs of type Real, Integer and Boolean, with the types and units of the FMUs. `step_size` in
 /// s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
 ///
 /// # Errors
 ///
-/// [`SspError`] if an element or variable does not exist, if a setting does not have the type of
-/// its variable, or if a file cannot be read or written.
+/// [`SspError`] if the assembly has a function, if two elements have the same name, if an element or
+/// variable does not exist, if a connected variable is local or the independent variable, if a setting does
+/// not have the type of its variable or this type is not one of SSP 1.0, if the archive would exceed 2 GiB, or
+/// if a file cannot be read or written.
 pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Result<(), SspError> {
     if let Some((name, _)) = assembly.functions.first() {
         return Err(missing(name, "an FMU", "a function, which SSP does not have"));
@@ -135,7 +137,8 @@ impl Exporter {
     }
 
     /// Returns the type of a variable and adds its unit or enumeration to the definitions. A unit
-    /// is not stated if the FMU gives only its name, or if another FMU defines it differently.
+    /// is left out if the FMU gives only its name, or if another FMU defines it differently. `None` if SSP 1.0
+    /// does not have the type, or if the enumeration is unknown or another FMU defines it differently.
     fn value_type(
         &mut self,
         variable: &ScalarVariable,
@@ -230,7 +233,7 @@ impl Exporter {
         })
     }
 
-    /// Returns the name of the unit of a variable.
+    /// Returns the name of the unit of a variable, if it has one; an error if the variable does not exist.
     fn unit(&self, terminal: &Terminal) -> Result<Option<&str>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {
@@ -247,7 +250,8 @@ impl Exporter {
     }
 }
 
-/// Converts a setting to a value of the type of its variable.
+/// Converts a setting to a value of the type of its variable. Returns an error if the variable does not exist, or if
+/// its type is not one of SSP 1.0 or does not have the value.
 fn value(
     element: &str,
     setting: &Setting,

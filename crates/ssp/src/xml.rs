@@ -1,7 +1,7 @@
 //! XML elements of the SSP namespaces, with typed access to attributes and children.
 //!
-//! The tree is that of [`fmu_description::xml`], because roxmltree refuses undeclared prefixes, which some
-//! tools write and which are read with a warning. quick-xml resolves the namespaces.
+//! [`fmu_description::xml`] parses the text and quick-xml resolves the namespaces. Undeclared prefixes, which
+//! some tools write, give a warning; roxmltree would refuse them.
 
 use std::collections::HashSet;
 use std::str::FromStr;
@@ -24,7 +24,7 @@ const TAGS: usize = 4_000_000;
 /// The white space of XML.
 const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
 
-/// An element. The SSP namespaces are not distinguished: their names do not collide, and some tools
+/// An element. All SSP namespaces count as one: their element names do not collide, and some tools
 /// write `ssd:Real` for `ssc:Real`.
 #[derive(Debug)]
 pub(super) struct Node {
@@ -38,7 +38,10 @@ pub(super) struct Node {
 }
 
 /// Reads a file whose root element is `root` in the namespace that ends in `space`. Also returns
-/// warnings with positions about prefixes.
+/// a warning with its position for each undeclared prefix.
+///
+/// Returns an error if the file is too large or not well-formed, has another root element, or states a version
+/// other than 1.x and 2.x.
 pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<String>), SspError> {
     if exceeds(bytes.len(), CAPACITY) {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes", help: HELP });
@@ -52,7 +55,8 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     scope.open(&element);
     let namespace = scope.space(&element).unwrap_or_default().to_owned();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    let is_root = namespace == required || (namespace.is_empty() && scope.assumes(&element));
+    let is_root = namespace == required
+        || (namespace.is_empty() && scope.has_assumed_prefix(&element));
     if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,
@@ -111,15 +115,15 @@ impl Scope {
     }
 
     /// Returns whether the element has an undeclared prefix that is usual for SSP.
-    fn assumes(&self, element: &xml::Element) -> bool {
+    fn has_assumed_prefix(&self, element: &xml::Element) -> bool {
         self.space(element).is_none() && PREFIXES.contains(&prefix(element))
     }
 
     fn node(&mut self, element: xml::Element) -> Result<Node, SspError> {
         self.open(&element);
         let space = self.space(&element);
-        let is_ssp =
-            space.is_some_and(|space| space.starts_with(NAMESPACE)) || self.assumes(&element);
+        let is_ssp = space.is_some_and(|space| space.starts_with(NAMESPACE))
+            || self.has_assumed_prefix(&element);
         let prefix = prefix(&element);
         let is_known = space.is_some() || prefix.is_empty();
         if !is_known && !self.undeclared.iter().any(|(known, _)| known == prefix) {
@@ -194,7 +198,8 @@ impl Node {
         value.ok_or_else(|| self.wrong(format!("the attribute {name}"), "none"))
     }
 
-    /// Parses the attribute `name` with `read`, which returns `None` for invalid text.
+    /// Parses the attribute `name`, without the white space around it, with `read`, which returns `None` for
+    /// invalid text. Returns `None` if the attribute is absent.
     fn parsed<T>(
         &self,
         name: &str,
@@ -216,24 +221,24 @@ impl Node {
         value.split(WHITE_SPACE).filter(|word| !word.is_empty())
     }
 
-    /// Reads an `xs:long` or `xs:unsignedLong`.
+    /// Reads an integer of up to 128 bits; `None` if the attribute is absent.
     pub(super) fn long(&self, name: &str) -> Result<Option<i128>, SspError> {
         self.parsed(name, "an integer", |text| i128::from_str(text).ok())
     }
 
-    /// Reads a finite `xs:double`.
+    /// Reads a finite `xs:double`; `None` if the attribute is absent.
     pub(super) fn number(&self, name: &str) -> Result<Option<f64>, SspError> {
         let finite = |text: &str| f64::from_str(text).ok().filter(|value| value.is_finite());
         self.parsed(name, "a finite number", finite)
     }
 
-    /// Reads an `xs:int`.
+    /// Reads an `xs:int`; `None` if the attribute is absent.
     pub(super) fn integer(&self, name: &str) -> Result<Option<i32>, SspError> {
         let expected = "an integer from -2147483648 to 2147483647";
         self.parsed(name, expected, |text| i32::from_str(text).ok())
     }
 
-    /// Reads an `xs:boolean`.
+    /// Reads an `xs:boolean`; `None` if the attribute is absent.
     pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>, SspError> {
         self.parsed(name, "true, false, 1 or 0", |text| match text {
             "true" | "1" => Some(true),
@@ -242,7 +247,7 @@ impl Node {
         })
     }
 
-    /// Reads a required attribute with one of the methods above.
+    /// Reads the attribute `name` with `read`; returns an error if it is absent.
     pub(super) fn needed<T>(
         &self,
         name: &str,
@@ -266,7 +271,7 @@ impl Node {
         self.ssp_children().filter(move |child| child.name == name)
     }
 
-    /// Returns the child called `name`; more than one is an error.
+    /// Returns the child called `name` in an SSP namespace, if there is one; more than one is an error.
     pub(super) fn child(&self, name: &str) -> Result<Option<&Node>, SspError> {
         let mut children = self.children_named(name);
         let first = children.next();

@@ -1,4 +1,4 @@
-//! Reads files; each file is read once even if several elements refer to it.
+//! Reads files. Each file except those of signal dictionaries is read once even if several elements refer to it.
 
 use std::collections::HashMap;
 use std::fs;
@@ -56,7 +56,8 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Returns the SSD at a path given by the user, or the SSD `fragment` of an SSP.
+    /// Returns the SSD at a path given by the user: an SSD file, or in a folder or SSP the SSD `fragment`, by default
+    /// `SystemStructure.ssd`.
     pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
         if target.path.is_dir() {
@@ -68,7 +69,8 @@ impl Files {
         self.referred(target, &outside, !is_ssd)
     }
 
-    /// Returns the SSD that a component refers to.
+    /// Returns the SSD that a component refers to: the file `target` or, in an `archive`, its SSD `fragment`,
+    /// by default `SystemStructure.ssd`. `base` is the base of the file that contains the component.
     pub(super) fn referred(
         &mut self,
         target: &Target,
@@ -76,7 +78,7 @@ impl Files {
         archive: bool,
     ) -> Result<Rc<Document>, SspError> {
         if !archive {
-            return self.ssd(target, base.below(target));
+            return self.ssd(target, base.of_file(target));
         }
         let folder = self.unpacked(target)?;
         let base = Base::archive(&folder, &target.shown);
@@ -105,7 +107,7 @@ impl Files {
         Ok(document)
     }
 
-    /// Unpacks an SSP; returns its folder.
+    /// Returns the folder of an unpacked SSP; unpacks it on the first call and adds its warnings.
     fn unpacked(&mut self, target: &Target) -> Result<PathBuf, SspError> {
         if let Some(known) = self.archives.get(&target.path) {
             return Ok(known.clone());
@@ -124,7 +126,7 @@ impl Files {
         self.warnings.extend(sentences.map(|text| format!("{}: {text}", shown.display())));
     }
 
-    /// Returns the index of the FMU `target`, an archive or a folder.
+    /// Returns the index of the FMU `target`, an archive or a folder; opens it on the first call and adds its warnings.
     pub(crate) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
         if let Some(known) = self.fmu_indices.get(&target.path) {
             return Ok(*known);
@@ -208,7 +210,7 @@ impl Files {
     }
 }
 
-/// Replaces the path of the unpacked copy in the error by the name that the user knows.
+/// Replaces the path of the unpacked copy in the error by the name that the user knows, or adds the name.
 fn with_shown_path(error: PackageError, target: &Target) -> SspError {
     let path = target.shown.clone();
     let is_itself = |named: &Path| named == target.path;
@@ -226,7 +228,7 @@ fn with_shown_path(error: PackageError, target: &Target) -> SspError {
     error.into()
 }
 
-/// Lists the SSD files at the root of an unpacked SSP.
+/// Lists up to ten SSD files at the root of an unpacked SSP.
 fn definitions_in(folder: &Path) -> String {
     let names = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_ssd = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ssd");

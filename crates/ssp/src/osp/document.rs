@@ -51,11 +51,11 @@ pub(super) enum Kind {
     Sum(Sum),
 }
 
-/// A connection of two variables, of a variable and a signal of a function, or of two groups.
+/// A connection of two variables, of a variable and a signal of a function, or of two groups of them.
 #[derive(Debug)]
 pub(super) struct Connection {
     pub(super) ends: [End; 2],
-    /// Whether the ends are groups of variables.
+    /// Whether the ends are groups of variables or signals.
     pub(super) groups: bool,
     pub(super) at: Position,
 }

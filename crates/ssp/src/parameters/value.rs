@@ -25,7 +25,7 @@ pub(super) enum Number {
     /// An item of an enumeration, with its number if the file defines it.
     Item(String, Option<i32>),
     Binary,
-    /// The description of a value whose type FMI 2.0 does not have.
+    /// The description of an array or of an integer beyond 32 bits; no variable can be set to it.
     Unsupported(String),
 }
 
@@ -60,7 +60,9 @@ impl Value {
         Value { number, measure }
     }
 
-    /// Converts the unit, then applies the transformation of a mapping; also returns warnings.
+    /// Converts the unit to that of `there`, then applies the transformation of a mapping; also returns warnings.
+    /// Returns an error sentence if the units measure different quantities or if the transformation is for
+    /// another type.
     pub(super) fn convert(
         self,
         conversion: &Conversion,
@@ -112,7 +114,8 @@ impl Number {
         })
     }
 
-    /// Applies the inverse of `transformation`.
+    /// Applies the inverse of `transformation`. Returns an error sentence unless `transformation` is the identity, or
+    /// linear with a factor other than zero for a Real.
     pub(super) fn inverted(&self, transformation: &Transformation) -> Result<Number, String> {
         match (transformation, self) {
             (Transformation::Identity, _) => Ok(self.clone()),
@@ -123,7 +126,8 @@ impl Number {
         }
     }
 
-    /// Returns the text of a setting for a variable of type `kind`.
+    /// Returns the text of a setting for a variable of type `kind` with the enumeration `items`; an error sentence if
+    /// the value does not fit the type.
     pub(super) fn text(
         &self,
         kind: &Kind,

@@ -44,7 +44,8 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
     Ok(Unit { name: node.required("name")?.to_owned(), base })
 }
 
-/// Reads the type that a child element states.
+/// Reads the type that child elements state: an array if there are dimensions, otherwise a clocked value if a clock
+/// is named, otherwise the element type. `None` if no type is stated; two element types are an error.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     let mut stated = None;
     for child in node.ssp_children() {
@@ -68,7 +69,7 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     Ok(array(node)?.or_else(|| clocked(node)).or(stated))
 }
 
-/// Reads the dimensions; `None` if there is exactly one element in all.
+/// Reads the dimensions; `None` if there are none or if all have the size 1.
 fn array(node: &Node) -> Result<Option<Type>, SspError> {
     let dimensions = node.children_named("Dimension").map(|dimension| {
         let expected = "a size of at least 0 and below 2^64";
@@ -85,13 +86,13 @@ fn array(node: &Node) -> Result<Option<Type>, SspError> {
     Ok((!is_one).then_some(Type::Array(dimensions)))
 }
 
-/// Reads the clock of a clocked value.
+/// Reads the clock of a clocked value; `None` if no clock is named.
 fn clocked(node: &Node) -> Option<Type> {
     let clock = node.children_named("Clock").find_map(|clock| clock.attribute("name"))?;
     Some(Type::Clocked(clock.to_owned()))
 }
 
-/// Reads the transformation in a child element and `suppressUnitConversion`.
+/// Reads the transformation in a child element, if there is one, and `suppressUnitConversion`.
 pub(super) fn conversion(node: &Node) -> Result<Conversion, SspError> {
     let mut transformation = None;
     for child in node.ssp_children().filter(|child| child.name.ends_with("Transformation")) {

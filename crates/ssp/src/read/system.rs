@@ -91,7 +91,7 @@ fn component(node: &Node) -> Result<Component, SspError> {
     })
 }
 
-/// Returns the source of a component; empty if it has none.
+/// Returns the source of a component; empty if the attribute is absent. An empty attribute is an error.
 fn source_of(node: &Node) -> Result<String, SspError> {
     match node.attribute("source") {
         Some("") => Err(node.wrong("the path of a file in the attribute source", "nothing")),
@@ -170,7 +170,8 @@ fn media_type(node: &Node, known: &str) -> Result<(), SspError> {
     }
 }
 
-/// Reads the URI in `source`, otherwise the inline content.
+/// Reads the URI in the attribute `source` of `node`, or the element `content` of `inline`. Returns an error if
+/// both or neither are stated.
 fn source<T>(
     node: &Node,
     inline: Option<&Node>,
@@ -210,10 +211,10 @@ pub(super) fn experiment(node: &Node) -> Result<DefaultExperiment, SspError> {
     Ok(experiment)
 }
 
-/// Returns the annotation of the Open Simulation Platform.
+/// Returns the first annotation of the Open Simulation Platform, if there is one.
 fn annotation(node: &Node) -> Result<Option<&Node>, SspError> {
     let list = node.child("Annotations")?.into_iter().flat_map(Node::ssp_children);
-    let is_theirs =
+    let is_osp =
         |annotation: &&Node| annotation.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);
-    Ok(list.into_iter().find(is_theirs))
+    Ok(list.into_iter().find(is_osp))
 }

@@ -1,11 +1,11 @@
-//! Elements that quick-xml writes once the tree is whole: the root states the version of SSP that its
-//! content needs, so the content is known before the first tag is written.
+//! A tree of elements that quick-xml writes when it is complete, because the root states the version of SSP that
+//! its content requires.
 
 use fmu_description::xml::writable;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
-/// What the prefixes mean. Importers compare prefixes: these are the usual ones.
+/// The prefixes with their namespaces. Some importers compare prefixes, so these are the usual ones.
 const PREFIXES: [(&str, &str); 6] = [
     ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
     ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
@@ -53,7 +53,7 @@ impl Tag {
         self
     }
 
-    /// Marks the element as one that SSP 1.0 does not have.
+    /// If `is_newer`, marks the element as one that SSP 1.0 does not have.
     pub(super) fn newer(mut self, is_newer: bool) -> Self {
         self.newer |= is_newer;
         self
@@ -107,6 +107,6 @@ impl Tag {
 }
 
 fn write(writer: &mut Writer<Vec<u8>>, event: Event<'_>) {
-    // Exporter into memory cannot fail.
+    // Writing into memory cannot fail.
     let _ = writer.write_event(event);
 }

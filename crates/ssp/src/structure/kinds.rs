@@ -20,7 +20,7 @@ pub enum ConnectorKind {
     Constant,
     /// `local` (SSP 2.0).
     Local,
-    /// `unspecified` (SSP 2.0): the connection determines the kind.
+    /// `unspecified` (SSP 2.0): the variable of the FMU determines the kind, otherwise the connection.
     Unspecified,
 }
 
@@ -74,7 +74,7 @@ pub enum Type {
     Clock,
     /// An array with these dimensions (SSP 2.0), of any element type.
     Array(Vec<Dimension>),
-    /// A value that belongs to the clock of this name (SSP 2.0).
+    /// A value of any type that belongs to the clock of this name (SSP 2.0).
     Clocked(String),
 }
 
@@ -115,7 +115,7 @@ impl Type {
 pub enum ParameterValue {
     /// `Real` with its `unit`; of SSP 2.0 also `Float64` and `Float32`.
     Real(f64, Option<String>),
-    /// `Integer`; of SSP 2.0 also `Int8` to `UInt64`.
+    /// `Integer`; of SSP 2.0 also `Int8` to `UInt64` with a value that fits.
     Integer(i32),
     /// `Boolean`.
     Boolean(bool),
@@ -125,7 +125,7 @@ pub enum ParameterValue {
     Enumeration(String, Option<String>),
     /// `Binary`, which FMI 2.0 does not have, in hexadecimal digits.
     Binary(String),
-    /// An integer of more than 32 bits (SSP 2.0), which FMI 2.0 does not have.
+    /// `Int8` to `UInt64` (SSP 2.0) with a value beyond `i32`, which FMI 2.0 does not have.
     Long(i128),
     /// An array (SSP 2.0), which FMI 2.0 does not have: the name of the element that states the
     /// type, and the values as text.
