@@ -1,7 +1,7 @@
 //! Conversion of stated values to the units of the variables.
 
 use fmu_description::unit::{BaseUnit, Unit};
-use fmu_description::{Kind, ModelDescription, ScalarVariable};
+use fmu_description::{ModelDescription, ScalarVariable};
 
 use super::Reason;
 
@@ -27,7 +27,8 @@ impl Conversion {
     }
 
     /// Returns the conversion from the unit `stated` to the unit of `variable`, called `name`; the
-    /// identity if no unit is stated.
+    /// identity if no unit is stated. Returns an error if the variable has no unit, or if the units are unknown or
+    /// measure different quantities.
     pub(super) fn find(
         stated: Option<&str>,
         name: &str,
@@ -36,7 +37,7 @@ impl Conversion {
     ) -> Result<Self, Reason> {
         let Some(stated) = stated else { return Ok(Self::NONE) };
         let name = name.to_owned();
-        let Some(unit) = unit_of(variable, description) else {
+        let Some(unit) = variable.kind.as_real().and_then(|real| real.unit.as_deref()) else {
             return Err(Reason::NoUnit { name, stated: stated.to_owned() });
         };
         if unit == stated {
@@ -53,20 +54,8 @@ impl Conversion {
     }
 }
 
-/// Returns the name of the unit of a Real: its own, or the unit of its type.
-fn unit_of<'a>(variable: &'a ScalarVariable, description: &'a ModelDescription) -> Option<&'a str> {
-    let Kind::Real(real) = &variable.kind else { return None };
-    let declared = || {
-        let name = real.declared_type.as_ref()?;
-        match &description.types.iter().find(|one| one.name == *name)?.kind {
-            Kind::Real(kind) => kind.unit.as_deref(),
-            _ => None,
-        }
-    };
-    real.unit.as_deref().or_else(declared)
-}
-
-/// Returns the base of a unit: from the definition in the FMU, or from the name.
+/// Returns the base of a unit: from the definition in the FMU, otherwise from the name. Returns an error if the
+/// FMU does not define the unit and the name is not one.
 fn base_of(name: &str, description: &ModelDescription) -> Result<BaseUnit, Reason> {
     let defined = description.units.iter().find(|unit| unit.name == name);
     if let Some(base) = defined.and_then(|unit| unit.base) {

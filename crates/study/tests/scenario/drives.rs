@@ -225,6 +225,15 @@ fn integers_of_every_width_follow_a_file_within_their_range() {
 }
 
 #[test]
+fn the_unit_of_a_value_is_converted_to_that_of_a_float32() {
+    let (mut system, calls) = of_fmi_3();
+    let text = r#"scenario.set = [{ variable = "fmu.single", at = 0, value = 5, unit = "km" }]"#;
+    let mut prepared = scenario(text).resolve(&system, &setup(here())).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.0).unwrap();
+    assert_eq!(take(&calls), ["real [4] [5000.0]"]);
+}
+
+#[test]
 fn a_repeated_step_sets_its_values_again() {
     let (mut system, plant, _) = system();
     let text = r#"scenario.set = [{ variable = "plant.F_c", at = 1, value = 7 }]"#;

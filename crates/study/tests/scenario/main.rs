@@ -131,12 +131,13 @@ fn system() -> (System, Calls, Calls) {
 fn of_fmi_3() -> (System, Calls) {
     let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="Listener" instantiationToken="t">
         <CoSimulation modelIdentifier="L"/>
+        <UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit></UnitDefinitions>
         <ModelVariables>
         <Float64 name="time" valueReference="0" causality="independent"/>
         <Int8 name="small" valueReference="1" causality="input" start="0"/>
         <UInt32 name="large" valueReference="2" causality="input" start="0"/>
         <Int64 name="wide" valueReference="3" causality="input" start="0"/>
-        <Float32 name="single" valueReference="4" causality="input" start="0"/>
+        <Float32 name="single" valueReference="4" causality="input" unit="m" start="0"/>
         </ModelVariables><ModelStructure/></fmiModelDescription>"#;
     let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
     let mut system = System::default();
