@@ -18,15 +18,15 @@ use crate::link::link as link_ports;
 pub struct AssembledSystem {
     /// The FMUs and their connections.
     pub system: System,
-    /// Times and step size stated in an SSP.
+    /// Times and base step that the system structure states.
     pub experiment: DefaultExperiment,
-    /// FMUs by name, each with the communication step in s that an SSP proposes for it.
+    /// FMUs by name, each with the communication step in s that the system structure proposes for it.
     pub steps: Vec<(String, f64)>,
-    /// Whether the SSP requests libcosim's fixed-step algorithm.
+    /// Whether the system structure requests libcosim's fixed-step algorithm.
     pub fixed_step: bool,
-    /// The SSP with the folders to which it was unpacked; keep it as long as the system.
+    /// The system structure with the folders of its unpacked FMUs; keep it as long as the system.
     pub opened: Option<Arc<Opened>>,
-    /// FMUs by name that are integrated through their model-exchange interface, with the method.
+    /// FMUs by name that the master integrates by model exchange, with the method.
     pub integrated: Vec<(String, Solver)>,
 }
 
@@ -34,8 +34,8 @@ pub struct AssembledSystem {
 ///
 /// # Errors
 ///
-/// Returns an error if a file cannot be read, an FMU cannot be instantiated, or a connection or a
-/// setting does not fit.
+/// Returns an error if a file cannot be read, the system has no FMU, an FMU cannot be instantiated, or a
+/// connection or a setting does not fit.
 pub fn assemble(
     loaded: &LoadedConfig,
     options: &AssemblyOptions<'_>,
@@ -43,11 +43,11 @@ pub fn assemble(
     assemble_with(loaded, options, Vec::new())
 }
 
-/// Like [`assemble`], with further `slaves`, by name, that are no FMUs.
+/// Like [`assemble`], with further `slaves`, by name, that are not FMUs. With slaves, the system needs no FMU.
 ///
 /// # Errors
 ///
-/// Same as [`assemble`]; also if a slave has the name of an FMU.
+/// Same as [`assemble`]; also if a slave has the name of an FMU or of another slave.
 pub fn assemble_with(
     loaded: &LoadedConfig,
     options: &AssemblyOptions<'_>,
@@ -98,7 +98,8 @@ pub fn assemble_with(
     Ok(AssembledSystem { system, experiment, steps, fixed_step, opened, integrated })
 }
 
-/// Applies the settings of structural parameters, or those of all other variables.
+/// Applies the settings of structural parameters or, if `structural` is false, those of all other variables: first
+/// the settings of the system structure, then those of the configuration, which override them.
 fn apply_settings(
     system: &mut System,
     loaded: &LoadedConfig,
@@ -127,7 +128,7 @@ fn apply_settings(
     Ok(())
 }
 
-/// Opens the system on which the configuration builds.
+/// Opens the system structure on which the configuration builds, and logs its warnings.
 fn open(path: &Path) -> Result<Opened, Error> {
     let opened = ssp::open(path)?;
     let folder = path.parent().unwrap_or(path).to_string_lossy();
@@ -147,8 +148,8 @@ fn element(name: &str, path: &Path) -> Element {
 }
 
 /// Makes the connections. A connection of the configuration takes precedence over one of `links` to
-/// the same input. If none are stated, connects variables of equal names and, with `by_unit`, of
-/// equal units.
+/// the same input. If the configuration states neither connections nor a system structure, connects variables
+/// of equal names and, with `by_unit`, of equal units.
 fn connect(
     system: &mut System,
     loaded: &LoadedConfig,
@@ -158,8 +159,8 @@ fn connect(
     let config = &loaded.config;
     let mut connected = HashSet::new();
     let mut stated_links = Vec::new();
-    for wire in config.connections.iter().flatten() {
-        let ConnectionEntry { from, to, factor, offset } = wire.get_ref();
+    for entry in config.connections.iter().flatten() {
+        let ConnectionEntry { from, to, factor, offset } = entry.get_ref();
         let pairs = system.pairs(from.get_ref(), to.get_ref()).map_err(|error| {
             let is_known = system.pairs(from.get_ref(), from.get_ref()).is_ok();
             let place = if is_known { to.span() } else { from.span() };
@@ -181,7 +182,7 @@ fn connect(
                 transformation,
                 units_settled: stated,
             };
-            stated_links.push((wire.span(), link));
+            stated_links.push((entry.span(), link));
         }
     }
     for link in links.iter().filter(|link| !connected.contains(&link.to)) {
@@ -190,11 +191,12 @@ fn connect(
     for (place, link) in &stated_links {
         link_ports(system, link).map_err(|error| loaded.point(place, error))?;
     }
-    let alone = config.connections.is_none() && config.system.is_none();
-    if alone && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }
+    let unstated = config.connections.is_none() && config.system.is_none();
+    if unstated && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }
 }
 
-/// Connects variables of equal names and, with `by_unit`, of equal units.
+/// Connects variables of equal names and, with `by_unit`, of equal units; warns about each connection by unit, and if
+/// there are no connections.
 fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
     let by_name = system.connect_equal_names()?;
     let by_unit = if by_unit { system.connect_equal_units()? } else { Vec::new() };

@@ -12,14 +12,14 @@ use crate::table::Table;
 pub struct AssemblyOptions<'a> {
     /// Whether the FMUs log everything.
     pub logging: bool,
-    /// Whether free outputs and inputs of equal units are connected.
+    /// Whether outputs and inputs of equal units are connected if the configuration states no connections.
     pub by_unit: bool,
     /// The log of FMI calls, if any.
     pub log_calls: Option<&'a CallLog>,
-    /// FMUs that are already open, which further runs may use too.
+    /// FMUs and system structures that several runs share, if any.
     pub store: Option<&'a Store>,
-    /// The program that becomes the separate process of an FMU; default: this program.
+    /// The program to start as the separate process of an FMU; default: this program.
     pub worker: Option<&'a Path>,
-    /// Tables in memory that the scenario reads, each with the path of the file whose place it takes.
+    /// Tables in memory that the scenario reads instead of files, each with the path of the file.
     pub tables: &'a [(PathBuf, Table)],
 }

@@ -17,7 +17,7 @@ use format::Format;
 /// Part of the `mimeType` of the operations of a CAN bus.
 const CAN: &str = "fmi-ls-bus.can";
 
-/// A terminal that sends: its variables.
+/// The variables by which a terminal of a CAN bus sends.
 #[derive(Clone, Copy, Debug)]
 struct Sender {
     slave: usize,
@@ -27,27 +27,31 @@ struct Sender {
     bus: usize,
 }
 
-/// A trace that is being written.
+/// A trace to which frames are added during the run.
 pub(crate) struct BusTrace(Arc<Mutex<Writer>>);
 
 struct Writer {
     path: PathBuf,
     file: File,
-    /// Buffer for a frame, which is written at once: a run that is killed loses none.
+    /// Buffer for a frame. Each frame is written to the file at once, so that a run that is killed loses none.
     bytes: Vec<u8>,
     format: Format,
-    /// The frames of the present instant: several terminals of a bus send the same one.
-    instant: (f64, Vec<(usize, Operation)>),
+    /// The present time in s, and the frames of this instant with their bus: several terminals of a bus may send
+    /// the same frame, which is written once.
+    time: f64,
+    frames: Vec<(usize, Operation)>,
+    /// The first error of a write; no frame is written after it.
     failed: Option<std::io::Error>,
 }
 
 impl BusTrace {
-    /// Creates the file at `path`; `.asc`, `.log` or `.pcapng` selects its format. Writes the frames of all CAN buses of
-    /// `system`: those that a simulation of the bus passes on or, if there is none, those that the nodes send.
+    /// Creates the file at `path` and its folder; the extension `.asc`, `.log` or `.pcapng` selects the format. During
+    /// the run, the trace gets the frames of all CAN buses of `system`: the frames that an FMU which simulates the bus
+    /// passes on or, without such an FMU, the frames that the nodes send.
     ///
     /// # Errors
     ///
-    /// [`Error`] if the file cannot be written, if its extension is another one, or if there is no CAN bus.
+    /// [`Error`] if the file cannot be written, if it has another extension, or if there is no CAN bus.
     pub(crate) fn create(path: &Path, system: &mut System) -> Result<Self, Error> {
         let format = Format::of(path)?;
         let senders = senders(system);
@@ -62,16 +66,16 @@ impl BusTrace {
         let mut file = File::create(path).map_err(Error::file("create", path))?;
         let buses = 1 + senders.iter().map(|sender| sender.bus).max().unwrap_or_default();
         let mut bytes = Vec::new();
-        let begun = format.begin(&mut bytes, buses).and_then(|()| file.write_all(&bytes));
-        begun.map_err(Error::file("write", path))?;
-        let (path, instant) = (path.to_owned(), (f64::NAN, Vec::new()));
-        let writer = Writer { path, file, bytes, format, instant, failed: None };
+        let start = format.write_start(&mut bytes, buses).and_then(|()| file.write_all(&bytes));
+        start.map_err(Error::file("write", path))?;
+        let (path, time, frames) = (path.to_owned(), f64::NAN, Vec::new());
+        let writer = Writer { path, file, bytes, format, time, frames, failed: None };
         let writer = Arc::new(Mutex::new(writer));
         let shared = writer.clone();
         let mut bytes = [Vec::new()];
         system.observe_events(Box::new(move |slave, time, instance| {
             for sender in senders.iter().filter(|sender| sender.slave == slave) {
-                if sent(sender, instance, &mut bytes)? {
+                if read_operations(sender, instance, &mut bytes)? {
                     let mut writer = shared.lock().unwrap_or_else(PoisonError::into_inner);
                     writer.add(time, sender.bus, &bytes[0]);
                 }
@@ -81,11 +85,11 @@ impl BusTrace {
         Ok(Self(writer))
     }
 
-    /// Ends the trace.
+    /// Checks that all frames so far were written.
     ///
     /// # Errors
     ///
-    /// [`Error`] if a frame could not be written.
+    /// [`Error`] with the path if a frame could not be written; each error is returned once.
     pub(crate) fn finish(&self) -> Result<(), Error> {
         let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let failed = writer.failed.take();
@@ -93,8 +97,8 @@ impl BusTrace {
     }
 }
 
-/// Reads what a terminal sends in this event; returns whether it does.
-fn sent(
+/// Reads the operations that a terminal sends in this event into `bytes`; returns whether there are any.
+fn read_operations(
     sender: &Sender,
     instance: &mut dyn Slave,
     bytes: &mut [Vec<u8>; 1],
@@ -109,38 +113,39 @@ fn sent(
 }
 
 impl Writer {
-    /// Adds the frames of the operations in `bytes`.
+    /// Writes the operations in `bytes` that `bus` has not had at `time` yet.
     fn add(&mut self, time: f64, bus: usize, bytes: &[u8]) {
-        if self.instant.0.to_bits() != time.to_bits() {
-            self.instant = (time, Vec::new());
+        if self.time.to_bits() != time.to_bits() {
+            self.time = time;
+            self.frames.clear();
         }
         for operation in Operation::read(bytes) {
             let frame = (bus, operation);
-            if self.failed.is_some() || self.instant.1.contains(&frame) {
+            if self.failed.is_some() || self.frames.contains(&frame) {
                 continue;
             }
             self.bytes.clear();
-            let composed = self.format.operation(&mut self.bytes, time, bus, &frame.1);
-            let written = composed.and_then(|()| self.file.write_all(&self.bytes));
-            self.failed = written.err();
-            self.instant.1.push(frame);
+            let result = self.format.write_operation(&mut self.bytes, time, bus, &frame.1);
+            self.failed = result.and_then(|()| self.file.write_all(&self.bytes)).err();
+            self.frames.push(frame);
         }
     }
 }
 
-/// A terminal of a CAN bus, with the names of the variables by which it is connected.
+/// A terminal of a CAN bus, with the names of its variables `Tx_Data` and `Rx_Data`, by which it is connected.
 struct Node {
     sender: Sender,
-    sends: String,
-    receives: Option<String>,
+    output: String,
+    input: Option<String>,
 }
 
-/// Returns the terminals whose frames are those of the buses: of a bus that is simulated, those of its simulation.
+/// Returns the terminals whose frames are traced: of a bus that an FMU simulates the terminals of this FMU, of other
+/// buses all terminals. The buses are numbered from 0.
 fn senders(system: &System) -> Vec<Sender> {
     let nodes = nodes(system);
     let links = links(system, &nodes);
     let mut senders: Vec<Sender> = nodes.into_iter().map(|node| node.sender).collect();
-    // Linked terminals get the same number, the least one.
+    // Linked terminals get the same bus number, the smaller one.
     let mut changed = true;
     while std::mem::take(&mut changed) {
         for &(one, other) in &links {
@@ -166,7 +171,7 @@ fn is_simulation(system: &System, slave: usize) -> bool {
     system.slaves[slave].1.description().is_bus_simulation
 }
 
-/// Returns all terminals of CAN buses, each as a bus of its own.
+/// Returns all terminals of CAN buses; each has a bus number that no other has.
 fn nodes(system: &System) -> Vec<Node> {
     let mut nodes = Vec::new();
     for (slave, (_, instance)) in system.slaves.iter().enumerate() {
@@ -185,8 +190,8 @@ fn nodes(system: &System) -> Vec<Node> {
                 let (clock, reference) = (clock.value_reference, data.value_reference);
                 nodes.push(Node {
                     sender: Sender { slave, clock, data: reference, bus: nodes.len() },
-                    sends: data.name.clone(),
-                    receives: variable("Rx_Data").map(|variable| variable.name.clone()),
+                    output: data.name.clone(),
+                    input: variable("Rx_Data").map(|variable| variable.name.clone()),
                 });
             }
         }
@@ -194,16 +199,17 @@ fn nodes(system: &System) -> Vec<Node> {
     nodes
 }
 
-/// Returns the pairs of terminals on one bus: those that are connected, and those of a simulation of a bus.
+/// Returns pairs of terminals on the same bus, as positions in `nodes`: terminals that are connected, and terminals of
+/// the same FMU if it simulates a bus.
 fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
     let mut links = Vec::new();
     for connection in &system.connections {
         let (from, to) = (connection.from, connection.to);
         let (source, target) = (&system.variable(from).name, &system.variable(to).name);
-        let sends = |node: &Node| node.sender.slave == from.slave && node.sends == *source;
-        let receives =
-            |node: &Node| node.sender.slave == to.slave && node.receives.as_ref() == Some(target);
-        links.extend(nodes.iter().position(sends).zip(nodes.iter().position(receives)));
+        let is_source = |node: &Node| node.sender.slave == from.slave && node.output == *source;
+        let is_target =
+            |node: &Node| node.sender.slave == to.slave && node.input.as_ref() == Some(target);
+        links.extend(nodes.iter().position(is_source).zip(nodes.iter().position(is_target)));
     }
     for (one, node) in nodes.iter().enumerate() {
         let slave = node.sender.slave;

@@ -32,7 +32,8 @@ const LARGEST_FILE: u64 = 64 << 20;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Config {
-    /// An SSP, an SSD or a folder with one, on which the configuration builds.
+    /// A system structure on which the configuration builds: an SSP, an SSD, an `OspSystemStructure.xml`, or a folder
+    /// with an SSD or an `OspSystemStructure.xml`.
     pub system: Option<PathBuf>,
     /// Shared libraries loaded first, whose symbols are visible to the FMUs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -43,10 +44,11 @@ pub struct Config {
     /// Paths of FMUs by name.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub fmus: Ordered<PathBuf>,
-    /// The interfaces of FMUs that offer both, by name; default: co-simulation.
+    /// The interfaces of FMUs, by name; default: the interface that the system structure states, otherwise
+    /// co-simulation if the FMU offers it.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub interface: Ordered<Interface>,
-    /// The integration methods of model-exchange FMUs, by name; default: automatic.
+    /// The integration methods of FMUs that run by model exchange, by name; default: automatic.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub solver: Ordered<Solver>,
     /// Connections. If neither they nor `system` are stated, variables of equal names are
@@ -103,8 +105,8 @@ impl LoadedConfig {
         Ok(Self { config, source: Some(source) })
     }
 
-    /// Adds the location `place` in the file to `error`. Values of the command line have no
-    /// location.
+    /// Adds the location `place` in the file to `error`. Returns `error` unchanged if the configuration comes from no
+    /// file or if `place` is empty, as it is for values of the command line.
     #[must_use]
     pub fn point(&self, place: &Place, error: impl Into<Error>) -> Error {
         let error = error.into();
@@ -151,23 +153,23 @@ impl Config {
         connections.try_for_each(|entry| entry.get_ref().check(&entry.span()))
     }
 
-    /// Prepends `folder` to relative paths.
+    /// Prepends `folder` to relative paths, except those of `preload`.
     pub fn rebase(&mut self, folder: &Path) {
         self.each_path(|path| *path = folder.join(&*path));
     }
 
-    /// Makes every path absolute, so that the configuration is valid in any folder.
+    /// Makes every path except those of `preload` absolute, so that the configuration is valid in any folder.
     ///
     /// # Errors
     ///
     /// Returns an error if the current folder cannot be determined.
     pub fn make_absolute(&mut self) -> std::io::Result<()> {
-        let mut done = Ok(());
+        let mut result = Ok(());
         self.each_path(|path| match std::path::absolute(&*path) {
             Ok(absolute) => *path = absolute,
-            Err(error) => done = Err(error),
+            Err(error) => result = Err(error),
         });
-        done
+        result
     }
 
     /// Checks that a run writes no file that it reads, and no file twice. `inputs` and `outputs` are
@@ -175,7 +177,7 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// Returns an error that names both files.
+    /// Returns an error that names both files if they are the same.
     pub fn check_outputs(
         &self,
         inputs: &[(&str, &Path)],

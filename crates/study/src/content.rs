@@ -1,4 +1,4 @@
-//! An opened FMU, for instances in this process or in others.
+//! An opened FMU, for instances in this process or in separate processes.
 
 use fmu_description::ModelDescription;
 use fmu_import::{Fmu, isolate};
@@ -8,7 +8,7 @@ use fmu_import::{Fmu, isolate};
 pub(crate) enum Content {
     /// Its library is loaded into this process.
     Loaded(Fmu),
-    /// Its instances run in processes of their own.
+    /// Each instance runs in a separate process.
     Isolated(isolate::Package),
 }
 
@@ -20,7 +20,8 @@ impl Content {
         }
     }
 
-    /// Whether several runs of a process can use it.
+    /// Returns whether several runs of this process can use the FMU: it can be instantiated several times per process,
+    /// or its instances run in separate processes.
     pub(crate) fn is_reusable(&self) -> bool {
         let description = self.description();
         let (simulation, exchange) = (description.stepped(), description.model_exchange.as_ref());

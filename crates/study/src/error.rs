@@ -46,7 +46,7 @@ pub enum Error {
     /// A file cannot be read or written.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// The action that failed: "read" or "write".
+        /// The action that failed, for example "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
@@ -56,10 +56,10 @@ pub enum Error {
     /// An entry of a scenario is wrong.
     #[error(transparent)]
     Scenario(#[from] crate::scenario::ScenarioError),
-    /// A pattern of variables to record matches none.
+    /// A name or pattern of variables to record matches none.
     #[error(transparent)]
     Selection(#[from] SelectionError),
-    /// An error with its context, such as an FMU or an entry.
+    /// An error with its context, such as an FMU or an entry. Its message is the context only.
     #[error("{what}")]
     Within {
         /// The context.
@@ -67,7 +67,7 @@ pub enum Error {
         /// The error.
         source: Box<Error>,
     },
-    /// A requested setting is invalid.
+    /// A setting, a file or a request is invalid; the sentence states the reason.
     #[error("{0}")]
     Invalid(String),
 }

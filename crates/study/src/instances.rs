@@ -1,4 +1,4 @@
-//! Instances of the FMUs of a system: their interface, their process.
+//! Creates the instances of the FMUs of a system: chooses interface and process, and opens the FMUs.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,8 @@ use crate::content::Content;
 use crate::error::Error;
 use crate::store::Store;
 
-/// Instantiates the FMUs; returns the system, and the FMUs that are integrated with their method.
+/// Instantiates the FMUs; returns the system, and the names of the FMUs that the master integrates, with the method.
+/// Returns an error if an option does not fit, or if an FMU cannot be opened or instantiated.
 pub(crate) fn instantiate(
     elements: &[Element],
     config: &Config,
@@ -55,20 +56,20 @@ pub(crate) fn instantiate(
         ..Default::default()
     };
     let (log, store, opened) = (options.log_calls, options.store, HashMap::new());
-    let mut opening = Opening { isolation, log, store, opened };
+    let mut opener = FmuOpener { isolation, log, store, opened };
     let (mut system, mut integrated) = (System::default(), Vec::new());
     for element in elements {
         let name = &element.name;
         let stated = stated_interface(element, config);
-        let content = opening.open(element, config)?;
+        let content = opener.open(element, config)?;
         let interface = choose_interface(element, content.description(), config, stated)?;
         let method = (interface == Interface::ModelExchange)
             .then(|| config.solver.get(name).copied().unwrap_or_default());
         integrated.extend(method.map(|method| (name.clone(), method)));
         let slave: Box<dyn Slave> = match (&content, method) {
-            (Content::Isolated(package), method) => opening.isolated(element, package, method)?,
-            (Content::Loaded(fmu), None) => opening.co_simulation(element, fmu)?,
-            (Content::Loaded(fmu), Some(method)) => opening.model_exchange(element, fmu, method)?,
+            (Content::Isolated(package), method) => opener.isolated(element, package, method)?,
+            (Content::Loaded(fmu), None) => opener.co_simulation(element, fmu)?,
+            (Content::Loaded(fmu), Some(method)) => opener.model_exchange(element, fmu, method)?,
         };
         system.add(name, slave)?;
     }
@@ -102,7 +103,7 @@ fn check_names(elements: &[Element], config: &Config) -> Result<(), Error> {
     }
 }
 
-/// Returns the interface that the configuration or the system structure states.
+/// Returns the interface that the configuration or else the system structure states, if either does.
 fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
     let stated = config.interface.get(&element.name).copied();
     stated.or(match element.implementation {
@@ -112,7 +113,8 @@ fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
     })
 }
 
-/// Returns the interface to use: the stated one, otherwise co-simulation if the FMU offers it.
+/// Returns the interface to use: the stated one if the FMU offers it, otherwise co-simulation if the FMU offers it,
+/// otherwise model exchange. Returns an error if the FMU does not offer the interface that the configuration states.
 fn choose_interface(
     element: &Element,
     description: &ModelDescription,
@@ -130,7 +132,7 @@ fn choose_interface(
     };
     match stated {
         Some(interface) if offers(interface) => Ok(interface),
-        // A system structure states the interface of the FMU that the configuration replaced.
+        // The system structure stated it for an FMU that the configuration has replaced.
         Some(_) if config.interface.get(&element.name).is_none() => Ok(default),
         Some(interface) => Err(Error::Invalid(format!(
             "interface.{}: {} offers {} only, found {}",
@@ -144,15 +146,15 @@ fn choose_interface(
 }
 
 /// Opens the FMUs; unpacks an FMU only once if several elements use it.
-struct Opening<'a> {
+struct FmuOpener<'a> {
     isolation: isolate::Options,
     log: Option<&'a CallLog>,
     store: Option<&'a Store>,
     opened: HashMap<&'a PathBuf, Content>,
 }
 
-impl<'a> Opening<'a> {
-    /// Returns the FMU of an element.
+impl<'a> FmuOpener<'a> {
+    /// Returns the FMU of an element: opened before, from the store, or opened now.
     fn open(&mut self, element: &'a Element, config: &Config) -> Result<Content, Error> {
         let isolate = config.isolation.isolate == Some(true);
         if let Some(content) = self.opened.get(&element.fmu) {
@@ -160,18 +162,17 @@ impl<'a> Opening<'a> {
         }
         let compiled = config.compile.then(|| compiled(element)).transpose()?;
         let path = compiled.as_ref().unwrap_or(&element.fmu);
-        let opening =
-            || if isolate { open_package(element, path) } else { open_fmu(element, path) };
+        let open = || if isolate { open_package(element, path) } else { open_fmu(element, path) };
         let content = match self.store {
-            Some(store) => store.fmu(path, isolate, opening)?,
-            None => opening()?,
+            Some(store) => store.fmu(path, isolate, open)?,
+            None => open()?,
         };
         self.opened.insert(&element.fmu, content.clone());
         Ok(content)
     }
 
-    /// Creates an instance in a separate process, integrated there by `method` if it is one for model
-    /// exchange.
+    /// Creates an instance in a separate process: for co-simulation, or for model exchange if there is a `method`,
+    /// which then integrates it there. Returns an error for model exchange with a log of calls.
     fn isolated(
         &self,
         element: &Element,
@@ -193,7 +194,7 @@ impl<'a> Opening<'a> {
         });
         let slave = package.instantiate(&element.name, &options);
         let slave = slave.map_err(|error| as_shown(error.into(), element))?;
-        Ok(self.logged(element, Box::new(slave)))
+        Ok(self.with_call_log(element, Box::new(slave)))
     }
 
     /// Creates a co-simulation instance in this process.
@@ -204,7 +205,7 @@ impl<'a> Opening<'a> {
         if self.isolation.logging {
             switch_logging_on(&element.name, &mut slave);
         }
-        Ok(self.logged(element, Box::new(slave)))
+        Ok(self.with_call_log(element, Box::new(slave)))
     }
 
     /// Creates a model-exchange instance in this process, integrated by `method`.
@@ -227,7 +228,7 @@ impl<'a> Opening<'a> {
         Ok(Box::new(slave))
     }
 
-    fn logged(&self, element: &Element, slave: Box<dyn Slave>) -> Box<dyn Slave> {
+    fn with_call_log(&self, element: &Element, slave: Box<dyn Slave>) -> Box<dyn Slave> {
         match self.log {
             Some(log) => Box::new(log.listen(&element.name, slave)),
             None => slave,
@@ -235,14 +236,14 @@ impl<'a> Opening<'a> {
     }
 }
 
-/// Returns the FMU of an element with a library for this platform, built if it has source code only.
+/// Returns the path of the FMU of an element with a library for this platform, built if it has source code only.
 fn compiled(element: &Element) -> Result<PathBuf, Error> {
     let compiled = fmu_import::compile(&element.fmu);
     compiled.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
 }
 
 /// Opens the FMU of an element for separate processes. Warnings about an FMU in an SSP were already
-/// logged when the SSP was opened.
+/// with_call_log when the SSP was opened.
 fn open_package(element: &Element, path: &Path) -> Result<Content, Error> {
     let opened = isolate::Package::open(path);
     let package = opened.map_err(|error| Error::from(error).within(&element.name))?;
@@ -252,7 +253,8 @@ fn open_package(element: &Element, path: &Path) -> Result<Content, Error> {
     Ok(Content::Isolated(package))
 }
 
-/// Opens the FMU of an element in this process, with warnings as [`open_package`].
+/// Opens the FMU of an element in this process. Warnings about an FMU in an SSP were already logged when the SSP was
+/// opened.
 fn open_fmu(element: &Element, path: &Path) -> Result<Content, Error> {
     let opened = match &element.shown {
         Some(_) => Fmu::open_quietly(path),
@@ -262,7 +264,8 @@ fn open_fmu(element: &Element, path: &Path) -> Result<Content, Error> {
     opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
 }
 
-/// Replaces the unpacked path of an FMU in an error by the path that the user knows.
+/// Replaces the unpacked path of an FMU in an error by the path that the user knows; the result is then
+/// [`Error::Invalid`].
 fn as_shown(error: Error, element: &Element) -> Error {
     match &element.shown {
         Some(shown) => {

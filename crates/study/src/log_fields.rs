@@ -9,13 +9,13 @@ use tracing::field::{Field, Visit};
 pub struct LogFields {
     /// The text.
     pub message: String,
-    /// The instance name of the FMU; empty if the message is of no FMU.
+    /// The instance name of the FMU; empty for messages that come from no FMU.
     pub instance: String,
-    /// The category that the FMU states.
+    /// The category that the FMU states; empty if it states none.
     pub category: String,
-    /// Simulated time in s.
+    /// Simulated time in s, if stated.
     pub time: Option<f64>,
-    /// All further fields, as `, name = value`.
+    /// All further fields except `lost`, each as `, name = value`.
     pub others: String,
 }
 

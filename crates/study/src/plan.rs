@@ -12,13 +12,14 @@ use toml::Spanned;
 use crate::assemble::AssembledSystem;
 use crate::config::{Config, ConnectionEntry, Every};
 
-/// Largest default number of rows with fixed steps.
+/// Largest default number of intervals between rows with fixed steps.
 const ROWS: f64 = 1e4;
-/// Default length of a run in s if no stop time is stated, as in FMPy.
+/// Length of a run in s if nothing states a stop time after its start, as in FMPy.
 const LENGTH: f64 = 1.0;
-/// Smallest number of spacings of times that a step has without a warning.
+/// A step of fewer spacings between neighbouring floating-point times gives a warning.
 const STEP_RESOLUTION: f64 = 50.0;
-/// Largest relative distance of a proposed step from a multiple of the communication step.
+/// Relative tolerance: of a proposed step to a multiple of the communication step, and of the length of a run to
+/// [`ROWS`] steps.
 const NEAR: f64 = 1e-6;
 
 /// All settings of a run, stated or chosen.
@@ -31,11 +32,12 @@ pub struct Plan {
     pub stop: f64,
     /// Interval between rows.
     pub every: Every,
-    /// One sentence for each setting that the user did not state.
+    /// Sentences on the settings that the user did not state, with the reason for each choice.
     pub reasons: Vec<String>,
 }
 
-/// Chooses all settings that are not stated and completes `config` with them.
+/// Chooses all settings that are not stated and completes `config` with them, also with the connections of the system
+/// unless the configuration builds on a system structure or states connections.
 ///
 /// # Errors
 ///
@@ -75,7 +77,7 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     Ok(Plan { algorithm, experiment, stop, every, reasons })
 }
 
-/// Explains the tolerance that each FMU receives.
+/// If no tolerance is stated, explains the tolerance that an FMU receives from its `DefaultExperiment`.
 fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<String>) {
     if stated.is_some() {
         return;
@@ -88,7 +90,7 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
     }
 }
 
-/// Checks the communication step before other settings are derived from it.
+/// Checks that a stated communication step is finite and above 0, before other settings are derived from it.
 fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
     match request.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
@@ -111,8 +113,8 @@ fn warn_of_resolution(step: f64, latest: f64) {
     }
 }
 
-/// Fills in libcosim's fixed-step algorithm if the system structure requests it and nothing else is
-/// stated.
+/// If the system structure requests libcosim's fixed-step algorithm, fills in its method, extrapolation and coupling
+/// where nothing else is stated.
 fn propose_algorithm(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -121,40 +123,44 @@ fn propose_algorithm(
     if !assembled.fixed_step {
         return;
     }
-    let open =
+    let is_incomplete =
         request.method.is_none() || request.extrapolation.is_none() || request.coupling.is_none();
     request.method.get_or_insert(Method::Jacobi);
     request.extrapolation.get_or_insert(Extrapolation::Hold);
     request.coupling.get_or_insert(Coupling::Once);
-    if open {
+    if is_incomplete {
         let sentence = "the system structure asks for libcosim's fixed steps: jacobi, extrapolation hold, \
              coupling once, where nothing else is stated";
         reasons.push(sentence.to_owned());
     }
 }
 
-/// Fills in the steps that an SSP proposes if none are stated.
+/// Fills in the steps that the system structure proposes. If no communication step is stated, it is the base step,
+/// otherwise the smallest step proposed for an FMU. FMUs step every several communication steps if the request states
+/// neither such multiples nor step control, iteration or events, and if no algebraic loop is to be iterated.
 fn propose_steps(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
     reasons: &mut Vec<String>,
 ) {
-    let sound = |step: &f64| *step > 0.0 && step.is_finite();
-    let hints = assembled.steps.iter().filter(|(_, step)| sound(step));
+    let is_valid = |step: &f64| *step > 0.0 && step.is_finite();
+    let hints = assembled.steps.iter().filter(|(_, step)| is_valid(step));
     if request.step.is_none() {
         let least = hints.clone().map(|(_, step)| *step).reduce(f64::min);
-        request.step = assembled.experiment.step_size.filter(sound).or(least);
+        request.step = assembled.experiment.step_size.filter(is_valid).or(least);
         if let Some(step) = request.step {
             reasons.push(format!("step {step} s: from the system structure"));
         }
     }
-    let plain = request.step_control.is_none_or(|control| control == StepControl::Fixed)
+    let allows_multiples = request.step_control.is_none_or(|control| control == StepControl::Fixed)
         && request.coupling.is_none_or(|coupling| coupling == Coupling::Once)
         && request.next_event.is_empty()
         && request.crossing.is_empty()
         && (request.coupling.is_some()
             || by_direct_dependencies(&assembled.system).looped.is_empty());
-    let Some(step) = request.step.filter(|_| plain && request.every.is_empty()) else { return };
+    let Some(step) = request.step.filter(|_| allows_multiples && request.every.is_empty()) else {
+        return;
+    };
     for (name, proposed) in hints {
         let multiple = (proposed / step).round();
         if multiple >= 2.0 && (proposed / step - multiple).abs() < NEAR * multiple {
@@ -176,7 +182,9 @@ fn count(multiple: f64) -> u32 {
     multiple as u32
 }
 
-/// Returns start and stop time in s: stated by the user, by the system structure, or by the FMUs.
+/// Returns start and stop time in s: stated by the user, otherwise by the system structure, otherwise the
+/// earliest start and the latest stop after it of all FMUs. Without any of them, a run starts at 0 s and has
+/// the length [`LENGTH`].
 fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>) -> (f64, f64) {
     let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
     let defaults = || {
@@ -220,8 +228,8 @@ fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>
     (start, stop)
 }
 
-/// Chooses the interval between rows: each communication point, unless that gives more than
-/// [`ROWS`] rows.
+/// Chooses the interval between rows: every communication point, unless fixed steps give more than
+/// [`ROWS`] intervals.
 fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every {
     if algorithm.control == StepControl::Fixed && length > ROWS * algorithm.step * (1.0 + NEAR) {
         let interval = length / ROWS;

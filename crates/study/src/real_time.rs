@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use fmu_description::number::seconds;
 
-/// Longest sleep between two checks whether the wait ends early.
+/// Longest sleep before the next check whether the wait ends early.
 const SLICE: Duration = Duration::from_millis(50);
 /// Remaining wait in which the clock is read in a loop, because a sleep may end late by about this
 /// time.
@@ -46,13 +46,13 @@ pub struct RealTime {
 pub struct Overruns {
     /// The factor of real time.
     pub factor: f64,
-    /// Number of steps.
+    /// Number of steps so far.
     pub steps: u64,
     /// Number of steps that ended after their instant.
     pub count: u64,
     /// Largest time in s by which a step ended after its instant.
     pub largest: f64,
-    /// Simulated time in s at the end of that step.
+    /// Simulated time in s at the end of that step; 0 without overruns.
     pub at: f64,
 }
 
@@ -111,7 +111,8 @@ impl RealTime {
         }
     }
 
-    /// Shifts all later instants by the time `paused`, in which the run was held.
+    /// Delays all later instants by the time `paused` that the run was paused. Does nothing before the first call of
+    /// [`RealTime::wait`].
     pub fn shift(&mut self, paused: Duration) {
         if let Some((_, start)) = &mut self.start
             && let Some(later) = start.checked_add(paused)

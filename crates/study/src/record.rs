@@ -16,37 +16,39 @@ use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Sele
 use crate::config::Every;
 use crate::store::lock;
 
-/// All open results files, so that they can be completed when the process ends.
+/// All open results files, so that their rows can be written when the process ends.
 static FILES: Mutex<Files> = Mutex::new(Files { open: Vec::new(), is_watched: false });
 /// Longest time that a row stays in memory while the run makes no further one.
 const STALL: Duration = Duration::from_millis(250);
-/// Number of attempts to lock a file when the process ends, and the pause between them.
+/// Number of attempts to lock a file when the process ends.
 const TRIES: u32 = 50;
+/// Pause between two attempts to lock a file.
 const PAUSE: Duration = Duration::from_millis(10);
 
 struct Files {
     open: Vec<Weak<Mutex<Recording>>>,
-    /// Whether [`write_stalled`] runs.
+    /// Whether the thread of [`write_stalled`] runs.
     is_watched: bool,
 }
 
 impl Files {
-    /// Returns the open files.
+    /// Returns the open files, and forgets the others.
     fn open(&mut self) -> Vec<Arc<Mutex<Recording>>> {
         self.open.retain(|file| file.strong_count() > 0);
         self.open.iter().filter_map(Weak::upgrade).collect()
     }
 }
 
-/// An open results file. The end of the process can take it over.
+/// An open results file, shared by its recorder, [`write_stalled`] and [`keep_results`].
 struct Recording {
     path: PathBuf,
-    /// `None` after the file was completed.
+    /// `None` after the file was completed or its recorder dropped, or after [`keep_results`].
     sink: Option<Box<dyn Sink>>,
-    /// Whether a row was recorded since the last look of [`write_stalled`], and whether rows were before.
+    /// Whether a row was recorded since the last check of [`write_stalled`].
     recent: bool,
+    /// Whether a row was recorded between the two checks before, so that it may not be in the file yet.
     pending: bool,
-    /// The error of a write by [`write_stalled`].
+    /// The error of a write by [`write_stalled`], which the next call returns.
     failed: Option<ResultsError>,
 }
 
@@ -68,7 +70,7 @@ impl Recording {
     }
 }
 
-/// The recorder of a run: writes variables to a results file at given intervals.
+/// The recorder of a run: writes the values of variables to a results file or another sink at a given interval.
 pub struct Recorder {
     recording: Arc<Mutex<Recording>>,
     due: Due,
@@ -77,11 +79,12 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recorder of `ports` to the file at `path`; `None` if nothing is recorded.
+    /// Creates a recorder of `ports` to the file at `path` for a run that starts at `start` s; `None` if `every` is
+    /// [`Every::Never`]. Leaves out variables that their FMUs refuse to read, with a warning for each.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if an FMU fails or if the file cannot be created.
     pub fn create(
         path: &Path,
         simulation: &mut Simulation,
@@ -96,7 +99,7 @@ impl Recorder {
         let mut files = lock(&FILES);
         files.open.push(Arc::downgrade(&recorder.recording));
         if !files.is_watched {
-            // Without the thread, rows are written with the next row only.
+            // If the thread cannot start, rows are written with later rows only.
             let watch = thread::Builder::new().name("results".to_owned()).spawn(write_stalled);
             files.is_watched = watch.is_ok();
         }
@@ -104,12 +107,12 @@ impl Recorder {
         Ok(Some(recorder))
     }
 
-    /// Creates a recorder of `ports` to the sink that `make` returns for their columns; `None` if
-    /// nothing is recorded.
+    /// Like [`Recorder::create`], but writes to the sink that `make` returns for the columns of the variables.
+    /// [`keep_results`] does not write these rows.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if an FMU fails or if `make` fails.
     pub fn with_sink(
         simulation: &mut Simulation,
         ports: &[Port],
@@ -131,7 +134,7 @@ impl Recorder {
         Ok(Some(Self { recording, due, readout, slow }))
     }
 
-    /// Restores the time of the next row in a resumed run.
+    /// Restores the schedule of the next rows in a resumed run.
     pub fn set_due(&mut self, due: &Due) {
         self.due = due.clone();
     }
@@ -142,43 +145,44 @@ impl Recorder {
         &self.due
     }
 
-    /// Records a row if one is due at the time of `simulation`.
+    /// Records a row if one is due at the time of `simulation`. Call it once for each communication point, in order.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if an FMU fails or if the file cannot be written.
     #[inline]
     pub fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
         if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
-    /// Reads the start values of slaves that step every several communication steps. Call it before every
-    /// [`Simulation::step`].
+    /// Reads the values of slaves that step every several communication steps, if their step starts now. Call it before
+    /// every [`Simulation::step`].
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if an FMU fails.
     #[inline]
     pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         Ok(self.slow.before_step(simulation)?)
     }
 
-    /// Lets the rows follow the driven variables of now, after a change of the scenario.
+    /// Makes the rows show the values of all variables that the scenario drives now. Call it after a change of the
+    /// scenario.
     pub(crate) fn follow(&mut self, simulation: &Simulation) {
         simulation.follow(&mut self.readout);
     }
 
-    /// Returns the state of the recording for a checkpoint.
+    /// Returns the recorded values of slaves that step every several communication steps, for a checkpoint.
     pub fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
         self.slow.state(simulation.system())
     }
 
-    /// Restores the state of the recording in a resumed run.
+    /// Restores the state that [`Recorder::slow_state`] returned, in a resumed run.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if an FMU fails.
     pub fn restore(&mut self, simulation: &mut Simulation, state: &SlowState) -> Result<(), Error> {
         Ok(self.slow.restore(simulation, state)?)
     }
@@ -195,16 +199,16 @@ impl Recorder {
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if the file cannot be written now or could not be written since the last call.
     pub fn flush(&mut self) -> Result<(), Error> {
         Ok(lock(&self.recording).flush()?)
     }
 
-    /// Completes the file.
+    /// Completes the file. Does nothing after [`keep_results`].
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if the file cannot be written now or could not be written since the last call.
     pub fn finish(self) -> Result<(), Error> {
         let mut recording = lock(&self.recording);
         let failed = recording.failed.take().map_or(Ok(()), Err);
@@ -215,13 +219,13 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        // Now, and not when `write_stalled` lets go of the recording.
+        // `write_stalled` may still hold the recording, so close the file here.
         drop(lock(&self.recording).sink.take());
     }
 }
 
-/// Writes the rows of files whose run has made no row for some time: an FMU may take long for its step,
-/// or for ever, and nobody knows how the process ends. Returns when no file is open.
+/// Writes the rows of files whose run has recorded no further row for [`STALL`], because an FMU may need long for its
+/// step or hang until the process is killed. Returns when no file is open.
 fn write_stalled() {
     loop {
         thread::sleep(STALL);
@@ -233,7 +237,7 @@ fn write_stalled() {
             return;
         }
         for file in open {
-            // The run is writing.
+            // A locked file is being written by its run.
             let Ok(mut recording) = file.try_lock() else { continue };
             let was_recent = std::mem::take(&mut recording.recent);
             if !was_recent && recording.pending {
@@ -245,7 +249,7 @@ fn write_stalled() {
     }
 }
 
-/// Returns `ports` without the variables that their FMUs refuse to read, with a warning for each.
+/// Returns `ports` without the variables that their FMUs refuse to read, and logs a warning for each of those.
 fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>, Error> {
     let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
     for (port, error) in &refused {
@@ -256,7 +260,8 @@ fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>,
 }
 
 /// Writes the rows of all open files when the process is about to end; returns each file with the
-/// result. No recorder writes a row afterwards.
+/// result. No recorder of these files writes a row afterwards. Leaves out files that another thread keeps
+/// locked for half a second, and all files if their list is locked.
 pub fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     let files = match FILES.try_lock() {
         Ok(mut files) => files.open(),
@@ -265,7 +270,7 @@ pub fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     files.iter().filter_map(|file| keep(file)).collect()
 }
 
-/// Writes the rows of a file if its thread releases the lock in time.
+/// Writes the rows of a file; `None` if the file stays locked or is already completed.
 fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> {
     for _ in 0..TRIES {
         let mut recording = match file.try_lock() {
@@ -310,18 +315,18 @@ pub fn unit(system: &System, port: Port) -> Option<String> {
     }
 }
 
-/// Returns the variables selected by `record` and not by `exclude`. A pattern matches inputs,
-/// outputs and locals; a name may be any variable.
+/// Returns the variables selected by `record` and not by `exclude`; without `record`, all inputs, outputs and locals. A
+/// pattern matches inputs, outputs and locals; a name may be any variable.
 ///
 /// # Errors
 ///
-/// Returns an error if a name or a pattern matches no variable.
+/// Returns an error if a name or a pattern matches no variable, or if `exclude` leaves none.
 pub fn select(system: &System, record: &[String], exclude: &[String]) -> Result<Vec<Port>, Error> {
     let shown = [Causality::Input, Causality::Output, Causality::Local];
     let mut ports: Vec<Port> =
         shown.into_iter().flat_map(|causality| system.ports(causality)).collect();
     ports.sort_by_key(|port| (port.slave, port.variable));
-    // A name that two variables have stands for the first one.
+    // Of several variables with the same name, the first one counts.
     let mut known = HashSet::new();
     ports.retain(|port| known.insert(system.name(*port)));
     for name in record {

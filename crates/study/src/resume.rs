@@ -6,8 +6,8 @@ use master::{Checkpoint, Scenario, Simulation, System, SystemError};
 use crate::error::Error;
 use crate::plan::Plan;
 
-/// Restores the simulation of `checkpoint`. Returns an error or logs a warning if settings differ
-/// from the first run.
+/// Restores the simulation of `checkpoint`. Returns an error if the system or a setting does not fit the checkpoint;
+/// logs a warning if the stop time is later than the FMUs know, or if the run is already at its end.
 pub(crate) fn resume(
     system: System,
     plan: &Plan,

@@ -39,7 +39,7 @@ pub struct PreparedRun {
     /// The variables to record.
     pub ports: Vec<Port>,
     scenario: Scenario,
-    /// The unpacked SSP, which outlives the system.
+    /// The system structure, whose folders are removed after the system.
     opened: Option<Arc<Opened>>,
 }
 
@@ -55,11 +55,11 @@ impl PreparedRun {
         Self::with_slaves(loaded, options, Vec::new())
     }
 
-    /// Like [`PreparedRun::new`], with further `slaves`, by name, that are no FMUs.
+    /// Like [`PreparedRun::new`], with further `slaves`, by name, that are not FMUs.
     ///
     /// # Errors
     ///
-    /// Same as [`PreparedRun::new`]; also if a slave has the name of an FMU.
+    /// Same as [`PreparedRun::new`]; also if a slave has the name of an FMU or of another slave.
     pub fn with_slaves(
         mut loaded: LoadedConfig,
         options: &AssemblyOptions<'_>,
@@ -84,12 +84,12 @@ impl PreparedRun {
     }
 
     /// Initialises the FMUs, or restores them from the checkpoint `saved`, and creates the results
-    /// file.
+    /// file and the bus trace of the configuration.
     ///
     /// # Errors
     ///
-    /// Returns [`Error`] if an FMU fails, if the checkpoint does not match the run, or if the file
-    /// cannot be written.
+    /// Returns [`Error`] if an FMU fails, if the checkpoint does not match the run, if a bus trace is requested
+    /// and there is no CAN bus, or if a file cannot be written.
     pub fn start(self, saved: Option<&SavedRun>) -> Result<Run, Error> {
         let file = self.config.results.file.clone();
         self.start_recording(saved, |simulation, ports, every, start| match file {
@@ -99,7 +99,7 @@ impl PreparedRun {
     }
 
     /// Like [`PreparedRun::start`], but writes the results to the sink that `make` returns for their
-    /// columns, instead of the file of the configuration.
+    /// columns, not to the file of the configuration.
     ///
     /// # Errors
     ///
@@ -195,7 +195,7 @@ fn scenario(
     Ok(prepared.scenario)
 }
 
-/// Checks before the run that checkpoints can be saved at its end.
+/// If checkpoints are requested, checks before the run that all FMUs can save their state.
 fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
     if config.checkpoint.file.is_none() {
         return Ok(());
@@ -229,19 +229,19 @@ pub enum RunEnd {
     Failed(Error),
 }
 
-/// Number of steps and wall-clock time of a run.
+/// Number of steps and wall-clock time of a run, since its start or resumption.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunStatistics {
     /// Number of communication steps.
     pub steps: u64,
-    /// Wall-clock time in s.
+    /// Wall-clock time of [`Run::advance`] in s; 0 until it has returned.
     pub seconds: f64,
 }
 
 /// File and interval of the checkpoints.
 struct Checkpoints {
     path: PathBuf,
-    /// Simulated time in s between two checkpoints; `None`: a single checkpoint at the end.
+    /// Simulated time in s between two checkpoints; `None`: only the checkpoint at the end.
     interval: Option<f64>,
     /// The complete configuration.
     text: String,
@@ -265,18 +265,19 @@ pub struct Run {
     pub plan: Plan,
     recorder: Option<Recorder>,
     checkpoints: Option<Checkpoints>,
-    /// Whether the run was resumed at a communication point that the first run has already
-    /// recorded.
+    /// Whether the run was resumed with the same interval between rows, so that the first run has already handled the
+    /// communication point at which this one starts.
     resumed: bool,
     tally: RunStatistics,
     trace: Option<BusTrace>,
-    /// The unpacked SSP, whose folders are removed after the simulation.
+    /// The system structure, whose folders are removed after the simulation.
     _opened: Option<Arc<Opened>>,
 }
 
 impl Run {
     /// Steps to the stop time, records rows, writes checkpoints and terminates the FMUs. Calls
-    /// `watch` at the start and after every step; `watch` can end the run.
+    /// `watch` at the start and after every step; `watch` can end the run by [`ControlFlow::Break`] or by an
+    /// error. After an error the FMUs are not terminated and no checkpoint is written.
     pub fn advance(
         &mut self,
         mut watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
@@ -284,16 +285,16 @@ impl Run {
         self.advance_open(|run| Ok(watch(&mut run.simulation)?))
     }
 
-    /// Like [`Run::advance`], but `watch` gets the run, whose scenario it may change by
+    /// Like [`Run::advance`], but passes the whole run to `watch`, which may change the scenario by
     /// [`Run::intervene`].
     pub fn advance_open(
         &mut self,
         watch: impl FnMut(&mut Self) -> Result<ControlFlow<()>, Error>,
     ) -> RunEnd {
         let start = Instant::now();
-        let ended = self.steps(watch).unwrap_or_else(RunEnd::Failed);
+        let end = self.steps(watch).unwrap_or_else(RunEnd::Failed);
         self.tally.seconds = start.elapsed().as_secs_f64();
-        ended
+        end
     }
 
     fn steps(
@@ -302,7 +303,8 @@ impl Run {
     ) -> Result<RunEnd, Error> {
         let start = self.simulation.time();
         let interval = self.checkpoints.as_ref().and_then(|checkpoints| checkpoints.interval);
-        let mut saved = 0.0;
+        // Number of the interval at whose end a checkpoint was written last.
+        let mut intervals = 0.0;
         let mut save_at = interval.map_or(f64::INFINITY, |interval| start + interval);
         let mut flow = watch(self)?;
         if !self.resumed {
@@ -325,8 +327,8 @@ impl Run {
                 && time >= save_at
             {
                 self.save()?;
-                saved = ((time - start) / interval).floor().max(saved + 1.0);
-                save_at = start + (saved + 1.0) * interval;
+                intervals = ((time - start) / interval).floor().max(intervals + 1.0);
+                save_at = start + (intervals + 1.0) * interval;
             }
         }
         self.save()?;
@@ -347,7 +349,7 @@ impl Run {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.sample(simulation))
     }
 
-    /// Writes the rows up to now, then a checkpoint.
+    /// Writes the rows up to now, then a checkpoint. Does nothing if no checkpoints are requested.
     fn save(&mut self) -> Result<(), Error> {
         let Some(checkpoints) = &self.checkpoints else { return Ok(()) };
         let (mut due, mut slow) = (None, SlowState::default());
@@ -360,7 +362,7 @@ impl Run {
         saved.write(&checkpoints.path)
     }
 
-    /// Returns the number of steps and the wall-clock time so far.
+    /// Returns the number of steps so far, and the wall-clock time of [`Run::advance`] after it has returned.
     #[must_use]
     pub fn tally(&self) -> RunStatistics {
         self.tally
@@ -372,11 +374,12 @@ impl Run {
         self.checkpoints.as_ref().map(|checkpoints| checkpoints.path.as_path())
     }
 
-    /// Completes the results file; returns its path if rows were recorded.
+    /// Completes the results. Returns the path of the results file in the configuration; `None` if there is none, if
+    /// nothing is recorded, or if this was called before.
     ///
     /// # Errors
     ///
-    /// Returns [`Error::Results`] if the file cannot be completed.
+    /// Returns [`Error::Results`] if the results cannot be completed.
     pub fn finish(&mut self) -> Result<Option<&Path>, Error> {
         match self.recorder.take() {
             Some(recorder) => recorder.finish().map(|()| self.config.results.file.as_deref()),
@@ -384,7 +387,7 @@ impl Run {
         }
     }
 
-    /// Completes the trace of the buses, if there is one.
+    /// Completes the bus trace, if there is one.
     ///
     /// # Errors
     ///

@@ -20,7 +20,7 @@ pub struct SavedRun {
     /// The complete configuration, a `system.toml` with absolute paths.
     text: String,
     checkpoint: Checkpoint,
-    /// Interval between rows and time of the next row; `None` if nothing is recorded.
+    /// Interval between rows as text, and the schedule of the next rows; `None` if nothing is recorded.
     due: Option<(String, Due)>,
     slow: SlowState,
 }
@@ -83,19 +83,19 @@ impl SavedRun {
     ///
     /// # Errors
     ///
-    /// Returns an error if the configuration is invalid.
+    /// Returns an error if the configuration is not valid in this version.
     pub fn config(&self, path: &Path) -> Result<Config, Error> {
         Ok(config::parse(&self.text, path)?)
     }
 
-    /// Returns the time of the next row, if rows are recorded at the same interval as before.
+    /// Returns the schedule of the next rows if rows were recorded at the interval `every`, otherwise `None`.
     #[must_use]
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;
         (*text == every.to_string()).then_some(due)
     }
 
-    /// Returns the recorded values of multirate FMUs.
+    /// Returns the recorded values of FMUs that step every several communication steps.
     #[must_use]
     pub fn slow(&self) -> &SlowState {
         &self.slow
@@ -114,7 +114,7 @@ impl SavedRun {
     }
 }
 
-/// Explains why a file is not a checkpoint of this version.
+/// Returns the sentence for a file that is not a checkpoint of this version: another file, or another format.
 fn unreadable(path: &Path, bytes: &[u8]) -> String {
     let shown = path.display();
     let version = bytes.strip_prefix(KIND).filter(|_| !bytes.starts_with(MAGIC));

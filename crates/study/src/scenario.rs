@@ -1,7 +1,7 @@
 //! Scenarios: signals and faults during a run, as written in `system.toml`.
 //!
 //! [`Scenario`] holds the data of the file. [`Scenario::resolve`] finds the variables and
-//! connections and returns the drives ([`master::drive::Drives`]) and fault chains of the master.
+//! connections, and returns the drives ([`master::drive::Drives`]) and fault chains for the master.
 
 mod body;
 mod convert;
@@ -32,10 +32,11 @@ pub struct Scenario {
     /// `[[scenario.signal]]`: an input or a tunable parameter follows a signal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub signal: Vec<Spanned<SignalEntry>>,
-    /// `[[scenario.table]]`: every free input follows the column of its name.
+    /// `[[scenario.table]]`: every input without a connection and every tunable parameter follows the column of its
+    /// name, unless an entry of `set` or `signal` drives it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub table: Vec<Spanned<TableEntry>>,
-    /// `[[scenario.fault]]`: the values on a connection are disturbed.
+    /// `[[scenario.fault]]`: a fault acts on the values of a connection or of a driven input.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fault: Vec<Spanned<FaultEntry>>,
 }
@@ -95,7 +96,8 @@ pub struct TableEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultEntry {
-    /// The input, `slave.variable`, or the connection, `slave.output=slave.input`.
+    /// The input, `slave.variable`, or the connection, `slave.output=slave.input`. The input has a connection
+    /// or is driven by another entry.
     pub connection: Spanned<String>,
     /// Unit of the values; default: the unit of the input.
     pub unit: Option<Spanned<String>>,
@@ -117,6 +119,6 @@ pub struct FaultEntry {
     pub saturation: Option<Spanned<Saturation>>,
     /// Random noise is added.
     pub noise: Option<Spanned<Noise>>,
-    /// True becomes false.
+    /// True and false are exchanged.
     pub inversion: Option<Spanned<Inversion>>,
 }

@@ -11,10 +11,11 @@ use ssp::Opened;
 use crate::content::Content;
 use crate::error::Error;
 
-/// FMUs and system structures that are unpacked, described and loaded once for several runs.
+/// FMUs and SSP archives that are unpacked, parsed and loaded once for several runs.
 ///
 /// A file is opened again if its size or its time of modification has changed. An FMU that can be
-/// instantiated only once per process is not kept, so that every run loads it anew.
+/// instantiated only once per process is not kept unless it runs in separate processes, so that every run
+/// loads it anew. Other system structures than SSP archives are not kept, because they refer to further files.
 #[derive(Default)]
 pub struct Store {
     fmus: Mutex<HashMap<FmuKey, Content>>,
@@ -30,8 +31,8 @@ struct Stamp {
 }
 
 impl Stamp {
-    /// Returns the stamp of the archive at `path`, or of the description in the folder at `path`; `None`
-    /// if there is none.
+    /// Returns the stamp of the file at `path`, or of the description in the folder at `path`; `None`
+    /// if the file or the description does not exist.
     fn of(path: &Path) -> Option<Self> {
         let path = std::path::absolute(path).ok()?;
         let mut data = path.metadata().ok()?;
@@ -51,7 +52,8 @@ struct FmuKey {
 }
 
 impl Store {
-    /// Returns the FMU at `path`; opens it with `open` if the store does not have it.
+    /// Returns the FMU at `path`; opens it with `open` if the store does not have it, and keeps it if several runs can
+    /// use it.
     pub(crate) fn fmu(
         &self,
         path: &Path,
@@ -73,16 +75,19 @@ impl Store {
         Ok(content)
     }
 
-    /// Returns the system structure at `path`; opens it with `open` if the store does not have it.
+    /// Returns the system structure at `path`; opens it with `open` if the store does not have it, and keeps it
+    /// if it is an SSP archive.
     pub(crate) fn system(
         &self,
         path: &Path,
         open: impl FnOnce() -> Result<Opened, Error>,
     ) -> Result<Arc<Opened>, Error> {
-        // A folder has further files, whose changes its stamp would not show.
-        let stamp = Stamp::of(path).filter(|_| path.is_file());
-        let is_archive = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp"));
-        let Some(stamp) = stamp.filter(|_| is_archive) else { return open().map(Arc::new) };
+        // A folder, an SSD or an OSP file refers to further files, whose changes its stamp would not show.
+        let is_archive = path.is_file()
+            && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp"));
+        let Some(stamp) = Stamp::of(path).filter(|_| is_archive) else {
+            return open().map(Arc::new);
+        };
         let mut systems = lock(&self.systems);
         if let Some(opened) = systems.get(&stamp) {
             return Ok(opened.clone());
@@ -106,7 +111,7 @@ impl Store {
         lock(&self.fmus).len()
     }
 
-    /// Whether there is no FMU in the store.
+    /// Returns whether there is no FMU in the store; it may still have system structures.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -119,7 +124,7 @@ impl fmt::Debug for Store {
     }
 }
 
-/// Locks, even if another thread has panicked meanwhile.
+/// Locks `mutex`, even if another thread has panicked while it held the lock.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -28,7 +28,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Returns the column called `name`.
+    /// Returns the column called `name`, if there is one; the first column, `time`, is not among them.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&Arc<[f64]>> {
         let position = self.names.iter().position(|known| known == name)?;
@@ -52,7 +52,7 @@ pub enum TableError {
         /// The line.
         line: usize,
     },
-    /// The file is empty.
+    /// The file is empty or has only empty lines.
     #[error("the file is empty, expected a header such as \"time\",\"u\" and rows of numbers")]
     Empty,
     /// The first column is not `time`.
@@ -62,7 +62,7 @@ pub enum TableError {
         line: usize,
         /// Name of the first column.
         actual: String,
-        /// A hint at the probable cause.
+        /// A hint at the probable cause; may be empty.
         hint: &'static str,
     },
     /// A column has no name.
@@ -193,7 +193,8 @@ fn advance(reader: &mut csv::Reader<&[u8]>, record: &mut ByteRecord) -> Result<b
     reader.read_byte_record(record).map_err(|error| TableError::Unreadable(error.into()))
 }
 
-/// Returns the names of all columns.
+/// Returns the names of all columns, `time` included. Returns an error unless the first one is `time`, there
+/// are others, and all have different names.
 fn header(record: &ByteRecord, line: usize) -> Result<Vec<String>, TableError> {
     let name = |field: &[u8]| String::from_utf8_lossy(field).into_owned();
     let names: Vec<String> = record.iter().map(name).collect();
@@ -224,12 +225,12 @@ fn number(field: &[u8]) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-/// Returns the start of an entry for a message.
+/// Returns the first [`LONGEST_QUOTATION`] characters of an entry for a message.
 fn quotation(field: &[u8]) -> String {
     String::from_utf8_lossy(field).chars().take(LONGEST_QUOTATION).collect()
 }
 
-/// Returns the line of a record; it starts after the empty lines at its position.
+/// Returns the line on which a record starts. The position of a record may be that of empty lines before it.
 fn line_of(bytes: &[u8], record: &ByteRecord) -> usize {
     let position = record.position().map_or(0, csv::Position::byte);
     let start = usize::try_from(position).unwrap_or(0).min(bytes.len());

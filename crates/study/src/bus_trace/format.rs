@@ -7,14 +7,16 @@ use fmu_description::can::{Frame, FrameKind, Operation};
 
 use crate::error::Error;
 
-/// The link type of `SocketCAN` (`LINKTYPE_CAN_SOCKETCAN`), with its flags in the identifier.
+/// The link type of `SocketCAN`, `LINKTYPE_CAN_SOCKETCAN`.
 const LINK_TYPE: u16 = 227;
+/// Flags of `SocketCAN` in the identifier.
 const EXTENDED: u32 = 0x8000_0000;
 const REMOTE: u32 = 0x4000_0000;
 const ERROR: u32 = 0x2000_0000;
-/// Error classes of `SocketCAN`: violation of the protocol on the bus (`CAN_ERR_PROT`, `CAN_ERR_BUSERROR`), with 8 bytes of data.
+/// Error classes of `SocketCAN`: violation of the protocol on the bus (`CAN_ERR_PROT`, `CAN_ERR_BUSERROR`),
+/// with 8 bytes of data.
 const PROTOCOL: u32 = 0x88;
-/// Flags of CAN FD in `SocketCAN`: bit rate switch, error state indicator, and that it is CAN FD.
+/// Flags of CAN FD in `SocketCAN`: bit rate switch, error state indicator, and the format CAN FD.
 const SWITCH: u8 = 1;
 const STATE: u8 = 2;
 const FLEXIBLE: u8 = 4;
@@ -28,7 +30,7 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// Returns the format for the extension of a file.
+    /// Returns the format for the extension of a file; an error if it is not `log`, `asc` or `pcapng`.
     pub(super) fn of(path: &Path) -> Result<Self, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("log") => Ok(Self::Candump),
@@ -41,8 +43,8 @@ impl Format {
         }
     }
 
-    /// Writes what stands before the frames.
-    pub(super) fn begin(self, file: &mut impl Write, buses: usize) -> io::Result<()> {
+    /// Writes the part of the file before the frames: nothing for candump.
+    pub(super) fn write_start(self, file: &mut impl Write, buses: usize) -> io::Result<()> {
         match self {
             Self::Candump => Ok(()),
             // Simulated time starts at the epoch.
@@ -69,8 +71,8 @@ impl Format {
         }
     }
 
-    /// Writes what happened on a bus at `time` in s: a frame or an error.
-    pub(super) fn operation(
+    /// Writes an operation on a bus at `time` in s: a frame or a bus error. Writes nothing for other operations.
+    pub(super) fn write_operation(
         self,
         file: &mut impl Write,
         time: f64,
@@ -100,7 +102,7 @@ impl Format {
             (Self::Pcapng, Operation::BusError { .. }) => {
                 packet(file, time, bus, [ERROR | PROTOCOL, 0], &[0; 8])
             }
-            // A confirmation is no frame on the bus.
+            // Other operations, such as a confirmation, are not frames on the bus.
             _ => Ok(()),
         }
     }
@@ -154,7 +156,7 @@ fn digits(file: &mut impl Write, data: &[u8], before: &str) -> io::Result<()> {
     data.iter().try_for_each(|byte| write!(file, "{before}{byte:02X}"))
 }
 
-/// Returns the flags of a CAN FD frame.
+/// Returns the flags of a CAN FD frame; 0 for other frames.
 fn flags(kind: FrameKind) -> u8 {
     match kind {
         FrameKind::Flexible { bit_rate_switch, error_state } => {
@@ -164,7 +166,8 @@ fn flags(kind: FrameKind) -> u8 {
     }
 }
 
-/// Returns the data length code of CAN FD (ISO 11898-1). Above 8 bytes a frame has 12, 16, 20, 24, 32, 48 or 64.
+/// Returns the data length code of a CAN FD frame (ISO 11898-1). The lengths above 8 bytes are 12, 16, 20, 24, 32, 48
+/// and 64.
 fn length_code(length: usize) -> usize {
     match length {
         0..=8 => length,

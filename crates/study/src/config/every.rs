@@ -15,7 +15,7 @@ const EXPECTED: &str = "seconds above 0, \"step\" (each communication point) or 
 /// The interval between recorded rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Every {
-    /// A row at the first communication point at or after each multiple of this interval in s.
+    /// A row at the first communication point at or after each multiple of this interval in s, counted from the start.
     Seconds(f64),
     /// A row at each communication point.
     Step,

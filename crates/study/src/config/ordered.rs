@@ -26,13 +26,13 @@ impl<T> Ordered<T> {
         self.0.is_empty()
     }
 
-    /// Returns the value of `name`.
+    /// Returns the value of `name`, if there is one.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&T> {
         self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
-    /// Sets the value of `name`, replacing an earlier one.
+    /// Sets the value of `name`: replaces it in its place, or adds it at the end.
     pub fn put(&mut self, name: String, value: T) {
         match self.0.iter_mut().find(|(known, _)| *known == name) {
             Some((_, old)) => *old = value,
@@ -96,8 +96,8 @@ impl fmt::Display for SettingValue {
     }
 }
 
-/// Values by `slave.variable`, in the order of the file; the last value of a variable applies. In
-/// the file, parts of a name may also be tables: `[settings.plant]`.
+/// Values by `slave.variable`, in the order of the file, each with its location. In the file, a name
+/// that occurs twice is an error, and parts of a name may also be tables: `[settings.plant]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings(pub Vec<(String, SettingValue, Place)>);
 
@@ -108,7 +108,7 @@ impl Settings {
         self.0.is_empty()
     }
 
-    /// Adds a setting of the command line after all others.
+    /// Adds a setting of the command line after all others, and removes an earlier one of the same name.
     pub fn push(&mut self, name: String, value: String) {
         self.0.retain(|(known, _, _)| *known != name);
         self.0.push((name, SettingValue::Text(value), 0..0));

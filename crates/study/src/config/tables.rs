@@ -9,7 +9,7 @@ use super::{Every, Memory};
 use files::Place;
 
 /// Location and text of an error.
-type Wrong = (Place, String);
+type EntryError = (Place, String);
 
 /// An entry of `[[connections]]`: `to = factor from + offset`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,21 +19,21 @@ pub struct ConnectionEntry {
     pub from: Spanned<String>,
     /// The input, `slave.variable`.
     pub to: Spanned<String>,
-    /// Factor of the transformation. If factor or offset is stated, units are not converted.
+    /// Factor of the transformation; default: 1. If factor or offset is stated, units are not converted.
     pub factor: Option<f64>,
-    /// Offset of the transformation, in the unit of the input.
+    /// Offset of the transformation, in the unit of the input; default: 0.
     pub offset: Option<f64>,
 }
 
 impl ConnectionEntry {
-    /// Creates a connection of the command line, without a location.
+    /// Creates a connection without a location and without a transformation, as on the command line.
     #[must_use]
     pub fn new(from: String, to: String) -> Spanned<Self> {
         let text = |text| Spanned::new(0..0, text);
         Spanned::new(0..0, Self { from: text(from), to: text(to), factor: None, offset: None })
     }
 
-    pub(super) fn check(&self, place: &Place) -> Result<(), Wrong> {
+    pub(super) fn check(&self, place: &Place) -> Result<(), EntryError> {
         let numbers = [("factor", self.factor), ("offset", self.offset)];
         match numbers.iter().find(|(_, number)| number.is_some_and(|value| !value.is_finite())) {
             Some((name, _)) => Err((place.clone(), format!("{name}: expected a finite number"))),
@@ -55,11 +55,11 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    pub(super) fn check(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), EntryError> {
         for (name, time) in [("start-time", &self.start_time), ("stop-time", &self.stop_time)] {
-            expect(name, time.as_ref(), "a finite number", f64::is_finite)?;
+            check_number(name, time.as_ref(), "a finite number", f64::is_finite)?;
         }
-        expect("tolerance", self.tolerance.as_ref(), ABOVE, above)
+        check_positive("tolerance", self.tolerance.as_ref())
     }
 }
 
@@ -99,8 +99,8 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    pub(super) fn check(&self) -> Result<(), Wrong> {
-        expect("time-limit", self.time_limit.as_ref(), ABOVE, above)
+    pub(super) fn check(&self) -> Result<(), EntryError> {
+        check_positive("time-limit", self.time_limit.as_ref())
     }
 }
 
@@ -110,13 +110,13 @@ impl Isolation {
 pub struct CheckpointSettings {
     /// The file.
     pub file: Option<PathBuf>,
-    /// Simulated time in s between two checkpoints; default: a single checkpoint at the end.
+    /// Simulated time in s between two checkpoints, beside the one at the end; default: only the one at the end.
     pub every: Option<Spanned<f64>>,
 }
 
 impl CheckpointSettings {
-    pub(super) fn check(&self) -> Result<(), Wrong> {
-        expect("every", self.every.as_ref(), ABOVE, above)?;
+    pub(super) fn check(&self) -> Result<(), EntryError> {
+        check_positive("every", self.every.as_ref())?;
         match &self.every {
             Some(every) if self.file.is_none() => {
                 Err((every.span(), "every: expected file beside it".to_owned()))
@@ -126,20 +126,20 @@ impl CheckpointSettings {
     }
 }
 
-const ABOVE: &str = "a finite number above 0";
-
-fn above(value: f64) -> bool {
-    value > 0.0 && value.is_finite()
+fn check_positive(name: &str, value: Option<&Spanned<f64>>) -> Result<(), EntryError> {
+    let is_positive = |value: f64| value > 0.0 && value.is_finite();
+    check_number(name, value, "a finite number above 0", is_positive)
 }
 
-fn expect(
+/// Checks a value, if it is stated, by the condition `is_valid`, which `expected` describes.
+fn check_number(
     name: &str,
     value: Option<&Spanned<f64>>,
     expected: &str,
-    holds: fn(f64) -> bool,
-) -> Result<(), Wrong> {
+    is_valid: fn(f64) -> bool,
+) -> Result<(), EntryError> {
     match value {
-        Some(value) if !holds(*value.get_ref()) => {
+        Some(value) if !is_valid(*value.get_ref()) => {
             let message = format!("{name}: expected {expected}, found {}", value.get_ref());
             Err((value.span(), message))
         }

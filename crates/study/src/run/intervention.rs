@@ -1,4 +1,4 @@
-//! Interventions: entries of the scenario that are added while the run goes on.
+//! Interventions: entries that are added to the scenario during the run.
 
 use std::path::Path;
 
@@ -13,35 +13,36 @@ use crate::scenario::{Scenario, Setup};
 const EXPECTED: &str =
     "expected [[set]] or [[fault]], for example [[set]] variable = \"plant.F_c\" value = 15";
 
-/// Reason for the earliest time of most entries.
+/// The reason for the earliest time of an entry that is not a delay, for messages.
 const UNUSED: &str = "the first one that the run has not used yet";
 
 /// A change of the scenario of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Intervention {
-    /// Time in s that the run had reached.
+    /// Time in s that the run had reached when the entries were added.
     pub time: f64,
     /// The earliest time in s at which the change can take effect, and at which it does unless an
     /// entry states a later one.
     pub from: f64,
-    /// The entries, complete, as they are in a `system.toml` below `scenario`.
+    /// The entries with all times, as in a `system.toml` below `scenario`.
     pub text: String,
 }
 
 impl Run {
-    /// Adds entries to the scenario: `text` has `[[set]]` and `[[fault]]` as a `system.toml` has them
-    /// below `scenario`. A time `at` or `from` that is not stated is
-    /// [`master::Simulation::next_change`]; that of a delay is not before the present time plus the delay, because
-    /// the run keeps the values on the connection from now on. Call it between steps, from [`Run::advance_open`].
+    /// Adds entries to the scenario. `text` has `[[set]]` and `[[fault]]` as a `system.toml` has them
+    /// below `scenario`. Call it between steps, from [`Run::advance_open`].
+    ///
+    /// The default of a time `at` or `from` is [`master::Simulation::next_change`]. A delay starts at the present
+    /// time plus the delay if that is later, because the run has no earlier values of the connection.
     ///
     /// [`Run::config`] has the entries afterwards: a run of this configuration from the start gives
     /// the same results, bit for bit.
     ///
     /// # Errors
     ///
-    /// Returns an error, and changes nothing, if the run ends before a change can take effect, or if
-    /// an entry is invalid: a time that has passed, a delay in a run whose steps vary (which points it
-    /// keeps depends on earlier steps), or for one of the reasons of a `system.toml`.
+    /// Returns an error, and changes nothing, if the run ends before a change can take effect, if `text` has no
+    /// entry or one that a `system.toml` does not allow, if a time is before its default, or if a delay is
+    /// added to a run whose steps vary: which values such a run keeps depends on its steps so far.
     pub fn intervene(&mut self, text: &str) -> Result<Intervention, Error> {
         let time = self.simulation.time();
         let from = self.simulation.next_change().ok_or_else(|| {
@@ -80,8 +81,9 @@ impl Run {
     }
 }
 
-/// Reads the entries of an intervention at `time` that takes effect at `from` or later, in s; also returns them
-/// as a text with all times.
+/// Parses the entries of an intervention at `time` that takes effect at `from` or later, in s; also returns them
+/// as TOML with all times. Returns an error if the text is not TOML, has other or no entries, or a time that is too
+/// early.
 fn entries(text: &str, time: f64, from: f64) -> Result<(Scenario, String), Error> {
     let source = Source::new(Path::new("intervention"), text.to_owned());
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
@@ -113,13 +115,14 @@ fn entries(text: &str, time: f64, from: f64) -> Result<(Scenario, String), Error
     Ok((added, complete))
 }
 
-/// Returns the tables of the list `key`.
+/// Returns the tables in the list `key`; none if there is no such list.
 fn members<'a>(table: &'a mut toml::Table, key: &str) -> impl Iterator<Item = &'a mut toml::Table> {
     let list = table.get_mut(key).and_then(toml::Value::as_array_mut);
     list.into_iter().flatten().filter_map(toml::Value::as_table_mut)
 }
 
-/// Puts the time `key` into a table, or checks that it is not before `from`, in s; `reason` says what this time is.
+/// Inserts the time `key` = `from` in s into a table, or checks that the stated time is not before `from`; `reason`
+/// explains this limit in the message.
 fn put_time(
     table: &mut toml::Table,
     key: &'static str,
@@ -130,7 +133,7 @@ fn put_time(
         table.insert(key.to_owned(), toml::Value::Float(from));
         return Ok(());
     };
-    // Another type is refused with all others.
+    // The parser of the scenario refuses another type.
     let Some(stated) = number(stated) else { return Ok(()) };
     if stated >= from {
         return Ok(());

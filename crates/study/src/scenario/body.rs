@@ -41,7 +41,7 @@ macro_rules! fault {
 }
 
 body! {
-    /// `ramp`: `begin` up to the time `from`, `end` after the time `until`, linear in between.
+    /// `ramp`: `begin` up to the time `from`, `end` from the time `until` on, linear in between.
     Ramp {
         /// Start of the ramp in s.
         from: f64,
@@ -131,7 +131,7 @@ fault! {
         probability: Option<f64>,
         /// Time in s between samples; default: one sample at each communication point.
         every: Option<f64>,
-        /// Seed of the random series.
+        /// Seed of the random series; default: 0.
         seed: Option<u64>,
     }
 }
@@ -162,11 +162,11 @@ fault! {
 }
 
 fault! {
-    /// `saturation`: `v`, limited to bounds.
+    /// `saturation`: `v`, limited to one or two bounds.
     Saturation {
-        /// Lowest value.
+        /// Lowest value; default: no bound.
         min: Option<f64>,
-        /// Highest value.
+        /// Highest value; default: no bound.
         max: Option<f64>,
     }
 }
@@ -174,20 +174,20 @@ fault! {
 fault! {
     /// `noise`: `v + e` with random `e`, normal or uniform.
     Noise {
-        /// Standard deviation, for the normal distribution.
+        /// Standard deviation of the normal distribution; instead of `amplitude`.
         deviation: Option<f64>,
-        /// Largest size, for the uniform distribution.
+        /// Largest magnitude of the uniform distribution; instead of `deviation`.
         amplitude: Option<f64>,
         /// Time in s between samples; default: one sample at each communication point.
         every: Option<f64>,
-        /// Seed of the random series.
+        /// Seed of the random series; default: 0.
         #[serde(default)]
         seed: u64,
     }
 }
 
 fault! {
-    /// `inversion`: true becomes false.
+    /// `inversion`: exchanges true and false.
     Inversion {
     }
 }

@@ -27,7 +27,7 @@ pub struct ScenarioError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Reason {
-    /// A name does not exist.
+    /// A slave or a variable does not exist.
     #[error(transparent)]
     Name(#[from] SystemError),
     /// The variable cannot be set during the run.
@@ -57,7 +57,7 @@ pub enum Reason {
         /// Path of the other entry.
         first: String,
     },
-    /// A fault on a variable without a connection and without a signal.
+    /// A fault is stated for a variable without a connection and without a signal.
     #[error("{name} is {actual}, expected a connected input, or one that a signal drives")]
     NoConnection {
         /// The variable.
@@ -78,7 +78,7 @@ pub enum Reason {
     /// An entry does not have exactly one kind.
     #[error("found {}, expected exactly one of {expected}", listed(actual))]
     Kinds {
-        /// The kinds found.
+        /// The kinds stated.
         actual: Vec<&'static str>,
         /// The kinds possible.
         expected: &'static str,
@@ -134,7 +134,7 @@ pub enum Reason {
         /// The unit stated.
         stated: String,
     },
-    /// The unit has another dimension than the variable.
+    /// The unit cannot be converted to that of the variable.
     #[error("{name} is in {unit:?}, to which {stated:?} cannot be converted")]
     Dimension {
         /// The variable.
@@ -168,7 +168,7 @@ pub enum Reason {
         /// Some of the columns in the file.
         known: String,
     },
-    /// The file has no column for a free input.
+    /// No column of the file has the name of an input or parameter that can be driven.
     #[error("{}: no column is called as {expected}, it has {known}", path.display())]
     NoColumn {
         /// The file.

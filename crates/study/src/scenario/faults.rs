@@ -13,16 +13,16 @@ use super::{
 use master::Port;
 use master::fault::{Fault, FaultChain, LossPattern, NoiseDistribution, RandomSeries, Window};
 
-/// Kinds of a fault.
+/// All kinds of faults.
 const KINDS: &str = "bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, \
                      inversion";
-/// Kinds for Integers.
+/// Kinds of faults by the type of the input.
 const OF_INTEGERS: &str = "bias, stuck, dropout, delay or saturation";
 const OF_BOOLEANS: &str = "stuck, dropout, delay or inversion";
 const OF_ENUMERATIONS: &str = "stuck, dropout or delay";
 const OF_REALS: &str = "any kind but inversion";
 
-/// The faults of one input, with the path of the first entry.
+/// The faults of one input, with the first entry and its path.
 struct InputFaults<'a> {
     port: Port,
     entry: &'a Spanned<FaultEntry>,
@@ -37,35 +37,36 @@ impl<'a> Resolver<'a> {
         &mut self,
         entries: &'a [Spanned<FaultEntry>],
     ) -> Result<Vec<(Port, FaultChain)>, ScenarioError> {
-        let mut ways: Vec<InputFaults<'a>> = Vec::new();
+        let mut inputs: Vec<InputFaults<'a>> = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
             let path = format!("scenario.fault[{}]", index + 1);
             let stated = &entry.get_ref().connection;
-            let target = self.way(stated.get_ref()).map_err(at(stated, &path))?;
+            let target = self.faulty_input(stated.get_ref()).map_err(at(stated, &path))?;
             let port = target.port;
-            let position = ways.iter().position(|way| way.port == port).unwrap_or_else(|| {
-                ways.push(InputFaults { port, entry, path: path.clone(), faults: Vec::new() });
-                ways.len() - 1
+            let position = inputs.iter().position(|input| input.port == port).unwrap_or_else(|| {
+                inputs.push(InputFaults { port, entry, path: path.clone(), faults: Vec::new() });
+                inputs.len() - 1
             });
-            let place = ways[position].faults.len() as u64;
-            let reader = Reader { target, start: self.setup.start, place };
-            let fault = reader.fault(entry.get_ref()).map_err(at(entry, &path))?;
-            ways[position].faults.push(fault);
+            let index = inputs[position].faults.len() as u64;
+            let converter = EntryConverter { target, start: self.setup.start, index };
+            let fault = converter.fault(entry.get_ref()).map_err(at(entry, &path))?;
+            inputs[position].faults.push(fault);
         }
-        let mut lines = Vec::new();
-        for InputFaults { port, entry, path, faults } in ways {
-            let line = FaultChain::new(faults, self.setup.step)
+        let mut chains = Vec::new();
+        for InputFaults { port, entry, path, faults } in inputs {
+            let chain = FaultChain::new(faults, self.setup.step)
                 .map_err(|error| at(entry, &path)(error.into()))?;
             match self.drives.iter_mut().find(|(drive, _)| drive.port() == port) {
-                Some((drive, _)) => drive.set_faults(line),
-                None => lines.push((port, line)),
+                Some((drive, _)) => drive.set_faults(chain),
+                None => chains.push((port, chain)),
             }
         }
-        Ok(lines)
+        Ok(chains)
     }
 
-    /// Returns the input of a connection or of a signal.
-    fn way(&self, stated: &str) -> Result<Target<'a>, Reason> {
+    /// Returns the input that `stated` names as `slave.variable` or as `slave.output=slave.input`. Returns an
+    /// error if it has neither a connection nor a signal, or if its source is not the one stated.
+    fn faulty_input(&self, stated: &str) -> Result<Target<'a>, Reason> {
         let (source, input) = match stated.split_once('=') {
             Some((source, input)) => (Some(source.trim()), input.trim()),
             None => (None, stated.trim()),
@@ -93,15 +94,16 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// The converter of the entries of one input.
-struct Reader<'a> {
+/// Converts an entry of `[[scenario.fault]]` to a fault of the master.
+struct EntryConverter<'a> {
     target: Target<'a>,
+    /// Start of the simulation in s.
     start: f64,
-    /// Position among the faults of the input.
-    place: u64,
+    /// Position of the fault among those of the input; it distinguishes their random series.
+    index: u64,
 }
 
-impl Reader<'_> {
+impl EntryConverter<'_> {
     fn fault(&self, entry: &FaultEntry) -> Result<(Window, Fault), Reason> {
         let kinds = kinds!(entry: bias, gain, drift, stuck, dropout, delay, quantisation, saturation,
             noise, inversion);
@@ -110,8 +112,8 @@ impl Reader<'_> {
         let (window, fault) = self.body(entry, unit)?;
         finite("from", window.from)?;
         if let Some(until) = window.until {
-            let right = until.is_finite() && until > window.from;
-            require("until", until, right, "a time after from")?;
+            let is_later = until.is_finite() && until > window.from;
+            require("until", until, is_later, "a time after from")?;
         }
         Ok((window, fault))
     }
@@ -141,15 +143,15 @@ impl Reader<'_> {
         Err(Reason::Kinds { actual: Vec::new(), expected: KINDS })
     }
 
-    /// Checks that a kind of fault fits the type of the input.
+    /// Checks that the kind of fault `what` fits the type of the input.
     fn expect_fit(&self, what: &'static str) -> Result<(), Reason> {
-        let anywhere = ["stuck", "dropout", "delay"].contains(&what);
+        let fits_all = ["stuck", "dropout", "delay"].contains(&what);
         let (fits, expected) = match &self.target.variable.kind {
             Kind::Real(_) | Kind::Float32(_) => (what != "inversion", OF_REALS),
-            Kind::Boolean(_) => (anywhere || what == "inversion", OF_BOOLEANS),
-            Kind::Enumeration(_) => (anywhere, OF_ENUMERATIONS),
+            Kind::Boolean(_) => (fits_all || what == "inversion", OF_BOOLEANS),
+            Kind::Enumeration(_) => (fits_all, OF_ENUMERATIONS),
             other if other.as_integer().is_some() => {
-                (anywhere || ["bias", "saturation"].contains(&what), OF_INTEGERS)
+                (fits_all || ["bias", "saturation"].contains(&what), OF_INTEGERS)
             }
             _ => (false, "an input of another type"),
         };
@@ -159,24 +161,25 @@ impl Reader<'_> {
         Err(unfit(what, &self.target, expected))
     }
 
-    /// Checks that a number is an integer if the input is not a Real.
+    /// Returns `number`; an error if the input is not of a floating-point type and `number` is not an integer
+    /// that it can have.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
         let fits = self.target.is_real()
             || fits_integer(number, &self.target.variable.kind, self.target.description);
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 
-    /// Converts a value to the type of the input.
+    /// Converts a value, if one is stated, to the type and unit of the input; returns an error if it does not fit.
     fn value(&self, value: Option<&Literal>, unit: Conversion) -> Result<Option<f64>, Reason> {
         let Some(value) = value else { return Ok(None) };
         let number = value.number(self.target.variable, self.target.description);
-        let number = number.map_err(|expected| self.target.refused(value, expected))?;
+        let number = number.map_err(|expected| self.target.value_error(value, expected))?;
         Ok(Some(unit.absolute(number)))
     }
 
-    fn draw(&self, seed: u64, every: Option<f64>) -> Result<RandomSeries, Reason> {
+    fn random_series(&self, seed: u64, every: Option<f64>) -> Result<RandomSeries, Reason> {
         let every = every.map(|every| positive("every", every)).transpose()?;
-        Ok(RandomSeries::new(seed, &self.target.name, self.place, every))
+        Ok(RandomSeries::new(seed, &self.target.name, self.index, every))
     }
 
     fn dropout(&self, dropout: &Dropout, unit: Conversion) -> Result<Fault, Reason> {
@@ -193,7 +196,8 @@ impl Reader<'_> {
             (None, None, Some(probability)) => {
                 let fits = (0.0..=1.0).contains(&probability);
                 require("probability", probability, fits, "a number from 0 to 1")?;
-                LossPattern::Random { probability, draw: self.draw(seed.unwrap_or(0), every)? }
+                let draw = self.random_series(seed.unwrap_or(0), every)?;
+                LossPattern::Random { probability, draw }
             }
             _ => return Err(members("period and lost, or probability, or none of them")),
         };
@@ -214,9 +218,9 @@ impl Reader<'_> {
             let bound = bound.map(|bound| finite(what, bound)).transpose()?;
             bound.map(|bound| self.whole(what, unit.absolute(bound))).transpose()
         };
-        let (one, other) = (bound("min", saturation.min)?, bound("max", saturation.max)?);
+        let (min, max) = (bound("min", saturation.min)?, bound("max", saturation.max)?);
         // A unit with a negative factor exchanges the bounds.
-        let (lowest, highest) = if unit.factor < 0.0 { (other, one) } else { (one, other) };
+        let (lowest, highest) = if unit.factor < 0.0 { (max, min) } else { (min, max) };
         match (saturation.min, saturation.max) {
             (None, None) => {
                 Err(Reason::Members { what: "saturation", expected: "min or max or both" })
@@ -241,7 +245,7 @@ impl Reader<'_> {
                 return Err(Reason::Members { what: "noise", expected });
             }
         };
-        Ok(Fault::Noise { spread, draw: self.draw(noise.seed, noise.every)? })
+        Ok(Fault::Noise { spread, draw: self.random_series(noise.seed, noise.every)? })
     }
 }
 

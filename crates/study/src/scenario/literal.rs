@@ -66,13 +66,13 @@ impl Visitor<'_> for LiteralVisitor {
     }
 }
 
-/// What is expected in place of a Binary.
+/// Description of the value expected for a Binary.
 const NO_BINARY: &str =
     "another variable: a scenario sets no Binary, `--set` with hexadecimal digits does";
 
 impl Literal {
-    /// Converts the value to a number for a variable that is not a String: Booleans become 0 or 1,
-    /// an Enumeration item its number. On failure returns a description of the expected value.
+    /// Converts the value to a number of the type of `variable`: Booleans become 0 or 1, an Enumeration item its
+    /// number. Returns a description of the expected value if the value does not fit, and for a String or Binary.
     pub(super) fn number(
         &self,
         variable: &ScalarVariable,
@@ -112,13 +112,14 @@ impl Literal {
 /// The largest magnitude up to which each integer is a double, 2^53.
 const EXACT: i128 = 1 << f64::MANTISSA_DIGITS;
 
-/// Returns the smallest and largest integer that a signal can give to a variable of this type.
+/// Returns the smallest and largest integer that a signal can give to a variable of this type; `None` if its values are
+/// not integers.
 fn range(kind: &Kind, description: &ModelDescription) -> Option<(i128, i128)> {
     let (least, largest) = kind.integer_range(description.version())?.into_inner();
     Some((least.max(-EXACT), largest.min(EXACT)))
 }
 
-/// Whether a number is an integer that a signal can give to a variable of this type.
+/// Returns whether a number is an integer that a signal can give to a variable of this type.
 #[expect(clippy::cast_precision_loss, reason = "up to 2^53")]
 pub(super) fn fits_integer(number: f64, kind: &Kind, description: &ModelDescription) -> bool {
     range(kind, description).is_some_and(|(least, largest)| {

@@ -24,7 +24,7 @@ pub struct Setup<'a> {
     pub start: f64,
     /// Communication step in s; the first one if it varies.
     pub step: f64,
-    /// Tables in memory, each with the path of the file whose place it takes.
+    /// Tables in memory that are read instead of files, each with the path of the file.
     pub tables: &'a [(PathBuf, Table)],
 }
 
@@ -33,7 +33,8 @@ pub struct Setup<'a> {
 pub struct ResolvedScenario {
     /// The scenario for the master.
     pub scenario: master::Scenario,
-    /// Columns of `[[scenario.table]]` without a free input, with their file.
+    /// Columns of `[[scenario.table]]` that drive nothing, with their file: no variable that can be driven has their
+    /// name, or another entry drives it.
     pub unused: Vec<(PathBuf, String)>,
 }
 
@@ -60,10 +61,10 @@ impl Scenario {
             let path = format!("scenario.signal[{}]", index + 1);
             resolver.signal(entry.get_ref(), &path).map_err(at(entry, &path))?;
         }
-        let others = resolver.drives.len();
+        let first_table_drive = resolver.drives.len();
         for (index, entry) in self.table.iter().enumerate() {
             let path = format!("scenario.table[{}]", index + 1);
-            resolver.table(entry.get_ref(), &path, others).map_err(at(entry, &path))?;
+            resolver.table(entry.get_ref(), &path, first_table_drive).map_err(at(entry, &path))?;
         }
         let faults = resolver.faults(&self.fault)?;
         let drives = Drives::new(resolver.drives.into_iter().map(|(drive, _)| drive).collect());
@@ -97,7 +98,7 @@ pub(super) struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// Whether it is a continuous Real input.
+    /// Returns whether the variable is a continuous input of a floating-point type.
     pub(super) fn is_continuous(&self) -> bool {
         self.variable.causality == Causality::Input
             && self.variable.variability == Variability::Continuous
@@ -108,15 +109,15 @@ impl Target<'_> {
         self.variable.kind.as_real().is_some()
     }
 
-    /// Returns the error for a value that is not the `expected` one.
-    pub(super) fn refused(&self, value: &Literal, expected: impl Into<String>) -> Reason {
+    /// Returns the error for a value that does not fit the variable; `expected` describes the values that fit.
+    pub(super) fn value_error(&self, value: &Literal, expected: impl Into<String>) -> Reason {
         let (name, actual) = (self.name.clone(), value.to_string());
         Reason::Value { name, actual, expected: expected.into() }
     }
 }
 
 impl<'a> Resolver<'a> {
-    /// Returns the variable called `name`.
+    /// Returns the variable called `name`; an error if it does not exist.
     pub(super) fn target(&self, name: &str) -> Result<Target<'a>, Reason> {
         let system = self.system;
         let port = system.port(name)?;
@@ -125,12 +126,13 @@ impl<'a> Resolver<'a> {
         Ok(Target { port, name, variable, description })
     }
 
-    /// Returns the variable called `name` if it can be driven and no other entry drives it.
-    pub(super) fn free(&self, name: &str) -> Result<Target<'a>, Reason> {
+    /// Returns the variable called `name` if it can be driven: an input without a connection or a tunable parameter; a
+    /// clock only if it is triggered.
+    pub(super) fn drivable(&self, name: &str) -> Result<Target<'a>, Reason> {
         let target = self.target(name)?;
         let (causality, variability) = (target.variable.causality, target.variable.variability);
-        let tunable = causality == Causality::Parameter && variability == Variability::Tunable;
-        if causality != Causality::Input && !tunable {
+        let is_tunable = causality == Causality::Parameter && variability == Variability::Tunable;
+        if causality != Causality::Input && !is_tunable {
             let description = format!("{} {}", variability.as_str(), causality.as_str());
             return Err(Reason::NotSettable {
                 name: target.name,
@@ -150,7 +152,7 @@ impl<'a> Resolver<'a> {
         Ok(target)
     }
 
-    /// Adds a drive; `path` is the path of its entry.
+    /// Adds a drive; `path` is the path of its entry. Returns an error if another entry drives the variable.
     pub(super) fn add(
         &mut self,
         target: &Target<'_>,
@@ -170,12 +172,13 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    /// Returns the drive of a variable with the path of its entry.
+    /// Returns the drive of a variable with the path of its entry, if there is one.
     pub(super) fn driver(&self, port: Port) -> Option<&(Drive, String)> {
         self.drives.iter().find(|(drive, _)| drive.port() == port)
     }
 
-    /// Reads a CSV file, once even if several entries use it.
+    /// Returns the path of the CSV file `name` and its table, which may be in memory. Reads each file once even
+    /// if several entries use it.
     pub(super) fn file(&mut self, name: &str) -> Result<(PathBuf, Rc<Table>), Reason> {
         let path = self.setup.folder.join(name);
         if let Some(known) = self.files.get(&path) {
@@ -210,14 +213,14 @@ pub(super) fn positive(what: &'static str, number: f64) -> Result<f64, Reason> {
     require(what, number, number.is_finite() && number > 0.0, "a number above 0")
 }
 
-/// Returns `number` if `holds` is true, otherwise an error with the text `expected`.
+/// Returns `number` if `is_valid`, otherwise an error with the text `expected`.
 pub(super) fn require(
     what: &'static str,
     number: f64,
-    holds: bool,
+    is_valid: bool,
     expected: &'static str,
 ) -> Result<f64, Reason> {
-    if holds { Ok(number) } else { Err(Reason::Number { what, actual: number, expected }) }
+    if is_valid { Ok(number) } else { Err(Reason::Number { what, actual: number, expected }) }
 }
 
 /// Lists the kinds that an entry can have: the name of each, and whether the entry states it.
@@ -231,7 +234,8 @@ pub(super) fn only(
     kinds: &[(&'static str, bool)],
     expected: &'static str,
 ) -> Result<&'static str, Reason> {
-    let stated: Vec<_> = kinds.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+    let stated: Vec<_> =
+        kinds.iter().filter(|(_, is_stated)| *is_stated).map(|(name, _)| *name).collect();
     match stated[..] {
         [one] => Ok(one),
         _ => Err(Reason::Kinds { actual: stated, expected }),

@@ -20,7 +20,7 @@ const KINDS: &str = "constant, steps, points, ramp, sine, csv";
 /// Largest number of names in a message.
 const MOST_NAMES: usize = 10;
 
-/// The settings of one variable.
+/// The settings of one variable: times with values, and the first entry with its path.
 struct Settings<'a> {
     target: Target<'a>,
     path: String,
@@ -40,7 +40,7 @@ impl<'a> Resolver<'a> {
         for (index, entry) in entries.iter().enumerate() {
             let path = format!("scenario.set[{}]", index + 1);
             let set = entry.get_ref();
-            let target = self.free(set.variable.get_ref()).map_err(at(&set.variable, &path))?;
+            let target = self.drivable(set.variable.get_ref()).map_err(at(&set.variable, &path))?;
             finite("at", set.at).map_err(at(entry, &path))?;
             let Port { slave, variable } = target.port;
             let position = *positions.entry((slave, variable)).or_insert_with(|| {
@@ -64,7 +64,7 @@ impl<'a> Resolver<'a> {
 
     /// Resolves an entry of `[[scenario.signal]]`.
     pub(super) fn signal(&mut self, entry: &SignalEntry, path: &str) -> Result<(), Reason> {
-        let target = self.free(entry.variable.get_ref())?;
+        let target = self.drivable(entry.variable.get_ref())?;
         let kind = only(&kinds!(entry: constant, steps, points, ramp, sine, csv), KINDS)?;
         if ["points", "ramp", "sine"].contains(&kind) && !target.is_real() {
             return Err(unfit(kind, &target, "constant, steps or csv"));
@@ -100,13 +100,14 @@ impl<'a> Resolver<'a> {
         column_signal(&path, &table, &name, target, csv.hold)
     }
 
-    /// Resolves an entry of `[[scenario.table]]`, except inputs that the first `others` drives
-    /// already drive.
+    /// Resolves an entry of `[[scenario.table]]`. Skips columns of variables that entries of `set` or `signal`
+    /// drive: their drives precede the position `first_table_drive`. Returns an error if no column has the name
+    /// of a variable that can be driven.
     pub(super) fn table(
         &mut self,
         entry: &TableEntry,
         path: &str,
-        others: usize,
+        first_table_drive: usize,
     ) -> Result<(), Reason> {
         let (file, table) = self.file(entry.csv.get_ref())?;
         let mut used = false;
@@ -115,11 +116,11 @@ impl<'a> Resolver<'a> {
                 Some(element) => format!("{}.{column}", element.get_ref()),
                 None => column.clone(),
             };
-            match self.free(&name) {
+            match self.drivable(&name) {
                 Ok(target) => {
                     used = true;
-                    let known = &self.drives[..others];
-                    if known.iter().all(|(drive, _)| drive.port() != target.port) {
+                    let stated = &self.drives[..first_table_drive];
+                    if stated.iter().all(|(drive, _)| drive.port() != target.port) {
                         let signal = column_signal(&file, &table, column, &target, false)?;
                         let texts = Vec::new();
                         let source = DriveSource { signal, start: f64::NEG_INFINITY, texts };
@@ -139,7 +140,7 @@ impl<'a> Resolver<'a> {
         if used {
             return Ok(());
         }
-        let known = some(&table.names);
+        let known = first_names(&table.names);
         let expected = match &entry.element {
             Some(element) => format!("a free input of {}", element.get_ref()),
             None => "slave.variable of a free input".to_owned(),
@@ -148,8 +149,8 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// Lists the first column names of a file.
-fn some(names: &[String]) -> String {
+/// Lists up to [`MOST_NAMES`] column names of a file.
+fn first_names(names: &[String]) -> String {
     let more = if names.len() > MOST_NAMES { ", .." } else { "" };
     format!("{}{more}", names[..names.len().min(MOST_NAMES)].join(", "))
 }
@@ -167,7 +168,8 @@ pub(super) fn conversion(
     Conversion::find(stated, &target.name, target.variable, target.description)
 }
 
-/// Encodes a value as a number; a String becomes its index in `texts`.
+/// Encodes a value as a number in the unit of the variable; a text for a String is added to `texts` and becomes
+/// its index. Returns an error if the value does not fit the type.
 #[expect(clippy::cast_precision_loss, reason = "a position")]
 fn encode(
     value: &Literal,
@@ -177,13 +179,13 @@ fn encode(
 ) -> Result<f64, Reason> {
     if let Kind::String(_) = target.variable.kind {
         let Literal::Text(text) = value else {
-            return Err(target.refused(value, "a text in quotes"));
+            return Err(target.value_error(value, "a text in quotes"));
         };
         texts.push(text.clone());
         return Ok((texts.len() - 1) as f64);
     }
     let number = value.number(target.variable, target.description);
-    let number = number.map_err(|expected| target.refused(value, expected))?;
+    let number = number.map_err(|expected| target.value_error(value, expected))?;
     Ok(conversion.absolute(number))
 }
 
@@ -218,10 +220,10 @@ fn held_steps(
 
 fn track(
     points: impl Iterator<Item = (f64, f64)>,
-    between: Interpolation,
+    interpolation: Interpolation,
 ) -> Result<Signal, Reason> {
     let (times, values): (Vec<_>, Vec<_>) = points.unzip();
-    Ok(Signal::Track(Track::new(times.into(), values.into(), between)?))
+    Ok(Signal::Track(Track::new(times.into(), values.into(), interpolation)?))
 }
 
 fn ramp_signal(ramp: &Ramp) -> Result<Signal, Reason> {
@@ -241,8 +243,9 @@ fn sine_signal(sine: &Sine, start: f64) -> Result<Signal, Reason> {
     })
 }
 
-/// Returns the signal of a column as FMPy interprets it: linear interpolation for continuous Reals,
-/// held values otherwise.
+/// Returns the signal of the column `name` as FMPy interprets it: linear interpolation for continuous inputs of
+/// a floating-point type unless `hold` is true, held values otherwise; for a clock, ticks at single points.
+/// Returns an error if there is no such column or if a value does not fit the type of the variable.
 fn column_signal(
     path: &Path,
     table: &Table,
@@ -252,7 +255,7 @@ fn column_signal(
 ) -> Result<Signal, Reason> {
     let Some(values) = table.column(name) else {
         let (path, name) = (path.to_owned(), name.to_owned());
-        return Err(Reason::Column { path, name, known: some(&table.names) });
+        return Err(Reason::Column { path, name, known: first_names(&table.names) });
     };
     let (kind, description) = (&target.variable.kind, target.description);
     let wrong = match kind {
@@ -274,12 +277,12 @@ fn column_signal(
         };
         return Err(Reason::Value { name: target.name.clone(), actual, expected });
     }
-    let between = match kind {
+    let interpolation = match kind {
         Kind::Clock(_) => Interpolation::Points,
         _ if hold || !target.is_continuous() => Interpolation::Hold,
         _ => Interpolation::Line,
     };
-    Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), between)?))
+    Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), interpolation)?))
 }
 
 /// Returns the signal in the unit of the variable; without a conversion it still shares the values of its table.
