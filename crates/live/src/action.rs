@@ -1,15 +1,15 @@
-//! What a page asks of a run.
+//! The requests that a page sends to a run.
 
 use std::sync::mpsc::SyncSender;
 
-/// What a page asks of the run.
+/// An action that a page requests of the run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Hold at the next communication point.
+    /// Pause at the next communication point.
     Pause,
-    /// Go on.
+    /// Continue after a pause.
     Continue,
-    /// Make one communication step and hold again.
+    /// Make one communication step and pause again.
     Step,
     /// End the run.
     Stop,
@@ -17,17 +17,17 @@ pub enum Action {
     Intervene(String),
 }
 
-/// A request of a page, which waits for its answer.
+/// A request of a page. The page waits a short time for the answer.
 pub struct Request {
-    /// What is asked.
+    /// The action requested.
     pub action: Action,
     pub(crate) answer: SyncSender<Result<String, String>>,
 }
 
 impl Request {
-    /// Answers with a sentence, or with an error.
+    /// Answers with a sentence: `Ok` if the run has performed the action, otherwise `Err` with the reason.
     pub fn answer(self, answer: Result<String, String>) {
-        // The page may have given up.
+        // The page may no longer wait.
         let _ = self.answer.try_send(answer);
     }
 }

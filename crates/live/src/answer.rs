@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// The page loads its own files only, runs no inline code and is in no frame.
+/// The content security policy: the page loads files of this server only, runs no inline code and is in no frame.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Largest number of bytes of a refused request that are still read, so that the client can read the
-/// answer, and the time for it.
+/// Largest number of bytes of a refused request that are still read, so that the client can read the answer.
 const REST: usize = 256 << 10;
+/// Time for reading these bytes.
 const REST_TIME: Duration = Duration::from_millis(500);
 
 /// An answer.
@@ -20,27 +20,27 @@ pub(crate) struct Answer {
     pub(crate) status: u16,
     pub(crate) kind: &'static str,
     pub(crate) body: Cow<'static, str>,
-    /// The methods of the address, if the request has another one.
+    /// The methods that the address allows, if the request has another one.
     pub(crate) allow: Option<&'static str>,
 }
 
 impl Answer {
-    /// An answer with a file of the page.
+    /// Creates an answer with a file of the page.
     pub(crate) fn file(kind: &'static str, body: &'static str) -> Self {
         Self { status: 200, kind, body: Cow::Borrowed(body), allow: None }
     }
 
-    /// An answer in JSON.
+    /// Creates an answer in JSON.
     pub(crate) fn json(status: u16, value: &Value) -> Self {
         Self::text_of_json(status, value.to_string())
     }
 
-    /// An answer whose text is JSON already.
+    /// Creates an answer from JSON text.
     pub(crate) fn text_of_json(status: u16, body: String) -> Self {
         Self { status, kind: "application/json", body: Cow::Owned(body), allow: None }
     }
 
-    /// A refusal with its reason.
+    /// Creates a refusal with its reason.
     pub(crate) fn refusal(status: u16, reason: &str) -> Self {
         Self::json(status, &json!({ "error": reason }))
     }
@@ -74,7 +74,8 @@ impl Answer {
         )
     }
 
-    /// Writes the answer until `deadline`, then closes the connection.
+    /// Writes the answer and closes the connection for writing. After a refusal, also reads the rest of the request.
+    /// Returns an error if the client does not receive the answer until `deadline`.
     pub(crate) fn write(&self, stream: &mut TcpStream, deadline: Instant) -> io::Result<()> {
         put(stream, self.head().as_bytes(), deadline)?;
         put(stream, self.body.as_bytes(), deadline)?;
@@ -103,7 +104,7 @@ fn put(stream: &mut TcpStream, mut bytes: &[u8], deadline: Instant) -> io::Resul
     Ok(())
 }
 
-/// Reads what the client still sends: a connection closed before would lose the answer.
+/// Reads the bytes that the client still sends, within limits: closing the connection before would lose the answer.
 fn drain(stream: &mut TcpStream) {
     let end = Instant::now() + REST_TIME;
     let (mut chunk, mut count) = ([0; 4096], 0);

@@ -1,8 +1,8 @@
-//! What the page knows about a run from its start.
+//! The facts about a run that do not change during the run.
 
 use serde::Serialize;
 
-/// What a page shows.
+/// The subject of a page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Subject {
@@ -14,10 +14,10 @@ pub enum Subject {
     Campaign,
 }
 
-/// A run or a campaign, as the page introduces it.
+/// The facts about a run or a campaign that a page loads once.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Facts {
-    /// What the page shows.
+    /// The subject of the page.
     pub subject: Subject,
     /// The system: the title of the page.
     pub system: String,
@@ -25,7 +25,7 @@ pub struct Facts {
     pub start: f64,
     /// Stop time in s.
     pub stop: f64,
-    /// The factor of real time by which the run is paced, if it is.
+    /// The factor of real time at which the run is paced, if it is.
     pub pace: Option<f64>,
     /// The signals, in the order of the values of a [`crate::Sample`].
     pub signals: Vec<Variable>,
@@ -35,7 +35,7 @@ pub struct Facts {
     pub inputs: Vec<Source>,
     /// The file that repeats the run with its interventions.
     pub file: String,
-    /// The command that does so.
+    /// The command that repeats the run from this file.
     pub repeat: String,
 }
 

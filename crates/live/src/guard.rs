@@ -1,14 +1,14 @@
-//! Who may talk to the server: token, host and origin.
+//! Checks the sender of a request: token, host and origin.
 
 use std::fmt::Write as _;
 use std::io;
 
-use crate::request::Parsed;
+use crate::request::HttpRequest;
 
 /// Number of random bytes in a token.
 const BYTES: usize = 24;
 
-/// The random part of the address. A page that does not know it gets nothing.
+/// The random part of the address. A request without it is refused.
 pub(crate) struct Token(String);
 
 impl Token {
@@ -28,7 +28,7 @@ impl Token {
         &self.0
     }
 
-    /// Whether both are equal, in a time that does not depend on the place of a difference.
+    /// Returns whether `other` equals the token, in a time that does not depend on the position of a difference.
     pub(crate) fn is(&self, other: &str) -> bool {
         let (token, other) = (self.0.as_bytes(), other.as_bytes());
         let pairs = token.iter().zip(other);
@@ -37,7 +37,7 @@ impl Token {
     }
 }
 
-/// Checks who sends a request.
+/// Checks whether a request comes from the page of this server.
 pub(crate) struct Guard {
     token: Token,
     hosts: [String; 2],
@@ -51,11 +51,14 @@ impl Guard {
         Self { token, hosts, origins }
     }
 
-    /// Returns the path of the request after the token, or the reason of a refusal with its status.
+    /// Returns the path of the request after the token, or the status and the reason of a refusal.
     ///
-    /// A foreign `Host` is that of a page whose name resolves to 127.0.0.1 (DNS rebinding); a foreign
-    /// `Origin` is that of a page of another site in the same browser.
-    pub(crate) fn admit<'a>(&self, request: &'a Parsed) -> Result<&'a str, (u16, &'static str)> {
+    /// A page whose name resolves to 127.0.0.1 (DNS rebinding) sends a foreign `Host`; a page of another site in the
+    /// same browser sends a foreign `Origin`.
+    pub(crate) fn admit<'a>(
+        &self,
+        request: &'a HttpRequest,
+    ) -> Result<&'a str, (u16, &'static str)> {
         let host = request.host.as_deref().unwrap_or_default();
         if !self.hosts.iter().any(|known| known.eq_ignore_ascii_case(host)) {
             return Err((403, "the Host of the request is not this server"));
@@ -65,9 +68,9 @@ impl Guard {
             return Err((403, "the Origin of the request is another site"));
         }
         let site = request.site.as_deref().unwrap_or("none");
-        // A click on the printed address comes from no site.
-        let opens = request.method == "GET" && request.mode.as_deref() == Some("navigate");
-        if !(["same-origin", "none"].contains(&site) || opens) {
+        // A page may be opened by a link, which browsers report as another site.
+        let is_navigation = request.method == "GET" && request.mode.as_deref() == Some("navigate");
+        if !(["same-origin", "none"].contains(&site) || is_navigation) {
             return Err((403, "the request comes from another site"));
         }
         let path = request.path.strip_prefix('/').unwrap_or(&request.path);
@@ -80,13 +83,13 @@ impl Guard {
 mod tests {
     use super::*;
 
-    fn request(path: &str, host: Option<&str>, origin: Option<&str>) -> Parsed {
-        Parsed {
+    fn request(path: &str, host: Option<&str>, origin: Option<&str>) -> HttpRequest {
+        HttpRequest {
             method: "GET".to_owned(),
             path: path.to_owned(),
             host: host.map(str::to_owned),
             origin: origin.map(str::to_owned),
-            ..Parsed::default()
+            ..HttpRequest::default()
         }
     }
 
@@ -96,7 +99,7 @@ mod tests {
         let path = format!("/{}/state", token.text());
         let guard = Guard::new(token, 81);
         let host = Some("127.0.0.1:81");
-        let status = |request: &Parsed| guard.admit(request).err().map(|(status, _)| status);
+        let status = |request: &HttpRequest| guard.admit(request).err().map(|(status, _)| status);
         assert_eq!(guard.admit(&request(&path, host, None)), Ok("state"));
         assert_eq!(
             status(&request(&path, Some("LOCALHOST:81"), Some("http://localhost:81"))),

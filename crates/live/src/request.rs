@@ -4,51 +4,66 @@ use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Limits: bytes of request line and headers, number of headers, bytes of the body.
+/// Largest number of bytes of request line and headers.
 const HEAD: usize = 8 << 10;
+/// Largest number of headers.
 const HEADERS: usize = 64;
+/// Largest number of bytes of the body.
 const BODY: usize = 64 << 10;
 
-/// A request.
+/// A request of HTTP/1.1.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct Parsed {
+pub(crate) struct HttpRequest {
     pub(crate) method: String,
     pub(crate) path: String,
     /// The part after the question mark.
     pub(crate) query: String,
     pub(crate) host: Option<String>,
     pub(crate) origin: Option<String>,
-    /// `Sec-Fetch-Site` and `Sec-Fetch-Mode`, which browsers state.
+    /// `Sec-Fetch-Site`, which browsers state.
     pub(crate) site: Option<String>,
+    /// `Sec-Fetch-Mode`, which browsers state.
     pub(crate) mode: Option<String>,
+    /// `Content-Type`.
     pub(crate) kind: Option<String>,
     pub(crate) body: String,
 }
 
-/// Why a request is refused: status and reason; `None` if nothing can be answered.
+/// Status and reason of a refusal; `None` if the connection is broken, so that no answer is possible.
 pub(crate) type Refusal = Option<(u16, &'static str)>;
 
-/// The start of a request: its parts, the length of the head and that of the body, in bytes.
-type Head = (Parsed, usize, usize);
+/// The head of a request.
+#[derive(Debug)]
+struct Head {
+    /// The request, without its body.
+    request: HttpRequest,
+    /// Length of the head in bytes.
+    size: usize,
+    /// Length of the body in bytes.
+    body_size: usize,
+}
 
-/// Reads a request until `deadline`.
-pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<Parsed, Refusal> {
+/// Reads a request until `deadline`. Refuses a request that is late, too large or not HTTP/1.1, and a body that is not
+/// UTF-8.
+pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequest, Refusal> {
     let mut bytes = Vec::new();
-    let (mut parsed, head, length) = loop {
-        if let Some(complete) = head(&bytes).map_err(Some)? {
-            break complete;
+    let Head { mut request, size, body_size } = loop {
+        if let Some(head) = parse_head(&bytes).map_err(Some)? {
+            break head;
         }
         receive(stream, deadline, &mut bytes)?;
     };
-    while bytes.len() < head + length {
+    let end = size + body_size;
+    while bytes.len() < end {
         receive(stream, deadline, &mut bytes)?;
     }
-    let body = bytes[head..head + length].to_vec();
-    parsed.body = String::from_utf8(body).map_err(|_| Some((400, "the body is not UTF-8")))?;
-    Ok(parsed)
+    let body = bytes[size..end].to_vec();
+    request.body = String::from_utf8(body).map_err(|_| Some((400, "the body is not UTF-8")))?;
+    Ok(request)
 }
 
-/// Appends the bytes that arrive next.
+/// Appends the bytes that arrive next, if any. Returns a refusal after `deadline`, `None` if the client has closed the
+/// connection.
 fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
     let late = Some((408, "the request took too long"));
     let left = deadline.saturating_duration_since(Instant::now());
@@ -71,11 +86,12 @@ fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Re
     }
 }
 
-/// Parses the head of a request; `None` if it is not complete.
-fn head(bytes: &[u8]) -> Result<Option<Head>, (u16, &'static str)> {
+/// Parses the head of a request; `None` if it is not complete. Returns the status and the reason of a refusal if it is
+/// too large, ambiguous or not HTTP/1.1.
+fn parse_head(bytes: &[u8]) -> Result<Option<Head>, (u16, &'static str)> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
-    let mut request = httparse::Request::new(&mut headers);
-    let size = match request.parse(bytes) {
+    let mut parser = httparse::Request::new(&mut headers);
+    let size = match parser.parse(bytes) {
         Ok(httparse::Status::Complete(size)) if size <= HEAD => size,
         Ok(httparse::Status::Partial) if bytes.len() < HEAD => return Ok(None),
         Err(httparse::Error::TooManyHeaders) | Ok(_) => {
@@ -83,42 +99,42 @@ fn head(bytes: &[u8]) -> Result<Option<Head>, (u16, &'static str)> {
         }
         Err(_) => return Err((400, "this is no request of HTTP/1.1")),
     };
-    let target = request.path.unwrap_or_default();
+    let target = parser.path.unwrap_or_default();
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let mut parsed = Parsed {
-        method: request.method.unwrap_or_default().to_owned(),
+    let mut request = HttpRequest {
+        method: parser.method.unwrap_or_default().to_owned(),
         path: path.to_owned(),
         query: query.to_owned(),
-        ..Parsed::default()
+        ..HttpRequest::default()
     };
     let mut length = None;
-    for header in request.headers {
+    for header in parser.headers {
         let name = header.name.to_ascii_lowercase();
         let value = std::str::from_utf8(header.value).unwrap_or("?").trim().to_owned();
-        let place = match name.as_str() {
-            "host" => &mut parsed.host,
-            "origin" => &mut parsed.origin,
-            "sec-fetch-site" => &mut parsed.site,
-            "sec-fetch-mode" => &mut parsed.mode,
-            "content-type" => &mut parsed.kind,
+        let field = match name.as_str() {
+            "host" => &mut request.host,
+            "origin" => &mut request.origin,
+            "sec-fetch-site" => &mut request.site,
+            "sec-fetch-mode" => &mut request.mode,
+            "content-type" => &mut request.kind,
             "content-length" => &mut length,
             "transfer-encoding" => return Err((411, "expected a body with its Content-Length")),
             _ => continue,
         };
-        if place.replace(value).is_some() {
+        if field.replace(value).is_some() {
             return Err((400, "a header is stated twice"));
         }
     }
     let digits = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
-    let length = match length {
+    let body_size = match length {
         None => 0,
         Some(text) if !text.is_empty() && digits(&text) => text.parse().unwrap_or(usize::MAX),
         Some(_) => return Err((400, "the Content-Length is no number")),
     };
-    if length > BODY {
+    if body_size > BODY {
         return Err((413, "the body of the request is too large"));
     }
-    Ok(Some((parsed, size, length)))
+    Ok(Some(Head { request, size, body_size }))
 }
 
 #[cfg(test)]
@@ -126,22 +142,23 @@ mod tests {
     use super::*;
 
     fn status(text: &str) -> u16 {
-        head(text.as_bytes())
+        parse_head(text.as_bytes())
             .map_or_else(|(status, _)| status, |actual| if actual.is_some() { 200 } else { 0 })
     }
 
     #[test]
     fn a_head_is_read_whole_and_only_once_it_is_complete() {
         let text = "POST /t/scenario?a=b HTTP/1.1\r\nHost: 127.0.0.1:1\r\nORIGIN: http://x\r\nContent-Length: 3\r\n\r\nabc";
-        let (actual, size, length) = head(text.as_bytes()).unwrap().unwrap();
+        let head = parse_head(text.as_bytes()).unwrap().unwrap();
+        let Head { request: actual, size, body_size } = head;
         assert_eq!((actual.method.as_str(), actual.path.as_str()), ("POST", "/t/scenario"));
-        assert_eq!((actual.query.as_str(), length, size), ("a=b", 3, text.len() - 3));
+        assert_eq!((actual.query.as_str(), body_size, size), ("a=b", 3, text.len() - 3));
         assert_eq!(
             (actual.host.as_deref(), actual.origin.as_deref()),
             (Some("127.0.0.1:1"), Some("http://x"))
         );
         for end in 0..size {
-            assert!(head(&text.as_bytes()[..end]).unwrap().is_none(), "{end}");
+            assert!(parse_head(&text.as_bytes()[..end]).unwrap().is_none(), "{end}");
         }
     }
 

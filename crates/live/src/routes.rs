@@ -11,21 +11,21 @@ use serde_json::json;
 use crate::action::{Action, Request};
 use crate::answer::Answer;
 use crate::guard::Guard;
-use crate::request::Parsed;
+use crate::request::HttpRequest;
 use crate::shared::{Phase, Shared};
 use crate::store::{Query, SHOWN};
 
-/// Time that an answer of the run may take: a step may be long.
+/// Time to wait for the answer of the run, which may be within a long step.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The type of the entries of a scenario. Browsers send it to another site only after asking for leave, which this
-/// server never gives.
+/// The content type of requests to the run. Browsers send it to another site only after a preflight request, which this
+/// server refuses.
 const TOML: &str = "application/toml";
 
 const HTML: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
-/// What the server serves.
+/// The content of the server, and its access to the run.
 pub(crate) struct Site {
     pub(crate) guard: Guard,
     /// The facts, in JSON.
@@ -36,12 +36,12 @@ pub(crate) struct Site {
 
 impl Site {
     /// Answers a request.
-    pub(crate) fn answer(&self, request: &Parsed) -> Answer {
+    pub(crate) fn answer(&self, request: &HttpRequest) -> Answer {
         let path = match self.guard.admit(request) {
             Ok(path) => path,
             Err((status, reason)) => return Answer::refusal(status, reason),
         };
-        self.shared.store().ask();
+        self.shared.store().record_request();
         let action = match path {
             "pause" => Some(Action::Pause),
             "continue" => Some(Action::Continue),
@@ -62,7 +62,7 @@ impl Site {
         }
     }
 
-    fn read(&self, path: &str, request: &Parsed) -> Answer {
+    fn read(&self, path: &str, request: &HttpRequest) -> Answer {
         match path {
             "" => Answer::file("text/html", HTML),
             "page.css" => Answer {
@@ -85,16 +85,16 @@ impl Site {
     }
 
     fn state(&self, query: &Query) -> Answer {
-        // The run makes a sample at once for the first question of a page.
+        // Calls for a sample at once, so that a page does not wait for the first one.
         self.shared.call_for_sample();
         let dropped = self.shared.dropped.load(Ordering::Relaxed);
-        // Read before the events, so that a page that sees the end has seen them all.
+        // Read before the store takes the events, so that a page that sees the end has all of them.
         let phase = self.shared.phase().name();
         let state = self.shared.store().state(query, phase, dropped);
         Answer::json(200, &state)
     }
 
-    fn perform(&self, action: Action, request: &Parsed) -> Answer {
+    fn perform(&self, action: Action, request: &HttpRequest) -> Answer {
         let kind = request.kind.as_deref().unwrap_or_default();
         if kind.split(';').next().unwrap_or_default().trim() != TOML {
             return Answer::refusal(415, "expected the Content-Type application/toml");
@@ -123,7 +123,8 @@ impl Site {
     }
 }
 
-/// Reads `rows=N&messages=N&show=N,N`; every part may be missing.
+/// Parses `rows=N&messages=N&show=N,N`; every part may be missing, and numbers after the first [`SHOWN`] signals are
+/// ignored. Returns `None` for other text.
 fn query(text: &str) -> Option<Query> {
     let mut query = Query::default();
     for part in text.split('&').filter(|part| !part.is_empty()) {

@@ -1,5 +1,5 @@
-//! The threads of the server: one accepts connections, one calls the run for samples, one for each
-//! connection.
+//! The threads of the server: one accepts connections, one calls the run for samples, and one for each
+//! connection answers its request.
 
 use std::io;
 use std::net::{TcpListener, TcpStream};
@@ -14,29 +14,34 @@ use crate::routes::Site;
 
 /// Largest number of connections at the same time; more are closed at once.
 const CONNECTIONS: usize = 24;
-/// Time for a request and for its answer.
+/// Time for receiving a request.
 const REQUEST_TIME: Duration = Duration::from_secs(2);
+/// Time for sending its answer.
 const ANSWER_TIME: Duration = Duration::from_secs(5);
 /// Pause after a connection that could not be accepted, for example because there are too many open files.
 const REST: Duration = Duration::from_millis(50);
-/// Interval between samples while a page is open, and between two looks whether one is.
+/// Shortest interval between samples while a page is open.
 const SAMPLE: Duration = Duration::from_millis(10);
+/// Interval between two checks whether a page is open.
 const IDLE: Duration = Duration::from_millis(100);
-/// A sample is due after this multiple of the time that one takes.
+/// Shortest interval between samples as a multiple of the time that a sample takes.
 const COSTS: u32 = 50;
 
-/// Starts the threads. They end when the view is closed.
+/// Starts the threads. They end after the view is closed.
 pub(crate) fn start(listener: TcpListener, site: Arc<Site>) -> io::Result<()> {
-    let keeper = site.clone();
-    thread::Builder::new().name("live samples".to_owned()).spawn(move || keep(&keeper))?;
+    let sampled = site.clone();
+    thread::Builder::new()
+        .name("live samples".to_owned())
+        .spawn(move || call_for_samples(&sampled))?;
     thread::Builder::new().name("live view".to_owned()).spawn(move || accept(&listener, &site))?;
     Ok(())
 }
 
-/// Takes the events of the run, and calls for samples while a page is open.
-fn keep(site: &Site) {
+/// Moves the events of the run into the store, and calls for samples while a page is open.
+fn call_for_samples(site: &Site) {
     let shared = &site.shared;
     while !shared.closed.load(Ordering::Acquire) {
+        // The lock of the store ends with this statement.
         let is_watched = shared.store().is_watched();
         if is_watched {
             shared.call_for_sample();
@@ -58,42 +63,42 @@ fn accept(listener: &TcpListener, site: &Arc<Site>) {
             thread::sleep(REST);
             continue;
         };
-        let place = Place::take(&open);
+        let connection = OpenConnection::new(&open);
         if open.load(Ordering::Relaxed) > CONNECTIONS {
             continue;
         }
         let site = site.clone();
-        // Without a thread the connection is closed.
+        // If the thread cannot start, the connection is closed.
         let _ = thread::Builder::new().name("live page".to_owned()).spawn(move || {
             serve(stream, &site);
-            drop(place);
+            drop(connection);
         });
     }
 }
 
-/// A place among the open connections.
-struct Place(Arc<AtomicUsize>);
+/// Counts an open connection until it is dropped.
+struct OpenConnection(Arc<AtomicUsize>);
 
-impl Place {
-    fn take(open: &Arc<AtomicUsize>) -> Self {
+impl OpenConnection {
+    fn new(open: &Arc<AtomicUsize>) -> Self {
         open.fetch_add(1, Ordering::Relaxed);
         Self(open.clone())
     }
 }
 
-impl Drop for Place {
+impl Drop for OpenConnection {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-/// Answers the one request of a connection.
+/// Answers the only request of a connection; closes it without an answer if it is broken.
 fn serve(mut stream: TcpStream, site: &Site) {
     let answer = match request::read(&mut stream, Instant::now() + REQUEST_TIME) {
         Ok(request) => site.answer(&request),
         Err(Some((status, reason))) => Answer::refusal(status, reason),
         Err(None) => return,
     };
-    // The page may have gone.
+    // The page may be closed.
     let _ = answer.write(&mut stream, Instant::now() + ANSWER_TIME);
 }

@@ -1,4 +1,4 @@
-//! What the run and the server share: flags, and a queue from the run to the server.
+//! The state that the run and the server share: flags, and a queue from the run to the server.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
@@ -7,8 +7,9 @@ use std::time::Duration;
 
 use crate::store::{Event, Store};
 
-/// Bits of the flags by which the server calls the run.
+/// The flag by which the server calls the run for a sample.
 const SAMPLE: u8 = 1;
+/// The flag by which the server calls the run for a request.
 const REQUEST: u8 = 2;
 
 /// The state of the run.
@@ -37,10 +38,11 @@ impl Phase {
 pub(crate) struct Shared {
     flags: AtomicU8,
     phase: AtomicU8,
-    /// Processor time in ns that the last sample took.
+    /// Time in ns that the last sample took.
     cost: AtomicU64,
     /// Number of events that were dropped because the queue was full.
     pub(crate) dropped: AtomicU64,
+    /// Whether the view is closed, so that the threads of the server end.
     pub(crate) closed: AtomicBool,
     events: Mutex<Receiver<Event>>,
     store: Mutex<Store>,
@@ -64,7 +66,7 @@ impl Shared {
         self.flags.load(Ordering::Relaxed) != 0
     }
 
-    /// Takes the flags; returns whether a sample is due.
+    /// Clears the flags; returns whether a sample is due.
     pub(crate) fn take_calls(&self) -> bool {
         self.flags.swap(0, Ordering::Acquire) & SAMPLE != 0
     }
@@ -98,8 +100,8 @@ impl Shared {
         self.cost.store(nanoseconds, Ordering::Relaxed);
     }
 
-    /// Moves all events of the run into the store and returns the store. Only threads of the server
-    /// call this, so the run never waits for it.
+    /// Moves all events of the run into the store and returns the locked store. During the run only threads of the
+    /// server call this, so that the run does not wait for the lock.
     pub(crate) fn store(&self) -> MutexGuard<'_, Store> {
         let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
         let mut store = self.store.lock().unwrap_or_else(PoisonError::into_inner);

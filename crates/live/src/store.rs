@@ -1,4 +1,4 @@
-//! What the server keeps of a run: rows, messages, interventions.
+//! The rows, messages and interventions of a run that the server keeps.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Limits of the rows: their number, and the number of all values in them.
+/// Largest number of rows kept.
 const MOST_ROWS: usize = 4000;
+/// Number of rows that are kept even if they have more than [`VALUES`] values.
 const LEAST_ROWS: usize = 100;
+/// Largest number of values in all rows.
 const VALUES: usize = 1_000_000;
 /// Largest number of messages kept, and sent at once.
 const MESSAGES: usize = 1000;
@@ -22,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 pub struct Sample {
     /// Time in s.
     pub time: f64,
-    /// Values of [`crate::Facts::signals`].
+    /// Values of [`crate::Facts::signals`]; a sample with another number of values adds no row.
     pub values: Vec<f64>,
     /// Number of communication steps so far.
     pub steps: u64,
@@ -34,10 +36,10 @@ pub struct Sample {
     pub late: Option<u64>,
 }
 
-/// What the run tells the server.
+/// An event that the run sends to the server.
 pub(crate) enum Event {
     Sample(Sample),
-    /// A message; the name of its FMU is empty if it has none.
+    /// A message; `fmu` is empty if it comes from no FMU.
     Message {
         fmu: String,
         text: String,
@@ -58,18 +60,21 @@ struct Message {
     text: String,
 }
 
-/// A row of the signals; numbers grow with time.
+/// The values of all signals at a time. Later rows have larger numbers.
 struct Row {
     number: u64,
     time: f64,
     values: Vec<f64>,
 }
 
-/// What a page asks for: the rows and messages after these numbers, of these signals.
+/// The rows and messages that a page requests.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Query {
+    /// Number of the last row that the page has.
     pub(crate) rows_after: u64,
+    /// Number of messages that the page has.
     pub(crate) messages_after: u64,
+    /// Positions of the signals whose values the page shows.
     pub(crate) shown: Vec<usize>,
 }
 
@@ -81,13 +86,19 @@ pub(crate) struct Store {
     last: Sample,
     /// Number of the last row.
     row_number: u64,
+    /// The last messages.
     messages: VecDeque<Message>,
+    /// Number of all messages so far.
     message_count: u64,
+    /// Number of messages by FMU.
     counts: BTreeMap<String, u64>,
+    /// Time in s and text of each intervention.
     interventions: Vec<(f64, String)>,
+    /// The outcome of the run, after its end.
     outcome: Option<String>,
-    /// When a page last asked, and whether it has seen the outcome.
-    asked: Option<Instant>,
+    /// Time of the last request of a page.
+    last_request: Option<Instant>,
+    /// Whether a page has received the outcome.
     pub(crate) outcome_shown: bool,
 }
 
@@ -115,17 +126,17 @@ impl Store {
 
     fn add_sample(&mut self, mut sample: Sample) {
         let values = std::mem::take(&mut sample.values);
-        let repeated = self.rows.back().is_some_and(|row| row.time >= sample.time);
+        let is_repeated = self.rows.back().is_some_and(|row| row.time >= sample.time);
         let time = sample.time;
         self.last = sample;
-        if repeated || values.len() != self.signals {
+        if is_repeated || values.len() != self.signals {
             return;
         }
         self.row_number += 1;
         self.rows.push_back(Row { number: self.row_number, time, values });
         let most = (VALUES / self.signals.max(1)).clamp(LEAST_ROWS, MOST_ROWS);
         if self.rows.len() > most {
-            // The older a row, the more of its neighbours are gone.
+            // Removes every second row except the newest quarter, so that old rows become sparse.
             let mut position = 0;
             let newest = self.rows.len() - most / 4;
             self.rows.retain(|_| {
@@ -135,17 +146,18 @@ impl Store {
         }
     }
 
-    /// Records that a page has asked.
-    pub(crate) fn ask(&mut self) {
-        self.asked = Some(Instant::now());
+    /// Records that a page has sent a request now.
+    pub(crate) fn record_request(&mut self) {
+        self.last_request = Some(Instant::now());
     }
 
-    /// Whether a page is open.
+    /// Returns whether a page is open: it has sent a request within [`PATIENCE`].
     pub(crate) fn is_watched(&self) -> bool {
-        self.asked.is_some_and(|asked| asked.elapsed() < PATIENCE)
+        self.last_request.is_some_and(|time| time.elapsed() < PATIENCE)
     }
 
-    /// Returns what the page asks for; values that are not finite are null.
+    /// Returns the state of the run with the rows and messages of `query`; values that are not finite, and those of
+    /// signals that do not exist, are null.
     pub(crate) fn state(&mut self, query: &Query, phase: &str, dropped: u64) -> Value {
         self.outcome_shown |= self.outcome.is_some();
         let rows: Vec<&Row> =

@@ -1,4 +1,4 @@
-//! The side of the run.
+//! The interface of the run to its page.
 
 use std::io;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -15,13 +15,14 @@ use crate::server;
 use crate::shared::{Phase, Shared};
 use crate::store::{Event, Sample, Store};
 
-/// Number of events of the run that wait for the server, and of requests that wait for the run.
+/// Largest number of events of the run that wait for the server.
 const EVENTS: usize = 4096;
+/// Largest number of requests that wait for the run.
 const REQUESTS: usize = 32;
-/// Interval between two looks whether the page has seen the end.
+/// Interval between two checks whether the page has received the end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Passes messages to the page; any thread may use it.
+/// Sends messages to the page, from any thread. Messages that the server cannot take at once are dropped and counted.
 #[derive(Clone)]
 pub struct Messages {
     events: SyncSender<Event>,
@@ -29,19 +30,19 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Passes on a message of `fmu`; an empty name is that of no FMU.
+    /// Sends a message of the FMU `fmu`; the name is empty for a message that comes from no FMU.
     pub fn send(&self, fmu: &str, text: String) {
-        self.pass(Event::Message { fmu: fmu.to_owned(), text });
+        self.publish(Event::Message { fmu: fmu.to_owned(), text });
     }
 
-    fn pass(&self, event: Event) {
+    fn publish(&self, event: Event) {
         if self.events.try_send(event).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
 
-/// The page of a run, on the side of the run.
+/// The page of a run. The server ends when it is dropped.
 pub struct View {
     messages: Messages,
     shared: Arc<Shared>,
@@ -51,23 +52,23 @@ pub struct View {
 }
 
 impl View {
-    /// Starts the server of the page, at a random port of 127.0.0.1.
+    /// Starts the server of the page at a random port of 127.0.0.1. `phase` is the phase in which the run starts.
     ///
     /// # Errors
     ///
-    /// Returns an error if there is no port, no randomness or no thread.
+    /// Returns an error if the system provides no port, no random numbers or no thread.
     pub fn open(facts: &Facts, phase: Phase) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let port = listener.local_addr()?.port();
         let token = Token::random()?;
         let address = format!("http://127.0.0.1:{port}/{}/", token.text());
-        let (events, received) = sync_channel(EVENTS);
-        let (asked, requests) = sync_channel(REQUESTS);
+        let (events, event_queue) = sync_channel(EVENTS);
+        let (request_sender, requests) = sync_channel(REQUESTS);
         let store = Store::new(facts.signals.len(), facts.start);
-        let shared = Arc::new(Shared::new(received, store, phase));
+        let shared = Arc::new(Shared::new(event_queue, store, phase));
         let facts = serde_json::to_string(facts).map_err(io::Error::other)?;
         let guard = Guard::new(token, port);
-        let site = Site { guard, facts, shared: shared.clone(), requests: asked };
+        let site = Site { guard, facts, shared: shared.clone(), requests: request_sender };
         server::start(listener, Arc::new(site))?;
         let messages = Messages { events, shared: shared.clone() };
         Ok(Self { messages, shared, requests, port, address })
@@ -79,26 +80,27 @@ impl View {
         &self.address
     }
 
-    /// Whether a page wants something: a sample, or an answer.
+    /// Returns whether the server calls for a sample or for the answer to a request.
     #[inline]
     #[must_use]
     pub fn is_called(&self) -> bool {
         self.shared.is_called()
     }
 
-    /// Takes notice of the call; returns whether a sample is due. Requests are then taken by
-    /// [`View::request`].
+    /// Ends the call, so that [`View::is_called`] returns false until the next one; returns whether a sample is
+    /// due. The requests are then available by [`View::request`].
     #[must_use]
     pub fn take_calls(&self) -> bool {
         self.shared.take_calls()
     }
 
-    /// Lets [`View::is_called`] return true at the next communication point.
+    /// Makes [`View::is_called`] return true, for example at the next communication point.
     pub fn call_again(&self) {
         self.shared.call_for_request();
     }
 
-    /// Returns the next request; waits for it at most the time `wait`.
+    /// Returns the next request, if there is one; waits for it up to the time `wait`, or not at all if `wait`
+    /// is `None`.
     #[must_use]
     pub fn request(&self, wait: Option<Duration>) -> Option<Request> {
         match wait {
@@ -114,38 +116,38 @@ impl View {
         }
     }
 
-    /// Publishes a sample.
+    /// Publishes a sample. The sample is dropped and counted if the server cannot take it at once.
     pub fn publish(&self, sample: Sample) {
-        self.messages.pass(Event::Sample(sample));
+        self.messages.publish(Event::Sample(sample));
     }
 
-    /// States the time that the last sample took; samples are then due so rarely that they take at
-    /// most 2 % of the time.
+    /// Sets the time that the last sample took. The server then calls for samples so rarely that those of up to a
+    /// second take at most 2 % of the time, apart from the samples that a page requests.
     pub fn set_cost(&self, cost: Duration) {
         self.shared.set_cost(cost);
     }
 
-    /// Publishes an intervention at `time` in s.
+    /// Publishes an intervention at `time` in s. It is dropped and counted if the server cannot take it at once.
     pub fn intervened(&self, time: f64, text: String) {
-        self.messages.pass(Event::Intervention { time, text });
+        self.messages.publish(Event::Intervention { time, text });
     }
 
-    /// Publishes what the run does now.
+    /// Publishes the phase of the run.
     pub fn set_phase(&self, phase: Phase) {
         self.shared.set_phase(phase);
     }
 
-    /// Returns a way to the page for messages.
+    /// Returns a sender of messages to the page.
     #[must_use]
     pub fn messages(&self) -> Messages {
         self.messages.clone()
     }
 
-    /// Publishes the end of the run and closes the server; an open page gets at most the time
-    /// `patience` to see it.
+    /// Publishes the end of the run and closes the server. If a page is open, waits up to the time `patience`
+    /// until it has received the end.
     pub fn end(self, outcome: &str, patience: Duration) {
         let outcome = outcome.to_owned();
-        // The server takes events until it is closed.
+        // Waits if the queue is full: the server takes events until it is closed.
         let _ = self.messages.events.send(Event::Ended { outcome });
         self.shared.set_phase(Phase::Ended);
         let start = Instant::now();
