@@ -1,6 +1,6 @@
 //! Axes: the map from values to page coordinates, and the ticks at round values.
 
-/// Larger magnitudes are clipped to this value, so that sums of two values stay finite.
+/// Ends of axes of a larger magnitude are clipped to this value, so that sums of two values stay finite.
 const HUGE: f64 = 1e300;
 
 /// The scale of an axis.
@@ -12,7 +12,8 @@ enum Scale {
 }
 
 impl Scale {
-    fn stretch(self, value: f64) -> f64 {
+    /// Maps a value to a linear scale; for a symmetric scale, the magnitude that starts the decades becomes 1.
+    fn to_linear(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
             Self::Symmetric(knee) => {
@@ -35,8 +36,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Creates a linear axis with exactly this range; an empty or infinite range is replaced by a
-    /// usable one.
+    /// Creates a linear axis with exactly this range. A range that is reversed or not finite is replaced by 0 to 1, and
+    /// a range of almost no length is widened.
     #[must_use]
     pub fn exact(low: f64, high: f64, pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
@@ -56,13 +57,15 @@ impl Axis {
         Self { scale: Scale::Linear, low, high, pixels, ticks }
     }
 
-    /// Creates an axis that is linear between minus and plus `knee` and logarithmic beyond.
+    /// Creates an axis over `ends` that is linear between minus and plus `knee`, which is above 0, and
+    /// logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends.0, ends.1, pixels, ticks) }
     }
 
-    /// Creates a linear axis with a margin around finite values, up to a maximum magnitude.
+    /// Creates a linear axis with a margin around `values`, whose magnitudes count as `cap` if they are larger. Ignores
+    /// NaN; without values, the axis is around 0 to 1.
     pub fn around(
         values: impl Iterator<Item = f64>,
         cap: Option<f64>,
@@ -76,8 +79,8 @@ impl Axis {
             (low.min(value), high.max(value))
         });
         let tight = Self::exact(low, high, pixels, ticks);
-        let air = 0.06 * (tight.high - tight.low);
-        Self { low: tight.low - air, high: tight.high + air, ..tight }
+        let margin = 0.06 * (tight.high - tight.low);
+        Self { low: tight.low - margin, high: tight.high + margin, ..tight }
     }
 
     /// Returns the range of the values.
@@ -99,10 +102,10 @@ impl Axis {
     }
 
     /// Returns the page coordinate of a value; a value far outside is clipped to one axis length
-    /// outside.
+    /// outside. NaN gives NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
-        let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
+        let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.to_linear(end));
         let share = (value - low) / (high - low);
         let (first, last) = self.pixels;
         first + share.clamp(-1.0, 2.0) * (last - first)
@@ -128,7 +131,8 @@ impl Axis {
         }
     }
 
-    /// Returns the number of decades between two ticks.
+    /// Returns the number of decades between two ticks of an axis over `decades`, so that there are about as many ticks
+    /// as requested.
     fn stride(&self, decades: f64) -> i32 {
         let most = f64::from(self.ticks);
         (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)
@@ -173,7 +177,7 @@ fn power_label(power: i32) -> String {
     format!("10{}", power.to_string().chars().map(raise).collect::<String>())
 }
 
-/// Returns the smallest of 1, 2, 5 times a power of ten that is not below `minimum`.
+/// Returns the smallest of 1, 2, 5 times a power of ten that is not below `minimum`, with a tolerance of 0.1 %.
 fn round_step(minimum: f64) -> f64 {
     let power = 10_f64.powf(minimum.log10().floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= 0.999 * minimum);

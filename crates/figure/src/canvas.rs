@@ -1,4 +1,4 @@
-//! The page: SVG elements and rasterisation.
+//! The page of a figure: writes SVG elements and rasterises them.
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
@@ -10,7 +10,7 @@ use super::outline::outline_texts;
 const SCALE: f32 = 2.0;
 const FONTS: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
 
-/// A point on the page: to the right, and down.
+/// A point on the page in SVG units: x to the right, y down.
 type Place = (f64, f64);
 
 /// The part of a text that is at its position.
@@ -99,8 +99,8 @@ impl Canvas {
 
     /// Draws a text rotated by 90 degrees, from bottom to top.
     pub(super) fn upward_text(&mut self, (x, y): Place, size: f64, colour: &str, text: &str) {
-        let turn = format!(r#" transform="rotate(-90 {x:.1} {y:.1})""#);
-        self.put_text((x, y), Anchor::Middle, size, colour, text, &turn);
+        let rotation = format!(r#" transform="rotate(-90 {x:.1} {y:.1})""#);
+        self.put_text((x, y), Anchor::Middle, size, colour, text, &rotation);
     }
 
     fn put_text(
@@ -128,12 +128,12 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.58 * size).sum()
 }
 
-/// Returns the width of a number in the embedded font, whose digits are wider than its letters.
+/// Returns the width of a number in the embedded font, whose digits are wider than its letters on average.
 pub(super) fn digits_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.64 * size).sum()
 }
 
-/// Escapes a text for XML; control characters become spaces.
+/// Escapes a text for the content of an XML element; control characters become spaces.
 fn escape(text: &str) -> String {
     text.chars()
         .map(|letter| match letter {
@@ -150,8 +150,8 @@ fn escape(text: &str) -> String {
 ///
 /// # Errors
 ///
-/// [`FigureError::Pixels`] if `svg` is not an SVG or has no area, or if one of its texts is not
-/// plain: has elements in it, or several positions.
+/// [`FigureError::Pixels`] if `svg` is not an SVG, has no area or is too large, or if one of its texts is not
+/// plain: it contains elements, has several positions, or its position or size is not a number.
 pub fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
     let failed = |reason: &dyn std::fmt::Display| FigureError::Pixels(reason.to_string());
     let outlined = outline_texts(svg).map_err(|reason| failed(&reason))?;

@@ -1,9 +1,10 @@
-//! Line plots of time series as SVG and PNG, and what pages with [`interactive`] plots have in common.
+//! Line plots of time series as SVG and PNG, and the common scripts and styles of pages with [`interactive`]
+//! plots.
 //!
-//! The SVG is written here and not by a plotting library, because a panel needs a legend of many
-//! long names outside of its frame, and a curve of millions of samples that keeps every spike; the
-//! report of a design draws its own diagrams with the same [`axis`]. The PNG is
-//! rasterised from the SVG with an embedded font, so a figure looks the same on a machine without
+//! This crate writes the SVG without a plotting library, because a panel needs a legend of many
+//! long names outside of its frame, and a curve of millions of samples that keeps every spike. The
+//! report of a design draws further diagrams with the same [`axis`]. The PNG is
+//! rasterised from the SVG with an embedded font, so that a figure looks the same on a machine without
 //! fonts.
 
 pub mod axis;
@@ -63,16 +64,17 @@ pub struct Panel<'a> {
     pub y_label: &'a str,
     /// Range of the time axis; `None`: all finite times.
     pub x_range: Option<(f64, f64)>,
-    /// Limit of the automatic range of the vertical axis. Larger values leave the frame, and the
-    /// legend notes it.
+    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, and a text
+    /// beside the legend says so.
     pub y_cap: Option<f64>,
     /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,
-    /// Times marked by a vertical dashed line with a text.
+    /// Times marked by a vertical dashed line, each with its text in the legend. Times outside of the axis are left
+    /// out.
     pub marks: Vec<(f64, &'a str)>,
-    /// Height of the frame in SVG units, if it differs from the default.
+    /// Height of the frame in SVG units; default: 168.
     pub frame_height: Option<f64>,
-    /// A claimed bound of the magnitude and its name: thin lines at plus and minus the bound.
+    /// A claimed bound of the magnitude and its name in the legend: thin lines at plus and minus the bound.
     pub limit: Option<(f64, &'a str)>,
 }
 
@@ -130,7 +132,7 @@ impl Series<'_> {
     }
 }
 
-/// Why a figure was not written.
+/// The reason why a figure could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {
@@ -216,7 +218,7 @@ impl Panel<'_> {
         LEGEND_HEIGHT + legend::height(&self.legend(&self.horizontal(left)), left)
     }
 
-    /// Returns the left margin that the tick labels and the axis label need.
+    /// Returns the left margin that the vertical axis needs for its label and the labels of its ticks.
     fn left(&self) -> f64 {
         let vertical = self.vertical(&self.horizontal(LEFT), (PLOT_HEIGHT, 0.0));
         let width = |(_, label): (f64, String)| canvas::digits_width(&label, TEXT_SIZE);
@@ -229,7 +231,7 @@ impl Panel<'_> {
     }
 
     /// Returns the vertical axis for the values in the range of `horizontal` and for the limits; `pixels` are the
-    /// places of its lowest and highest value.
+    /// page coordinates of its lowest and highest value.
     fn vertical(&self, horizontal: &Axis, pixels: (f64, f64)) -> Axis {
         let (start, end) = horizontal.range();
         let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);
@@ -273,6 +275,7 @@ impl Panel<'_> {
         }
     }
 
+    /// Returns the range of the finite times of all curves; a reversed range if there are none.
     fn times(&self) -> (f64, f64) {
         let times =
             self.series.iter().flat_map(|series| series.time).filter(|time| time.is_finite());

@@ -1,6 +1,7 @@
-//! Text as paths: replaces each `<text>` of an SVG with the outlines of its letters in the embedded
-//! font, letter by letter without kerning. The rasteriser then needs no text stack, which would take
-//! longer to compile than anything else in the command.
+//! Replaces each `<text>` of an SVG by the outlines of its letters in the embedded font, without kerning.
+//!
+//! The rasteriser then needs no text stack, which would take longer to compile than anything else in the
+//! command.
 
 use std::fmt::Write as _;
 
@@ -9,16 +10,16 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 /// Size of a text without `font-size`, in SVG units.
 const DEFAULT_SIZE: f32 = 16.0;
-/// Attributes that act on text only, or that the position of the outlines replaces.
+/// Attributes of a `<text>` that its path does not need, because the outlines include them.
 const TEXT_ATTRIBUTES: [&str; 7] =
     ["x", "y", "text-anchor", "font-size", "font-family", "font-weight", "font-style"];
 
-/// Returns `svg` with paths in the place of texts.
+/// Returns `svg` with a path instead of each text.
 ///
 /// # Errors
 ///
-/// Returns the reason if `svg` is not XML, or if a text is not plain: has elements in it, several
-/// positions, or no numbers for position and size.
+/// Returns the reason if `svg` is not XML, or if a text is not plain: it contains elements, has several
+/// positions, or its position or size is not a number.
 pub(super) fn outline_texts(svg: &str) -> Result<String, String> {
     let document = Document::parse(svg).map_err(|error| error.to_string())?;
     let face = Face::parse(dejavu::sans::regular(), 0).map_err(|error| error.to_string())?;
@@ -51,12 +52,12 @@ fn path(node: Node<'_, '_>, face: &Face<'_>) -> Result<String, String> {
     let glyphs = text.chars().map(|letter| face.glyph_index(letter).unwrap_or(GlyphId(0)));
     let advance = |glyph| scale * f32::from(face.glyph_hor_advance(glyph).unwrap_or(0));
     let width: f32 = glyphs.clone().map(advance).sum();
-    let before = match inherited(node, "text-anchor") {
+    let shift = match inherited(node, "text-anchor") {
         Some("middle") => 0.5 * width,
         Some("end") => width,
         _ => 0.0,
     };
-    let mut pen = Pen { data: String::new(), x: x - before, y, scale };
+    let mut pen = Pen { data: String::new(), x: x - shift, y, scale };
     for glyph in glyphs {
         face.outline_glyph(glyph, &mut pen);
         pen.x += advance(glyph);
@@ -73,7 +74,7 @@ fn path(node: Node<'_, '_>, face: &Face<'_>) -> Result<String, String> {
     Ok(path)
 }
 
-/// Returns an attribute of the element or of the nearest element around it.
+/// Returns an attribute of the element or of the nearest element around it, if any has it.
 fn inherited<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     node.ancestors().find_map(|node| node.attribute(name))
 }

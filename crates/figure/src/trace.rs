@@ -1,11 +1,12 @@
-//! Reduces a long series to a short SVG path that looks the same.
+//! Reduces a long series to a short SVG path with the same appearance.
 
 use super::axis::Axis;
 
-/// Returns the SVG path of a series, with a resolution of 0.1 page unit.
+/// Returns the SVG path of a series, with a resolution of 0.1 page unit; empty without points.
 ///
-/// Of the points in a column of one unit, the first, lowest, highest and last are kept. So no spike
-/// is lost, and the width of the page bounds the length of the path. Takes one pass.
+/// Points outside of the range of `horizontal` are left out, and values that are not finite leave a gap. Of the points
+/// in a column of one unit, the first, lowest, highest and last are kept, so that no spike is lost and the width
+/// of the page bounds the length of the path. Takes time proportional to the number of points.
 #[must_use]
 pub(crate) fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
     let place = |value: f64| if value.is_finite() { vertical.place(value) } else { f64::NAN };
@@ -18,12 +19,12 @@ pub(crate) fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &A
     points
         .split(|point| point.1.is_nan())
         .filter(|run| !run.is_empty())
-        .map(|run| piece(&outline(run)))
+        .map(|run| stroke(&decimate(run)))
         .collect()
 }
 
-/// Reduces a run of points without gaps.
-fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
+/// Keeps the first, lowest, highest and last point of each column in a run of points without gaps.
+fn decimate(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     for column in run.chunk_by(|a, b| (a.0.floor() - b.0.floor()).abs() < 0.5) {
         let by_height = |a: &usize, b: &usize| column[*a].1.total_cmp(&column[*b].1);
@@ -41,7 +42,7 @@ fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// Formats one stroke. The first point occurs twice, so that a single point is drawn as a dot.
-fn piece(points: &[(f64, f64)]) -> String {
+fn stroke(points: &[(f64, f64)]) -> String {
     let write = |point: &(f64, f64)| format!("{:.1} {:.1}", point.0, point.1);
     let texts: Vec<String> = points.iter().take(1).chain(points).map(write).collect();
     format!("M{}", texts.join(" "))
