@@ -39,6 +39,8 @@ pub struct PreparedRun {
     /// The variables to record.
     pub ports: Vec<Port>,
     scenario: Scenario,
+    /// The tables in memory that the scenario reads.
+    tables: Vec<(PathBuf, Table)>,
     /// The system structure, whose folders are removed after the system.
     opened: Option<Arc<Opened>>,
 }
@@ -80,7 +82,8 @@ impl PreparedRun {
         let config = loaded.config;
         let ports = select(&system, &config.results.record, &config.results.exclude)?;
         check_saving(&config, &system)?;
-        Ok(Self { config, system, plan, ports, scenario, opened })
+        let tables = options.tables.to_vec();
+        Ok(Self { config, system, plan, ports, scenario, tables, opened })
     }
 
     /// Initialises the FMUs, or restores them from the checkpoint `saved`, and creates the results
@@ -119,7 +122,7 @@ impl PreparedRun {
         saved: Option<&SavedRun>,
         record: impl FnOnce(&mut Simulation, &[Port], Every, f64) -> Result<Option<Recorder>, Error>,
     ) -> Result<Run, Error> {
-        let Self { config, mut system, plan, ports, scenario, opened } = self;
+        let Self { config, mut system, plan, ports, scenario, tables, opened } = self;
         let trace = config.results.bus_trace.as_deref();
         let trace = trace.map(|path| BusTrace::create(path, &mut system)).transpose()?;
         let text = config.render()?;
@@ -150,6 +153,7 @@ impl PreparedRun {
             config,
             plan,
             trace,
+            tables,
             _opened: opened,
         })
     }
@@ -270,6 +274,8 @@ pub struct Run {
     resumed: bool,
     tally: RunStatistics,
     trace: Option<BusTrace>,
+    /// The tables in memory that the scenario reads.
+    tables: Vec<(PathBuf, Table)>,
     /// The system structure, whose folders are removed after the simulation.
     _opened: Option<Arc<Opened>>,
 }

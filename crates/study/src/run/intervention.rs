@@ -64,10 +64,9 @@ impl Run {
         let mut scenario = self.config.scenario.clone();
         scenario.set.extend(added.set);
         scenario.fault.extend(added.fault);
-        let start = self.plan.experiment.start_time;
+        let (start, step) = (self.plan.experiment.start_time, self.plan.algorithm.step);
         // The paths are absolute already.
-        let setup =
-            Setup { folder: Path::new(""), start, step: self.plan.algorithm.step, tables: &[] };
+        let setup = Setup { folder: Path::new(""), start, step, tables: &self.tables };
         let resolved = scenario.resolve(self.simulation.system(), &setup)?;
         self.simulation.change_scenario(resolved.scenario)?;
         if let Some(recorder) = &mut self.recorder {
