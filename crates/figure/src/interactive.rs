@@ -1,13 +1,12 @@
 //! Scripts and style sheets of interactive plots, for HTML pages that are one file.
 //!
 //! A page includes [`UPLOT_STYLE`], [`COLOURS`], [`BASE_STYLE`] and [`LINKED_STYLE`], then [`UPLOT`] and [`LINKED`].
-//! Its own script makes a `LinkedAxis` for each quantity on a horizontal axis and calls its method `plot` for each
-//! plot: a drag along the axis zooms all plots of it, a drag across zooms the vertical axis of one; their cursors move
-//! together, and the legends show the values there, and their differences to those at a second cursor. Everything
-//! works from the keyboard. On a touch screen two fingers zoom and a double tap shows everything. [`USAGE`] says this
-//! to the reader.
+//! The script of the page creates a `LinkedAxis` for each quantity on a horizontal axis and calls its method `plot` for
+//! each plot. A horizontal drag zooms all plots of the axis, a vertical drag zooms the vertical axis of one plot. The
+//! cursors of the plots move together; the legends show the values at the cursor and their differences to the values at
+//! a second cursor. The plots can be operated by keyboard and on a touch screen. [`USAGE`] explains this to the reader.
 //!
-//! A page whose parts are folded includes [`FOLD`].
+//! A page with elements `details` includes [`FOLD`].
 
 /// The style sheet of the colours, light and dark.
 pub const COLOURS: &str = include_str!("interactive/colours.css");

@@ -121,8 +121,8 @@ impl View {
         self.messages.publish(Event::Sample(sample));
     }
 
-    /// Sets the time that the last sample took. The server then calls for samples so rarely that those of up to a
-    /// second take at most 2 % of the time, apart from the samples that a page requests.
+    /// Sets the time that the last sample took. The server then calls for samples so rarely that samples of
+    /// up to a second take at most 2 % of the time, apart from the samples that a page requests.
     pub fn set_cost(&self, cost: Duration) {
         self.shared.set_cost(cost);
     }

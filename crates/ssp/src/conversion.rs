@@ -20,7 +20,8 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    /// Creates the measure of a stated type. The first of `scopes` that defines its name counts.
+    /// Creates the measure of a stated type; its unit or enumeration is defined by the first of `scopes` that has its
+    /// name. Empty for types without unit and enumeration.
     pub(super) fn stated(kind: Option<&Type>, scopes: &[&Definitions]) -> Self {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
@@ -29,14 +30,14 @@ impl Measure {
         }
     }
 
-    /// Creates the measure of a unit, defined by the first of `scopes` that knows its name.
+    /// Creates the measure of a unit, defined by the first of `scopes` that has its name.
     pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), items: None }
     }
 
-    /// Creates the measure of an enumeration, defined by the first of `scopes` that knows its name.
+    /// Creates the measure of an enumeration, defined by the first of `scopes` that has its name.
     pub(super) fn enumeration(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
         let items = all.find(|known| known.name == name).map(|known| known.items.clone());
@@ -142,7 +143,7 @@ impl ConversionChain {
             let stated = resolve(stated, &self.measure, &there)?;
             transformation = then(transformation, stated)?;
         }
-        // After a suppressed conversion the unit of the source is no longer valid.
+        // After a suppressed conversion, the values are not in the unit of the source.
         let unit = if conversion.suppress_units { None } else { self.measure.unit };
         let items = if stated.is_some() { None } else { self.measure.items };
         let measure = there.or(Measure { unit, items });

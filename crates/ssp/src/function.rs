@@ -25,6 +25,7 @@ pub enum Function {
 }
 
 impl Function {
+    /// Returns the number of inputs and the number of components of each.
     fn shape(&self) -> (usize, usize) {
         match self {
             Function::Sum { inputs } => (*inputs, 1),

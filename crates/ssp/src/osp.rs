@@ -60,6 +60,7 @@ struct Loader {
     linear: Vec<(String, Linear)>,
 }
 
+/// A linear transformation with the connections to it.
 #[derive(Default)]
 struct Linear {
     factor: f64,

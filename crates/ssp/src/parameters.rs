@@ -264,8 +264,8 @@ impl Binder<'_> {
     }
 }
 
-/// Adds all variables and connectors below `node` with the hierarchical name `name` to `vertices`. A name may
-/// stand for several of them, because names of elements may contain dots.
+/// Adds all variables and connectors below `node` with the hierarchical name `name` to `vertices`. There may be
+/// several of them, because names of elements may contain dots.
 fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
     let element = &tree.nodes[node];
     match element.content {

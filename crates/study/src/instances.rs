@@ -243,7 +243,7 @@ fn compiled(element: &Element) -> Result<PathBuf, Error> {
 }
 
 /// Opens the FMU of an element for separate processes. Warnings about an FMU in an SSP were already
-/// with_call_log when the SSP was opened.
+/// logged when the SSP was opened.
 fn open_package(element: &Element, path: &Path) -> Result<Content, Error> {
     let opened = isolate::Package::open(path);
     let package = opened.map_err(|error| Error::from(error).within(&element.name))?;

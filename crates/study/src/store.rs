@@ -98,8 +98,8 @@ impl Store {
         Ok(opened)
     }
 
-    /// Forgets all FMUs and system structures. Their unpacked files are removed when no run uses them
-    /// any more.
+    /// Removes all FMUs and system structures from the store. Their unpacked files are removed when the last run
+    /// that uses them ends.
     pub fn clear(&self) {
         lock(&self.fmus).clear();
         lock(&self.systems).clear();

@@ -230,7 +230,7 @@ fn quotation(field: &[u8]) -> String {
     String::from_utf8_lossy(field).chars().take(LONGEST_QUOTATION).collect()
 }
 
-/// Returns the line on which a record starts. The position of a record may be that of empty lines before it.
+/// Returns the line on which a record starts, without the empty lines that its position may include.
 fn line_of(bytes: &[u8], record: &ByteRecord) -> usize {
     let position = record.position().map_or(0, csv::Position::byte);
     let start = usize::try_from(position).unwrap_or(0).min(bytes.len());

@@ -60,7 +60,7 @@ impl Value {
         Value { number, measure }
     }
 
-    /// Converts the unit to that of `there`, then applies the transformation of a mapping; also returns warnings.
+    /// Converts the value to the unit of `there`, then applies the transformation of a mapping; also returns warnings.
     /// Returns an error sentence if the units measure different quantities or if the transformation is for
     /// another type.
     pub(super) fn convert(

@@ -134,7 +134,7 @@ pub enum Reason {
         /// The unit stated.
         stated: String,
     },
-    /// The unit cannot be converted to that of the variable.
+    /// The unit cannot be converted to the unit of the variable.
     #[error("{name} is in {unit:?}, to which {stated:?} cannot be converted")]
     Dimension {
         /// The variable.

@@ -99,7 +99,7 @@ struct EntryConverter<'a> {
     target: Target<'a>,
     /// Start of the simulation in s.
     start: f64,
-    /// Position of the fault among those of the input; it distinguishes their random series.
+    /// Position among the faults of the input, so that two of them have different random series.
     index: u64,
 }
 
