@@ -225,7 +225,7 @@ def results_of(aso_ftc, folder, fmus, links, settings, stop):
     text += "[settings]\n" + "".join(f'"{name}" = {value}\n' for name, value in settings.items())
     text += f'[algorithm]\nstep = 0.001\nextrapolation = "hold"\n[experiment]\nstop-time = {stop}\n'
     (folder / "system.toml").write_text(text, encoding="utf-8")
-    done = aso_ftc("run", folder / "system.toml", "--results", folder / "results.csv", "--force")
+    done = aso_ftc("run", folder / "system.toml", "--results", folder / "results.csv")
     assert done.returncode == 0, done.stderr
     return np.genfromtxt(folder / "results.csv", delimiter=",", names=True, dtype=None, encoding=None, deletechars="")
 
@@ -267,12 +267,12 @@ FROM_THE_FILTER += [("filter.x_hat[2]", "feedback.x_filter[2]"), ("filter.f_hat"
 FROM_THE_FILTER += [("feedback.u", "plant.u"), ("feedback.u", "filter.u")]
 
 
-@pytest.mark.parametrize("more", ["", "t_on = 0.1", '[reference]\ntrack = ["theta_m"]'], ids=["regulator", "t_on", "reference"])
+@pytest.mark.parametrize("more", ["", "t_on = 0.1\nmonitor = true", '[reference]\ntrack = ["theta_m"]'], ids=["regulator", "t_on", "reference"])
 def test_a_linear_plant_moves_alike_with_the_filter_and_with_the_observer(servo, aso_ftc, examples, tmp_path, more):
     """With a friction, which acts like a fault, and a reference if there is one."""
     text = SERVO.format(plant=examples["DcServo"])
     paths = servo(f"{more}\n{text}" if more.startswith("t_on") else f"{text}\n{more}")
-    settings = {"plant.friction": 0.002, "plant.theta": 0.3}
+    settings = {"plant.friction": "true", "plant.theta": 0.3}
     angles = []
     for name in ("controller", "feedback"):
         with_reference = "track" in more
@@ -314,8 +314,17 @@ def test_a_sensor_of_every_seventh_sample_gives_the_loop_of_the_periodic_kalman_
     assert np.abs(actual - commands).max() < 1e-5 * np.abs(commands).max()
 
 
+DETECTION = """
+[detection]
+method = "cusum"
+false_alarm_interval = 1e6
+noise = 0.002
+sizes = { f_Q_1 = 1e-5, f_Q_2 = 1e-5 }
+"""
+
+
 def test_a_controller_without_observer_has_no_decisions_on_faults(attempt, examples, tmp_path):
-    text = TANKS.format(plant=examples["ThreeTank"]) + NOISE + "\n[detection]\nfalse_alarm_interval = 1e6\n"
+    text = TANKS.format(plant=examples["ThreeTank"]) + NOISE + DETECTION
     done, path = attempt(text, "--feedback-fmu", tmp_path / "Feedback.fmu")
     assert (done.returncode, path.exists()) == (2, False)
     assert "no controller for the estimates of the Kalman filter" in done.stderr

@@ -55,8 +55,8 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     scope.open(&element);
     let namespace = scope.space(&element).unwrap_or_default().to_owned();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    let is_root = namespace == required
-        || (namespace.is_empty() && scope.has_assumed_prefix(&element));
+    let is_root =
+        namespace == required || (namespace.is_empty() && scope.has_assumed_prefix(&element));
     if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,

@@ -43,10 +43,16 @@ impl<'a> Resolver<'a> {
             let stated = &entry.get_ref().connection;
             let target = self.faulty_input(stated.get_ref()).map_err(at(stated, &path))?;
             let port = target.port;
-            let position = inputs.iter().position(|input| input.port == port).unwrap_or_else(|| {
-                inputs.push(InputFaults { port, entry, path: path.clone(), faults: Vec::new() });
-                inputs.len() - 1
-            });
+            let position =
+                inputs.iter().position(|input| input.port == port).unwrap_or_else(|| {
+                    inputs.push(InputFaults {
+                        port,
+                        entry,
+                        path: path.clone(),
+                        faults: Vec::new(),
+                    });
+                    inputs.len() - 1
+                });
             let index = inputs[position].faults.len() as u64;
             let converter = EntryConverter { target, start: self.setup.start, index };
             let fault = converter.fault(entry.get_ref()).map_err(at(entry, &path))?;
