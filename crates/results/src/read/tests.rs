@@ -159,6 +159,17 @@ fn a_file_that_has_no_results_is_refused_by_name() {
 }
 
 #[test]
+fn a_mat_file_with_a_matrix_without_a_usable_name_is_refused_for_the_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    for length in [0_u32, 256] {
+        fs::write(&path, [[0; 16].as_slice(), &length.to_le_bytes()].concat()).unwrap();
+        let message = Table::open(&path).unwrap_err().to_string();
+        assert!(message.contains(&format!("name has {length} bytes")), "{message}");
+    }
+}
+
+#[test]
 fn a_damaged_parquet_file_is_an_error_and_no_panic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.parquet");

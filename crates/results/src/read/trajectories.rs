@@ -128,8 +128,12 @@ impl<'a> Source<'a> {
             5 => Precision::Uint8,
             _ => return Err(foreign("it is no MAT file of version 4 with little-endian numbers")),
         };
-        if kind % 10 > 1 || is_complex != 0 || !(1..256).contains(&length) {
+        if kind % 10 > 1 || is_complex != 0 {
             return Err(foreign("it has a matrix that is sparse or complex"));
+        }
+        if !(1..256).contains(&length) {
+            let reason = format!("it has a matrix whose name has {length} bytes, not 1 to 255");
+            return Err(foreign(&reason));
         }
         let mut name = vec![0; length as usize];
         self.file.read_exact(&mut name).map_err(|_| foreign("it is cut"))?;
