@@ -7,6 +7,7 @@ use results::{Column, ResultsError, Table};
 
 use crate::plots::Group;
 use crate::samples::{Collector, Samples};
+use crate::statistics::{SCALE, root};
 use crate::{Error, View};
 
 /// How much a variable differs from that of another run.
@@ -275,6 +276,8 @@ struct Sum {
     holds: bool,
     largest: (f64, f64),
     squares: f64,
+    /// Sum of the squares of the scaled differences, for differences whose squares overflow.
+    scaled_squares: f64,
     rows: u64,
     range: (f64, f64),
 }
@@ -286,6 +289,7 @@ impl Sum {
             holds: crate::holds(column),
             largest: (0.0, f64::NAN),
             squares: 0.0,
+            scaled_squares: 0.0,
             rows: 0,
             range: (f64::INFINITY, f64::NEG_INFINITY),
         }
@@ -302,6 +306,7 @@ impl Sum {
             self.largest = (size, time);
         }
         self.squares += size * size;
+        self.scaled_squares += (size * SCALE) * (size * SCALE);
         self.rows += 1;
         for finite in [value, other].into_iter().filter(|value| value.is_finite()) {
             self.range = (self.range.0.min(finite), self.range.1.max(finite));
@@ -313,7 +318,8 @@ impl Sum {
         let range = (self.range.1 - self.range.0).max(0.0);
         let relative = if largest > 0.0 { largest / range } else { 0.0 };
         #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 rows")]
-        let rms = (self.squares / self.rows.max(1) as f64).sqrt();
+        let rows = self.rows.max(1) as f64;
+        let rms = root(self.squares / rows, self.scaled_squares / rows);
         Difference { name: self.name, largest, at, rms, rows: self.rows, relative }
     }
 }

@@ -35,6 +35,14 @@ pub enum Basis {
     Values(u64),
 }
 
+/// Factor of values before they are squared a second time: those squares do not overflow.
+pub(crate) const SCALE: f64 = 1e-163;
+
+/// Returns the square root of a mean of squares; of the mean of scaled squares if the first one is infinite.
+pub(crate) fn root(square: f64, scaled_square: f64) -> f64 {
+    if square.is_infinite() { scaled_square.sqrt() / SCALE } else { square.sqrt() }
+}
+
 /// Collects the statistics of a variable row by row.
 pub(crate) struct Builder {
     statistics: Statistics,
@@ -44,11 +52,12 @@ pub(crate) struct Builder {
     before: Option<(f64, f64)>,
     /// Time in s between the first and the last finite row.
     length: f64,
-    /// Integrals of the value and of its square.
-    integrals: [f64; 2],
-    /// Number of finite values, their sum and that of their squares.
+    /// Integrals of the value, of its square and of its scaled square.
+    integrals: [f64; 3],
+    /// Number of finite values.
     count: u64,
-    sums: [f64; 2],
+    /// Sums of the finite values, of their squares and of their scaled squares.
+    sums: [f64; 3],
 }
 
 impl Builder {
@@ -65,7 +74,7 @@ impl Builder {
             not_finite: 0,
         };
         let holds = crate::holds(column);
-        let (integrals, sums) = ([0.0; 2], [0.0; 2]);
+        let (integrals, sums) = ([0.0; 3], [0.0; 3]);
         Self { statistics, holds, before: None, length: 0.0, integrals, count: 0, sums }
     }
 
@@ -87,31 +96,37 @@ impl Builder {
             statistics.largest = (value, time);
         }
         self.count += 1;
-        let powers = [value, value * value];
+        let powers = with_squares(value);
         if let Some((at, old)) = self.before {
-            let (step, olds) = ((time - at).max(0.0), [old, old * old]);
+            let (step, starts) = ((time - at).max(0.0), with_squares(old));
             self.length += step;
-            let ends = if self.holds { olds } else { powers };
-            for ((integral, old), end) in self.integrals.iter_mut().zip(olds).zip(ends) {
-                *integral += step * (0.5 * old + 0.5 * end);
+            let ends = if self.holds { starts } else { powers };
+            for ((integral, start), end) in self.integrals.iter_mut().zip(starts).zip(ends) {
+                *integral += step * (0.5 * start + 0.5 * end);
             }
         }
-        self.sums = [0, 1].map(|power| self.sums[power] + powers[power]);
+        self.sums.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
         self.before = Some((time, value));
     }
 
     pub(crate) fn finish(self) -> Statistics {
         let Self { mut statistics, length, integrals, count, sums, .. } = self;
-        let (basis, [mean, square]) = if length > 0.0 && statistics.not_finite == 0 {
+        let (basis, [mean, square, scaled_square]) = if length > 0.0 && statistics.not_finite == 0 {
             (Basis::Time(length), integrals.map(|integral| integral / length))
         } else {
             #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 values")]
             let number = count as f64;
             (Basis::Values(count), sums.map(|sum| sum / number))
         };
-        (statistics.mean, statistics.rms, statistics.basis) = (mean, square.sqrt(), basis);
+        statistics.rms = root(square, scaled_square);
+        (statistics.mean, statistics.basis) = (mean, basis);
         statistics
     }
+}
+
+/// Returns a value, its square and its scaled square.
+fn with_squares(value: f64) -> [f64; 3] {
+    [value, value * value, (value * SCALE) * (value * SCALE)]
 }
 
 #[cfg(test)]
@@ -139,6 +154,14 @@ mod tests {
             assert_eq!((actual.basis, actual.not_finite), (Basis::Values(4), 3));
         }
         assert!(statistics(ColumnKind::Real, &[gap]).mean.is_nan());
+    }
+
+    #[test]
+    fn the_rms_of_values_whose_squares_overflow_is_finite() {
+        for values in [[3e200, 3e200, 3e200], [3e200, f64::NAN, 3e200]] {
+            let rms = statistics(ColumnKind::Real, &values).rms;
+            assert!((rms / 3e200 - 1.0).abs() < 1e-12, "{rms}");
+        }
     }
 
     #[test]
