@@ -132,9 +132,15 @@ impl Node {
     }
 }
 
+/// Returns the message `what` with the place of its value in front; the outermost value has no place.
+fn at(place: &str, what: &str) -> String {
+    if place.is_empty() { what.to_owned() } else { format!("{place}: {what}") }
+}
+
+/// Converts the value at `place`, which is `depth` values deep in the outermost one.
 fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node> {
     if depth > DEPTH {
-        return Err(PyValueError::new_err(format!("{place}: more than {DEPTH} nested values")));
+        return Err(PyValueError::new_err(at(place, &format!("more than {DEPTH} nested values"))));
     }
     // A bool is an int in Python.
     if let Ok(boolean) = value.cast::<PyBool>() {
@@ -142,7 +148,8 @@ fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node
     }
     if value.is_instance_of::<PyInt>() {
         let integer = value.extract().map_err(|_| {
-            PyValueError::new_err(format!("{place}: expected an integer of 64 bits, found {value}"))
+            let what = format!("expected an integer of 64 bits, found {value}");
+            PyValueError::new_err(at(place, &what))
         })?;
         return Ok(Node::Integer(integer));
     }
@@ -165,10 +172,8 @@ fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node
     }
     let Ok(items) = value.try_iter() else {
         let kind = value.get_type().name()?;
-        let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
-        return Err(PyTypeError::new_err(format!(
-            "{place}expected a bool, a number, a text, a list or a dict, found {kind}"
-        )));
+        let what = format!("expected a bool, a number, a text, a list or a dict, found {kind}");
+        return Err(PyTypeError::new_err(at(place, &what)));
     };
     let items = items.enumerate();
     let list = items.map(|(k, item)| convert(&item?, &format!("{place}[{k}]"), depth + 1));
@@ -183,7 +188,7 @@ fn table(mapping: &Bound<'_, PyMapping>, place: &str, depth: usize) -> PyResult<
             continue;
         }
         let Ok(key) = key.extract::<String>() else {
-            return Err(PyTypeError::new_err(format!("{place}: the key {key} is not a text")));
+            return Err(PyTypeError::new_err(at(place, &format!("the key {key} is not a text"))));
         };
         let inner = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
         entries.push((key, convert(&value, &inner, depth + 1)?));

@@ -31,7 +31,7 @@ pub(crate) struct PythonSlave {
 
 impl PythonSlave {
     /// Describes `object` by its attributes `inputs` and `outputs`: names, or a mapping of names to start
-    /// values (`float`, `int` or `bool`). The attribute `direct` (default true) says whether outputs
+    /// values (`float`, `int` or `bool`, also of `NumPy`). The attribute `direct` (default true) says whether outputs
     /// depend on the inputs of the same time.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
@@ -287,13 +287,15 @@ fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String,
 /// Reads a start value. A bool is an int in Python, so it is tested first.
 fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     use pyo3::types::{PyBool, PyInt};
-    if let Ok(value) = value.cast::<PyBool>() {
-        return Ok(Start::Boolean(value.is_true()));
+    // Scalars of `NumPy` are no int and no bool of Python; `item` converts them.
+    let scalar = if value.hasattr("item")? { value.call_method0("item")? } else { value.clone() };
+    if let Ok(boolean) = scalar.cast::<PyBool>() {
+        return Ok(Start::Boolean(boolean.is_true()));
     }
-    if value.is_instance_of::<PyInt>() {
-        return value.extract().map(Start::Integer);
+    if scalar.is_instance_of::<PyInt>() {
+        return scalar.extract().map(Start::Integer);
     }
-    value.extract().map(Start::Real)
+    scalar.extract().map(Start::Real)
 }
 
 fn variable(name: String, reference: u32, causality: Causality, start: Start) -> ScalarVariable {

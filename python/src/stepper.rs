@@ -34,9 +34,16 @@ impl Stepper {
         self.run.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Calls `work` with the run.
+    /// Calls `work` with the run, and passes on the messages that it caused.
+    ///
+    /// # Errors
+    ///
+    /// `RuntimeError` if the simulation is closed; the exception of a logging handler; the error of `work`.
     fn with<T>(&self, py: Python<'_>, work: impl FnOnce(&mut Run) -> PyResult<T>) -> PyResult<T> {
-        work(self.lock(py).as_mut().ok_or_else(closed)?)
+        // The lock ends with this statement: a logging handler may use the simulation.
+        let result = work(self.lock(py).as_mut().ok_or_else(closed)?);
+        logging::pass_on(py)?;
+        result
     }
 
     /// Steps until `ended` holds for the number of steps so far and the time, or the run is finished;
@@ -163,8 +170,9 @@ impl Stepper {
         let saved = guarded(py, || {
             let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
             guard.as_mut().map(|run| run.simulation.checkpoint()).transpose()
-        })?;
-        let saved = saved.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        });
+        logging::pass_on(py)?;
+        let saved = saved?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
         let bytes = postcard::to_stdvec(&saved.ok_or_else(closed)?);
         let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
@@ -178,8 +186,9 @@ impl Stepper {
         let restored = guarded(py, || {
             let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
             guard.as_mut().map(|run| run.simulation.restore(&checkpoint)).transpose()
-        })?;
-        let restored = restored.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        });
+        logging::pass_on(py)?;
+        let restored = restored?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
         restored.ok_or_else(closed)
     }
 
@@ -190,8 +199,8 @@ impl Stepper {
             let Some(mut run) = run else { return Ok(()) };
             let terminated = run.simulation.terminate();
             terminated.and(run.simulation.free())
-        })?;
+        });
         logging::pass_on(py)?;
-        ended.map_err(|error| caused(py, error::system(&error), &self.raised))
+        ended?.map_err(|error| caused(py, error::system(&error), &self.raised))
     }
 }

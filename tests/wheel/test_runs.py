@@ -278,6 +278,14 @@ def test_a_python_object_takes_part_in_the_loop():
     assert same(results, again)
 
 
+def test_start_values_of_numpy_have_the_types_of_python():
+    class Scalars(Proportional):
+        outputs = {"u": np.float32(0.0), "on": np.bool_(False), "count": np.int64(0)}
+
+    results = loop(Scalars(2.0)).run()
+    assert [results[f"law.{name}"].dtype.kind for name in Scalars.outputs] == ["f", "b", "i"]
+
+
 def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
     class Broken(Proportional):
         def step(self, t, dt, inputs):

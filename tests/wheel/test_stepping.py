@@ -1,5 +1,6 @@
 """Simulations that Python advances."""
 
+import logging
 import threading
 
 import aso_ftc as af
@@ -83,6 +84,14 @@ def test_a_set_input_acts_from_the_next_step_on():
             simulation["p.none"]
         simulation.set("p.u", np.float32(1.5))
         assert simulation["p.u"] == 1.5
+
+
+def test_a_message_arrives_at_the_end_of_the_call_that_caused_it(caplog):
+    system = af.System().add("p", af.fmus()["FrictionPendulum"])
+    with system.simulation(stop_time=1.0, step=0.01) as simulation, caplog.at_level(logging.WARNING, "aso_ftc"):
+        with pytest.raises(af.RunError):
+            simulation.set("p.u", float("nan"))
+        assert "expected a finite number" in caplog.text
 
 
 def test_a_connected_input_cannot_be_set(paper):
