@@ -18,8 +18,8 @@ const INTERVAL: Duration = Duration::from_millis(100);
 /// A sink that writes CSV: one line per row, the time first, then the columns in their order.
 ///
 /// The first line contains the names, quoted. A Real has the fewest digits that read back as the same
-/// number (Schubfach; Giulietti 2020), NaN is `NaN`, infinity `inf`; a Boolean is 0 or 1; a String is
-/// quoted; a cell without a value is empty. The layout has no units.
+/// number (Schubfach; Giulietti 2020), NaN is `NaN`, infinity `inf` or `-inf`; a Boolean is 0 or 1; a
+/// String is quoted; a cell without a value is empty. The file has no units.
 #[derive(Debug)]
 pub struct CsvSink {
     file: OutputFile,
@@ -36,8 +36,9 @@ impl CsvSink {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Duplicate`] for two columns of one name, [`ResultsError::InUse`] if another run is
-    /// writing the file, [`ResultsError::Write`] if the file cannot be created.
+    /// [`ResultsError::Duplicate`] for two columns of one name or a column named [`TIME`],
+    /// [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the file cannot be
+    /// created.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let mut lines = Lines::new(columns, 2 * BUFFER);
@@ -60,7 +61,7 @@ impl CsvSink {
         Ok(sink)
     }
 
-    /// Appends the lines to the file; after a failure the file keeps its former content.
+    /// Verifies the file and appends the lines. After a failure they stay in the buffer.
     fn write_rows(&mut self) -> Result<(), ResultsError> {
         self.file.verify()?;
         if self.lines.bytes().is_empty() {

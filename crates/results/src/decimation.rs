@@ -20,18 +20,18 @@ pub enum Decimation {
 }
 
 impl Decimation {
-    /// Checks that the interval or the count is above zero.
+    /// Checks that the interval is finite and above zero, or that the count is above zero; returns the decimation.
     ///
     /// # Errors
     ///
-    /// The message for the user.
+    /// A message for the user with the invalid interval or count.
     pub fn check(self) -> Result<Self, String> {
         match self {
             Self::Every(interval) if !(interval > 0.0 && interval.is_finite()) => {
                 Err(format!("rows are recorded every {interval} s, expected an interval above 0"))
             }
             Self::Nth(0) => Err("rows are recorded every 0 steps, expected at least 1".to_owned()),
-            sound => Ok(sound),
+            valid => Ok(valid),
         }
     }
 }
@@ -43,8 +43,9 @@ pub struct Due {
     decimation: Decimation,
     /// Start of the grid in s.
     start: f64,
-    /// Number of the next instant of the grid, or number of communication points so far.
+    /// Number of the next instant of the grid, for [`Decimation::Every`].
     next: f64,
+    /// Number of communication points so far, for [`Decimation::Nth`].
     points: u64,
 }
 

@@ -1,10 +1,10 @@
 //! Reduction of a long time series to the samples that a plot shows, in bounded memory.
 
 /// Largest number of buckets: several for each pixel of a plot.
-const BUCKETS: usize = 8192;
+const BUCKETS: u16 = 8192;
 
-/// A time interval of the series: its first, lowest, highest and last finite sample, and the time of a
-/// sample that is not finite, if any.
+/// A time interval of the series: its first, lowest, highest and last finite sample, and the time of the
+/// first sample that is not finite, if any.
 #[derive(Debug, Clone, Copy)]
 struct Bucket {
     samples: Option<[(f64, f64); 4]>,
@@ -30,8 +30,8 @@ impl Bucket {
 /// The envelope of a time series: the samples that a plot shows.
 ///
 /// Samples are added in the order of time, to buckets of equal length in time. When time passes the
-/// last bucket, neighbouring buckets are merged and the length doubles. Thus 4096 to 8192 buckets
-/// cover a series of any length.
+/// last bucket, neighbouring buckets are merged and the length doubles. Thus at most 8192 buckets cover a
+/// series of any length, and at least 4096 once buckets were merged.
 #[derive(Debug, Clone)]
 pub struct Envelope {
     /// Time of the first sample, in s.
@@ -58,14 +58,14 @@ impl Envelope {
             self.start = time;
         }
         // The factor 0.5 keeps the difference of any two times finite.
-        let passed = (0.5 * time - 0.5 * self.start).max(0.0);
-        if self.length == 0.0 && passed > 0.0 {
-            self.length = 2.0 * passed.min(f64::MAX / 4.0);
+        let half_elapsed = (0.5 * time - 0.5 * self.start).max(0.0);
+        if self.length == 0.0 && half_elapsed > 0.0 {
+            self.length = 2.0 * half_elapsed.min(f64::MAX / 4.0);
         }
-        let mut place = self.place(passed);
-        while place >= ends() {
+        let mut place = self.place(half_elapsed);
+        while place >= f64::from(BUCKETS) {
             self.double();
-            place = self.place(passed);
+            place = self.place(half_elapsed);
         }
         let last = self.buckets.len() - 1;
         // Not negative, and below the number of buckets.
@@ -81,10 +81,11 @@ impl Envelope {
     }
 
     /// Returns the number of the bucket, as a float, for half the time since the start.
-    fn place(&self, passed: f64) -> f64 {
-        if self.length > 0.0 { (passed / (0.5 * self.length)).floor() } else { 0.0 }
+    fn place(&self, half_elapsed: f64) -> f64 {
+        if self.length > 0.0 { (half_elapsed / (0.5 * self.length)).floor() } else { 0.0 }
     }
 
+    /// Doubles the length of the buckets and merges pairs of them.
     fn double(&mut self) {
         self.length *= 2.0;
         let pairs = self.buckets.chunks(2);
@@ -92,8 +93,8 @@ impl Envelope {
             pairs.map(|pair| pair.iter().fold(EMPTY, |all, one| all.merge(*one))).collect();
     }
 
-    /// Returns the kept samples: times and values. One NaN represents all values of a bucket that are not
-    /// finite and follows its other samples.
+    /// Returns the times and the values of the samples. One NaN, at the time of the first, represents all values of
+    /// a bucket that are not finite; it follows the other samples of the bucket, also later ones.
     #[must_use]
     pub fn samples(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut times, mut values) = (Vec::new(), Vec::new());
@@ -107,11 +108,6 @@ impl Envelope {
         }
         (times, values)
     }
-}
-
-/// Returns the largest number of buckets as a float.
-fn ends() -> f64 {
-    f64::from(u16::try_from(BUCKETS).unwrap_or(u16::MAX))
 }
 
 #[cfg(test)]
@@ -128,7 +124,8 @@ mod tests {
             envelope.push(f64::from(k) * 1e-3, (f64::from(k) * 0.01).sin() + spike);
         }
         let (times, values) = envelope.samples();
-        assert!(times.len() <= 4 * BUCKETS && times.len() > BUCKETS, "{}", times.len());
+        let buckets = usize::from(BUCKETS);
+        assert!(times.len() <= 4 * buckets && times.len() > buckets, "{}", times.len());
         assert!(times.is_sorted());
         assert_eq!((times[0], values[0]), (0.0, 0.0));
         assert_eq!(times[times.len() - 1], f64::from(count - 1) * 1e-3);

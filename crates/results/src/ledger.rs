@@ -1,5 +1,6 @@
-//! What another process can know of the results file that this process writes: where it is, how much of it
-//! is written, and the rows that are not. So the rows survive the process.
+//! Shared memory that describes the results file of this process to a supervising process: its path, the length
+//! that is written, and the rows that are not written yet. With it, the supervisor completes the file if this process
+//! dies.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
@@ -12,42 +13,45 @@ use super::identity::Identity;
 /// Number of words that [`share`] needs at least.
 pub const WORDS: usize = ROWS + (1 << 16);
 
-/// The places in the memory: the numbers, then the bytes of the path, then those of the rows.
+// Positions in the shared memory, in words: the numbers, then the bytes of the path, then the bytes of the rows.
+
+/// 0 without a file, [`OPEN`] or [`COMPLETE`].
 const STATE: usize = 0;
 const DEVICE: usize = 1;
 const INODE: usize = 2;
 /// Length of the file in bytes, at the end of a row.
 const LENGTH: usize = 3;
-/// Number of bytes of whole rows that follow in the file.
+/// Number of bytes of the pending rows: whole rows that are not in the file yet.
 const PENDING: usize = 4;
 const PATH_LENGTH: usize = 5;
 const PATH: usize = 6;
-/// The longest path of the system, in words.
+/// Room for the longest path of the system, in words.
 const PATH_WORDS: usize = 512;
 const ROWS: usize = PATH + PATH_WORDS;
 
 const OPEN: u64 = 1;
 const COMPLETE: u64 = 2;
 
-/// Bytes of a word.
+/// Number of bytes of a word.
 const WORD: usize = size_of::<u64>();
 
 static SHARED: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 
-/// Lets the first results file from now on be known to the process that shares `memory`, whose words are zero.
-/// Only the first call has an effect.
+/// Describes the next results file in `memory`, which a supervising process shares and whose words are zero. Has no
+/// effect if `memory` has fewer than [`WORDS`] words, or after a call that had one.
 pub fn share(memory: &'static [AtomicU64]) {
     if memory.len() >= WORDS {
         let _ = SHARED.set(memory);
     }
 }
 
-/// The side of the process that writes.
+/// The shared memory, as the process that writes the file uses it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ledger(&'static [AtomicU64]);
 
 impl Ledger {
-    /// Enters a new file at this absolute path; `None` if there is no shared memory, or another file has it.
+    /// Enters a new file at this absolute path; `None` if there is no shared memory, another file has it, or the path
+    /// is too long.
     pub(crate) fn enter(path: &Path, identity: Identity) -> Option<Self> {
         let memory = SHARED.get()?;
         let path = path.as_os_str().as_encoded_bytes();
@@ -67,7 +71,7 @@ impl Ledger {
         self.0[place].store(value, Ordering::Release);
     }
 
-    /// Records that the file has this length, and that no rows are pending.
+    /// Records that the file has this length and that no rows are pending, and with `is_complete` that no row follows.
     pub(crate) fn written(self, length: u64, is_complete: bool) {
         self.set(PENDING, 0);
         self.set(LENGTH, length);
@@ -76,8 +80,8 @@ impl Ledger {
         }
     }
 
-    /// Keeps the row that begins at `start` of the `rows` that the file lacks. Returns false if the memory is
-    /// full: then the rows belong into the file.
+    /// Stores the pending `rows`, of which the memory already has the bytes before `start`. Returns false if they do
+    /// not fit: then they must be written to the file.
     #[inline]
     pub(crate) fn keep(self, rows: &[u8], start: usize) -> bool {
         let fits = rows.len() <= (self.0.len() - ROWS) * WORD;
@@ -89,7 +93,7 @@ impl Ledger {
     }
 }
 
-/// Stores the bytes from `start` on, by whole words.
+/// Stores the bytes from `start` on, by whole words; the bytes before `start` are stored already.
 #[inline]
 fn put(words: &[AtomicU64], start: usize, bytes: &[u8]) {
     let first = start / WORD;
@@ -104,7 +108,7 @@ fn put(words: &[AtomicU64], start: usize, bytes: &[u8]) {
     }
 }
 
-/// The first `length` bytes of the words.
+/// Returns the first `length` bytes of the words, or all if there are fewer.
 fn bytes(words: &[AtomicU64], length: u64) -> Vec<u8> {
     let length = usize::try_from(length).unwrap_or(usize::MAX);
     let words = words.iter().take(length.div_ceil(WORD));
@@ -121,12 +125,12 @@ pub struct LeftFile {
     pub path: PathBuf,
     /// Whether the process had completed it.
     pub was_complete: bool,
-    /// What it lacks; `None` if it has all rows.
+    /// What is wrong with it; `None` if it has all rows.
     pub damage: Option<String>,
 }
 
-/// Completes the file that the ended process wrote: appends the rows that it had recorded and not written.
-/// Returns `None` if it wrote none.
+/// Completes the file that the ended process wrote: appends the rows that the process had stored and not written.
+/// Returns `None` if the process wrote no file. `memory` has at least [`WORDS`] words.
 #[must_use]
 pub fn complete(memory: &[AtomicU64]) -> Option<LeftFile> {
     let value = |place: usize| memory[place].load(Ordering::Acquire);
@@ -156,8 +160,8 @@ fn path_of(bytes: Vec<u8>) -> PathBuf {
     String::from_utf8_lossy(&bytes).into_owned().into()
 }
 
-/// Appends the `rows` that the file of this identity, of which `length` bytes were written, lacks. Returns what
-/// is wrong with the file.
+/// Appends `rows`, or their missing part, to the file at `path`, which must still have this identity and the `length`
+/// bytes that were written. Returns what is wrong with the file; `None` if it has all rows.
 fn append(
     path: &Path,
     identity: Identity,
@@ -177,7 +181,7 @@ fn append(
         return Ok(Some("another file took its place during the run".to_owned()));
     }
     let (size, whole) = (metadata.len(), length + rows.len() as u64);
-    // The last write of a Parquet file, which has no rows here, may be unfinished: the one before it counts.
+    // The last write of a Parquet file may be unfinished: then the write before it counts. It never has rows here.
     let is_unfinished = size > whole && rows.is_empty() && !was_complete;
     if size < length || size > whole && !is_unfinished {
         return Ok(Some(format!(
@@ -188,11 +192,11 @@ fn append(
         return Ok(None);
     }
     // The process may have ended while it wrote the rows.
-    let (there, missing) = rows.split_at(usize::try_from(size - length).unwrap_or(0));
-    let mut written = vec![0; there.len()];
+    let (present, missing) = rows.split_at(usize::try_from(size - length).unwrap_or(0));
+    let mut written = vec![0; present.len()];
     file.seek(SeekFrom::Start(length))?;
     file.read_exact(&mut written)?;
-    if written != there {
+    if written != present {
         return Ok(Some("its last rows are not those of the run".to_owned()));
     }
     file.write_all(missing)?;

@@ -56,7 +56,7 @@ pub struct Column {
 pub enum ColumnKind {
     /// `fmi2Real`.
     Real,
-    /// `fmi2Integer`, and the integer types of FMI 3.0 with at most 32 bits.
+    /// `fmi2Integer`, and the integer types of FMI 3.0 that fit into 32 bits with a sign.
     Integer,
     /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`. Their values are among
     /// [`Row::integers`].
@@ -72,7 +72,8 @@ pub enum ColumnKind {
 pub struct Row<'a> {
     /// Values of the Real columns.
     pub reals: &'a [f64],
-    /// Values of the Integer and Long columns. A value beyond the type of its column is limited to it.
+    /// Values of the Integer and Long columns. Parquet and [`MemorySink`] limit a value to the type of its column;
+    /// CSV writes it in full.
     pub integers: &'a [i64],
     /// Values of the Boolean columns: zero is false.
     pub booleans: &'a [i32],
@@ -85,8 +86,8 @@ pub struct Row<'a> {
 /// A writer of result rows. A sink that is dropped without [`Sink::finish`] still writes every row, if
 /// the disk allows it.
 pub trait Sink: Send {
-    /// Writes the row at `time` in s. CSV allocates no memory here; Parquet allocates when it writes a
-    /// block of rows.
+    /// Adds the row at `time` in s, to the file now or later. CSV allocates no memory here, unless texts are very
+    /// long or earlier writes failed; Parquet allocates for texts and when it writes a block of rows.
     ///
     /// # Errors
     ///
@@ -137,10 +138,10 @@ pub enum ResultsError {
         /// The name.
         name: String,
     },
-    /// The number of values of a row differs from the number of columns.
+    /// The number of values of a type in a row differs from the number of its columns.
     #[error("a row has {actual} values of type {kind:?}, expected {expected}")]
     Values {
-        /// Type of the values.
+        /// Type of the values; Integer stands for Integer and Long.
         kind: ColumnKind,
         /// Number of columns of this type.
         expected: usize,
@@ -157,15 +158,15 @@ pub enum ResultsError {
         /// The file.
         path: PathBuf,
     },
-    /// The file cannot be created, or the disk is full.
+    /// The file cannot be created or written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Error of the operating system.
+        /// The reason, such as a full disk.
         source: io::Error,
     },
-    /// The file has another length than the rows that were written.
+    /// The length of the file differs from the number of bytes that were written.
     #[error(
         "{}: the file has {actual} bytes, expected {expected}: an FMU or another program has changed it \
          during the run. With --isolate no FMU reaches the files of the command",
@@ -179,7 +180,7 @@ pub enum ResultsError {
         /// Number of bytes in the file.
         actual: u64,
     },
-    /// The position of the open file was moved, and its content perhaps overwritten.
+    /// The write position of the open file was moved, so rows may be overwritten.
     #[error(
         "{}: an FMU has used the descriptor of this file and may have overwritten rows. With --isolate \
          no FMU reaches the files of the command",
@@ -189,7 +190,7 @@ pub enum ResultsError {
         /// The file.
         path: PathBuf,
     },
-    /// The path does not lead to the file that was written.
+    /// The path no longer leads to the file that was written, or the descriptor of a pipe or a device is lost.
     #[error("{}: the file was deleted, moved or replaced during the run", path.display())]
     Gone {
         /// The path.
@@ -225,7 +226,7 @@ pub enum ResultsError {
         /// Content of the cell.
         text: String,
     },
-    /// A time is earlier than that of the row before.
+    /// A time is earlier than the time of the row before.
     #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
     Order {
         /// The file.
@@ -247,12 +248,12 @@ pub enum ResultsError {
         /// The column.
         name: String,
     },
-    /// A requested column does not exist.
+    /// A pattern matches no column, or the selection is empty.
     #[error("{}: {source}", path.display())]
     Selection {
         /// The file.
         path: PathBuf,
-        /// The pattern that matches no column.
+        /// The error of the selection.
         source: SelectionError,
     },
 }
@@ -263,8 +264,8 @@ pub enum ResultsError {
 /// # Errors
 ///
 /// [`ResultsError::Format`] for another extension, [`ResultsError::Duplicate`] for two columns of one
-/// name, [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the
-/// file cannot be created.
+/// name or a column named [`TIME`], [`ResultsError::InUse`] if another run is writing the file,
+/// [`ResultsError::Write`] if the file cannot be created, or for Parquet to a pipe or a device.
 pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsError> {
     let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
     match (ending.to_str(), is_stream(path)) {
@@ -287,7 +288,7 @@ fn check_names(columns: &[Column]) -> Result<(), ResultsError> {
     }
 }
 
-/// The number of columns of each type.
+/// The number of columns of each type; Long columns count as integers.
 #[derive(Debug, Clone, Copy)]
 struct Widths {
     reals: usize,

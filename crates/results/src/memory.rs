@@ -55,7 +55,7 @@ impl Texts {
         self.offsets.push(i64::try_from(self.bytes.len()).unwrap_or(i64::MAX));
     }
 
-    /// Returns the text of a row; `None` beyond the last one.
+    /// Returns the text of a row; `None` beyond the last row.
     #[must_use]
     pub fn get(&self, row: usize) -> Option<&str> {
         let start = usize::try_from(*self.offsets.get(row)?).ok()?;
@@ -93,7 +93,7 @@ impl Columns {
     }
 
     /// Adds a row. An integer beyond the type of its column is limited to it. A value that `row` lacks
-    /// is 0.
+    /// is 0, false or empty.
     fn push(&mut self, time: f64, row: &Row<'_>) {
         self.time.push(time);
         let mut reals = row.reals.iter().copied();
@@ -118,7 +118,7 @@ impl Columns {
     ///
     /// # Errors
     ///
-    /// Same as [`create`]; [`ResultsError::Write`] if the disk is full.
+    /// Same as [`create`] and [`Sink::finish`].
     pub fn write(&self, path: &Path) -> Result<(), ResultsError> {
         let columns: Vec<_> = self.columns.iter().map(|(column, _)| column.clone()).collect();
         let mut sink = create(path, &columns)?;
@@ -158,7 +158,7 @@ pub(super) fn limited(value: i64) -> i32 {
 pub struct Recorded(Arc<Mutex<Columns>>);
 
 impl Recorded {
-    /// Takes the rows of a sink that was finished or dropped; no rows before that.
+    /// Takes the rows of a sink that was finished or dropped; no rows before that, nor in a second call.
     #[must_use]
     pub fn take(&self) -> Columns {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))

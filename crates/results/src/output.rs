@@ -1,7 +1,8 @@
 //! The file that a sink writes.
 //!
 //! An FMU in the process of the master can close or replace the descriptor of the file, move its
-//! position, change or delete the file, or duplicate the process. So each write is verified first.
+//! position, change or delete the file, or duplicate the process. So the sinks call
+//! [`OutputFile::verify`] before each write.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, Seek as _, SeekFrom, Write as _};
@@ -21,8 +22,8 @@ pub use stream::reserve_standard_output;
 /// Path of standard output; [`super::create`] writes CSV to it.
 pub const STANDARD_OUTPUT: &str = "/dev/stdout";
 
-/// Smallest number of the descriptor of a results file. Programs that close or reuse descriptors that
-/// are not theirs begin with the small ones.
+/// Smallest descriptor number of a results file, if the process may have it. An FMU that closes descriptors of
+/// others usually closes those with small numbers.
 #[cfg(unix)]
 const DESCRIPTOR: i32 = 512;
 
@@ -31,7 +32,7 @@ const DESCRIPTOR: i32 = 512;
 pub(super) struct OutputFile {
     /// The path as it was given, for messages.
     path: PathBuf,
-    /// The same path if the current folder changes.
+    /// The absolute path, which is valid after a change of the current folder.
     absolute: PathBuf,
     file: File,
     identity: Identity,
@@ -41,7 +42,7 @@ pub(super) struct OutputFile {
     process: u32,
     length: u64,
     ledger: Option<Ledger>,
-    /// Whether the file was opened again, of which one warning tells.
+    /// Whether the file was opened again; a warning is logged the first time.
     reopened: bool,
     /// The changes of the file, if a test collects them.
     #[cfg(test)]
@@ -57,8 +58,8 @@ pub(super) enum Change {
 }
 
 impl OutputFile {
-    /// Creates an empty file, and its folder if that is missing. No other process can write the file
-    /// while it is open.
+    /// Creates an empty file, and its folder if that is missing, and locks it against other runs; or opens a pipe or
+    /// a device.
     pub(super) fn create(path: &Path) -> Result<Self, ResultsError> {
         let failed = |source| ResultsError::Write { path: path.to_owned(), source };
         #[cfg(unix)]
@@ -86,7 +87,7 @@ impl OutputFile {
             path: path.to_owned(),
             ledger: regular.then(|| Ledger::enter(&absolute, identity)).flatten(),
             absolute,
-            file: lifted(file),
+            file: with_high_descriptor(file),
             identity,
             regular,
             process: process::id(),
@@ -106,10 +107,11 @@ impl OutputFile {
         self.length
     }
 
-    /// Checks that the file is the one that was created, with the content that was written, and that
-    /// this process has created it.
+    /// Checks that this process created the file, that it is still the same file, and that its length and position
+    /// are those after the last write.
     ///
-    /// Opens the file again if only the descriptor is lost. Cuts off what others have appended.
+    /// Opens the file again if only the descriptor is lost. Cuts off what others have appended and resets the
+    /// position, so that later writes succeed; the interference is an error once.
     pub(super) fn verify(&mut self) -> Result<(), ResultsError> {
         if process::id() != self.process {
             return Err(ResultsError::Forked { path: self.path.clone() });
@@ -132,7 +134,7 @@ impl OutputFile {
             return Ok(());
         }
         if size >= self.length {
-            // The rows that are not yet in the file can then be added.
+            // The rows that are not yet in the file can be added after that.
             let length = self.length;
             self.set_length(length)?;
         }
@@ -154,9 +156,9 @@ impl OutputFile {
         if Identity::new(&metadata) != self.identity {
             return Err(gone());
         }
-        let mut file = lifted(file);
+        let mut file = with_high_descriptor(file);
         file.seek(SeekFrom::Start(self.length)).map_err(|error| self.failed(error))?;
-        // The number of the former descriptor may be that of a file of the FMU by now.
+        // By now the number of the former descriptor may belong to a file of the FMU.
         forget(std::mem::replace(&mut self.file, file));
         if !std::mem::replace(&mut self.reopened, true) {
             tracing::warn!(
@@ -168,7 +170,8 @@ impl OutputFile {
         Ok(metadata)
     }
 
-    /// Appends to the file, after [`Self::verify`]. After a failure the file keeps its former content.
+    /// Appends to the file; call [`Self::verify`] first. After a failure the file keeps its former content, while a
+    /// pipe or a device may have received a part.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), ResultsError> {
         #[cfg(unix)]
         if !self.regular {
@@ -185,7 +188,7 @@ impl OutputFile {
         Ok(())
     }
 
-    /// Writes at `offset`; the position of the file is at the end of `bytes` then.
+    /// Writes `bytes` at `offset`, and leaves the position of the file behind them.
     pub(super) fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), ResultsError> {
         #[cfg(test)]
         if let Some(changes) = &mut self.changes {
@@ -195,7 +198,7 @@ impl OutputFile {
         sought.and_then(|_| self.file.write_all(bytes)).map_err(|error| self.failed(error))
     }
 
-    /// Sets the length of the file, and its position to the end.
+    /// Sets the length of the file, and moves its position to the new end.
     pub(super) fn set_length(&mut self, length: u64) -> Result<(), ResultsError> {
         #[cfg(test)]
         if let Some(changes) = &mut self.changes {
@@ -207,19 +210,19 @@ impl OutputFile {
         Ok(())
     }
 
-    /// Leaves nothing of a file whose start cannot be written: empties it, or removes it if that fails, too. The
-    /// caller reports the error of the write.
+    /// Empties a file whose start cannot be written, or removes it if that fails, too. The caller reports the error
+    /// of the write.
     pub(super) fn abandon(mut self) {
         if self.set_length(0).is_err() && self.regular {
             let _ = fs::remove_file(&self.absolute);
         }
     }
 
-    /// Checks that the path still leads to the file.
+    /// Checks that the path still leads to the file; a pipe or a device is not checked.
     pub(super) fn verify_path(&self) -> Result<(), ResultsError> {
         let leads = || {
             let (named, written) = (fs::metadata(&self.absolute)?, self.file.metadata()?);
-            // Some network file systems number their files anew.
+            // Some network file systems give a file a new number while it is open.
             let alike = || {
                 Ok::<_, io::Error>(
                     named.len() == written.len() && named.modified()? == written.modified()?,
@@ -234,15 +237,16 @@ impl OutputFile {
         }
     }
 
-    /// Records for a supervising process that all rows are in the file.
+    /// Tells a supervising process that all rows so far are in the file, and with `is_complete` that no row follows.
     pub(super) fn record(&self, is_complete: bool) {
         if let Some(ledger) = self.ledger {
             ledger.written(self.length, is_complete);
         }
     }
 
-    /// Keeps the row that begins at `start` of the `rows` that the file lacks, for a supervising process. Returns
-    /// false if the rows belong into the file now.
+    /// Shares `rows`, which are not yet in the file, with a supervising process, which already has the bytes before
+    /// `start`. Returns false if the shared memory is full: then the rows must be written now. Returns true if no
+    /// process supervises this file.
     #[inline]
     pub(super) fn keep(&self, rows: &[u8], start: usize) -> bool {
         self.ledger.is_none_or(|ledger| ledger.keep(rows, start))
@@ -263,7 +267,7 @@ fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// Gives up a file without closing its descriptor.
+/// Gives up a file without closing its descriptor, whose number may belong to another file.
 #[cfg(unix)]
 fn forget(file: File) {
     let _ = std::os::fd::IntoRawFd::into_raw_fd(file);
@@ -272,31 +276,32 @@ fn forget(file: File) {
 #[cfg(not(unix))]
 fn forget(_: File) {}
 
-/// Moves the descriptor of a file to a high number, if the process may have one.
+/// Moves the descriptor of a file to [`DESCRIPTOR`] or above, if the process may have such a number.
 #[cfg(unix)]
-fn lifted(file: File) -> File {
+fn with_high_descriptor(file: File) -> File {
     rustix::io::fcntl_dupfd_cloexec(&file, DESCRIPTOR).map_or(file, File::from)
 }
 
 #[cfg(not(unix))]
-fn lifted(file: File) -> File {
+fn with_high_descriptor(file: File) -> File {
     file
 }
 
-/// Whether the path leads to a pipe or a device, which takes CSV only and cannot be read again.
+/// Whether the path is [`STANDARD_OUTPUT`] or leads to a pipe or a device, which takes CSV only and cannot be read
+/// again.
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new(STANDARD_OUTPUT)
         || fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Opens a file for exclusive writing without changing its content; `None` if another process has it
-/// open for writing. The lock is released when the process ends, even by a crash.
+/// Opens a file for exclusive writing without changing its content; `None` if another run has locked it. With
+/// `create`, a missing file is created. The lock is released when the process ends, even by a crash.
 #[cfg(not(windows))]
 fn open_alone(path: &Path, create: bool) -> io::Result<Option<File>> {
     let file = File::options().write(true).create(create).truncate(false).open(path)?;
     match file.try_lock() {
-        // The file system has no locks: assume that the file is free.
+        // An error means that the file system has no locks: assume that the file is free.
         Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
         Err(fs::TryLockError::WouldBlock) => Ok(None),
     }

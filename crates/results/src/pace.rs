@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 /// Largest number of rows between two readings of the clock.
 const STRIDE: u32 = 256;
 
-/// A timer of an interval of wall-clock time. If rows arrive fast, it reads the clock for a few of them
-/// only, because a reading takes as long as writing several cells.
+/// A timer of an interval of wall-clock time. If rows arrive fast, it reads the clock only for some of them,
+/// because a reading takes as long as writing several cells.
 #[derive(Debug)]
 pub(super) struct Pace {
     interval: Duration,

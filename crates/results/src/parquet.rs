@@ -33,8 +33,8 @@ const INTERVAL: Duration = Duration::from_millis(500);
 /// Size of a page of a column in bytes.
 const PAGE: usize = 1 << 20;
 
-/// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Boolean as BOOLEAN, String
-/// as UTF-8; only values of clocked columns are null. The footer's metadata contains the units.
+/// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Long as INT64, Boolean as BOOLEAN,
+/// String as UTF-8; only values of clocked columns can be null. The footer's metadata contains the units.
 ///
 /// Rows are collected in a block of bounded size, which becomes a row group. A partly filled block is
 /// written again by the next write. The file is readable at every instant, also if the process is
@@ -46,7 +46,7 @@ pub struct ParquetSink {
     widths: Widths,
     properties: Arc<WriterProperties>,
     footer: Footer,
-    /// For each column of the file, its number among the clocked ones.
+    /// For each column of the file, its number among the clocked columns; `None` if it is not clocked.
     clocked: Vec<Option<usize>>,
     block: Block,
     /// End of the row groups of full blocks.
@@ -63,8 +63,9 @@ impl ParquetSink {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Duplicate`] for two columns of one name, [`ResultsError::InUse`] if another run is
-    /// writing the file, [`ResultsError::Write`] if the file cannot be created.
+    /// [`ResultsError::Duplicate`] for two columns of one name or a column named [`TIME`],
+    /// [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the file cannot be
+    /// created.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let failed = |source| write_error(path, source);
@@ -86,32 +87,32 @@ impl ParquetSink {
         })
     }
 
-    /// Writes the rows of the block and the footer; starts the next block if this one is full. With
-    /// `last`, the file has no unused bytes then.
+    /// Writes the rows of the block and the footer, unless the file has them already; starts the next block if this
+    /// one is full. With `last`, it also moves the tail so that the file has no unused bytes.
     fn write_rows(&mut self, last: bool) -> Result<(), ResultsError> {
         self.tail.file.verify()?;
         let (rows, full) = (self.block.rows(), self.block.is_full());
-        let is_behind = self.tail.start() > self.end;
-        if rows == self.written && !full && !(last && is_behind) {
+        let has_unused_bytes = self.tail.start() > self.end;
+        if rows == self.written && !full && !(last && has_unused_bytes) {
             return Ok(());
         }
         let path = self.tail.file.path().to_owned();
         let failed = |error| write_error(&path, error);
         let group = self.encode(rows).map_err(failed)?;
-        let in_front = footer::moved(&group, self.end).map_err(failed)?;
-        let footer = self.footer.render(Some(in_front.clone())).map_err(failed)?;
+        let metadata = footer::at_offset(&group, self.end).map_err(failed)?;
+        let footer = self.footer.render(Some(metadata.clone())).map_err(failed)?;
         // The end of the tail is rounded up.
         let end = self.end + (self.bytes.len() + footer.len() + 8) as u64;
         let fits = end <= self.tail.start();
         let is_partial = self.written > 0;
-        // The next tail, or this one again, then fits in front.
-        let behind = self.tail.file.length().max(end);
+        // Not before `end`: the next tail, or this one again, then fits in front of the one at this offset.
+        let offset = self.tail.file.length().max(end);
         if !fits && !is_partial {
-            self.tail.move_footer(behind)?;
+            self.tail.move_footer(offset)?;
         } else if !fits {
-            let group = footer::moved(&group, behind).map_err(failed)?;
+            let group = footer::at_offset(&group, offset).map_err(failed)?;
             let footer = self.footer.render(Some(group)).map_err(failed)?;
-            self.tail.replace(behind, &self.bytes, footer)?;
+            self.tail.replace(offset, &self.bytes, footer)?;
             self.written = rows;
         }
         if fits || !is_partial || full || last {
@@ -121,8 +122,8 @@ impl ParquetSink {
         self.tail.file.record(false);
         if full {
             let size = self.bytes.len() as u64;
-            self.footer.keep(in_front);
-            self.tail.keep(size);
+            self.footer.add(metadata);
+            self.tail.detach_group(size);
             self.end += size;
             self.block.clear();
             self.written = 0;
@@ -190,31 +191,32 @@ impl Drop for ParquetSink {
     }
 }
 
-/// Returns for each column of the file its number among the clocked ones; the time is the first column.
+/// Returns for each column of the file, of which the time is the first, its number among the clocked columns;
+/// `None` if it is not clocked.
 fn clocked(columns: &[Column]) -> Vec<Option<usize>> {
     let mut count = 0..;
     let number = |column: &Column| if column.clocked { count.next() } else { None };
     std::iter::once(None).chain(columns.iter().map(number)).collect()
 }
 
-/// Writes the values of a column; those whose level is 0 are null.
+/// Writes the values of a column. A value whose level is 0 is null; without levels none is.
 fn write<T: DataType>(
     writer: &mut ColumnWriterImpl<'_, T>,
     values: &[T::T],
     levels: Option<&[i16]>,
 ) -> Result<(), ParquetError> {
     let written = if let Some(levels) = levels {
-        let there = values.iter().zip(levels).filter(|(_, level)| **level > 0);
-        let there: Vec<T::T> = there.map(|(value, _)| value.clone()).collect();
-        writer.write_batch(&there, Some(levels), None)
+        let present = values.iter().zip(levels).filter(|(_, level)| **level > 0);
+        let present: Vec<T::T> = present.map(|(value, _)| value.clone()).collect();
+        writer.write_batch(&present, Some(levels), None)
     } else {
         writer.write_batch(values, None, None)
     };
     written.map(|_| ())
 }
 
-/// Returns the encodings: plain for numbers, which copies the memory; a dictionary for texts, which
-/// repeat.
+/// Returns the settings of the writer: a plain encoding for numbers, which copies the memory; a dictionary for
+/// texts, which repeat; no statistics.
 fn properties(columns: &[Column]) -> WriterProperties {
     let mut properties = WriterProperties::builder()
         .set_dictionary_enabled(false)

@@ -11,9 +11,9 @@ use super::{Column, Envelope, ResultsError, Selection};
 /// A result file, written by a [`super::Sink`] or by another program. The time must be in the column
 /// `time` or in the first column.
 ///
-/// Read are CSV with commas, semicolons or tabs between the values, decimal commas, UTF-8 or UTF-16, and
-/// optionally the units in the second line; Parquet; and MAT files of version 4 with results of Dymola or
-/// OpenModelica.
+/// The formats are CSV with commas, semicolons or tabs between the values, decimal commas, UTF-8 or UTF-16, and
+/// optionally the units in the second line; Parquet without nested columns; and MAT files of version 4 with results
+/// of Dymola or OpenModelica.
 #[derive(Debug)]
 pub struct Table {
     path: PathBuf,
@@ -24,7 +24,7 @@ pub struct Table {
     time: usize,
 }
 
-/// The format of a file, and what its start says about the rest.
+/// The format of a file, and the properties that are read when it is opened.
 #[derive(Debug)]
 enum Layout {
     Lines(lines::Layout),
@@ -36,12 +36,12 @@ enum Layout {
 type Visitor<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl Table {
-    /// Opens a file and reads the names of the columns; for Parquet also their types and units.
+    /// Opens a file and reads the names and units of the columns; for Parquet also their types.
     ///
     /// # Errors
     ///
     /// [`ResultsError::Extension`] for an extension other than `.csv`, `.parquet` and `.mat`,
-    /// [`ResultsError::Read`] if the file cannot be read.
+    /// [`ResultsError::Read`] if the file cannot be read or has no columns.
     pub fn open(path: &Path) -> Result<Self, ResultsError> {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (layout, columns) = match ending.to_str() {
@@ -63,7 +63,8 @@ impl Table {
     }
 
     /// Returns the columns in the order of the file, including the time; of MAT files, those that vary come first.
-    /// Columns of CSV and MAT files have the type Real; those of CSV have no unit, unless its second line states them.
+    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also those with 64 bits.
+    /// Columns of CSV have no unit, unless the second line of the file states units.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
@@ -79,7 +80,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Selection`] if a pattern matches no column or no column is left.
+    /// [`ResultsError::Selection`] if a pattern matches no column or no column is selected.
     pub fn choose(&self, selection: &Selection) -> Result<Vec<usize>, ResultsError> {
         let names: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
         selection
@@ -88,13 +89,14 @@ impl Table {
     }
 
     /// Calls a function for each row, with the time and the values of the columns at `positions`: a
-    /// Boolean is 0 or 1, a missing value NaN. An incomplete last line of CSV is ignored.
+    /// Boolean is 0 or 1, a missing value NaN. A last line of CSV that has no end of line and too few or too many
+    /// values is ignored, as incomplete.
     ///
     /// # Errors
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
     /// [`ResultsError::Order`] if a time is earlier than the one before, [`ResultsError::Read`] if the file cannot be
-    /// read or a time is no number.
+    /// read or a time is no number. The function was then called for some rows before the error.
     ///
     /// # Panics
     ///
@@ -144,7 +146,7 @@ impl Table {
     }
 }
 
-/// Returns the position of the time among the columns.
+/// Returns the position of the time: the column `time`, otherwise that name in another case, otherwise the first.
 fn time_position(columns: &[Column]) -> usize {
     let exact = columns.iter().position(|column| column.name == super::TIME);
     let similar =
@@ -156,7 +158,7 @@ fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
     ResultsError::Read { path: path.to_owned(), reason: reason.to_string() }
 }
 
-/// Checks that the times of the rows do not decrease.
+/// Checks that the times of the rows are numbers and do not decrease.
 struct Clock<'a> {
     path: &'a Path,
     /// The column of the time.
@@ -169,7 +171,7 @@ impl<'a> Clock<'a> {
         Self { path, name, before: f64::NEG_INFINITY }
     }
 
-    /// Checks the next time; `place` says where it is.
+    /// Checks the next time; `place` returns its line or row for the error.
     fn check(&mut self, time: f64, place: impl Fn() -> String) -> Result<(), ResultsError> {
         if time.is_nan() {
             let reason = format!("{}: {} is no number, expected a time in s", place(), self.name);

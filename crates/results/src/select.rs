@@ -1,6 +1,6 @@
 //! Selection of variables to record or to plot.
 
-/// Largest number of names in an error message.
+/// Largest number of similar or available names in an error message.
 const SHOWN: usize = 5;
 
 /// A selection of variables by names and patterns: all variables that match a pattern of `include` and
@@ -26,7 +26,7 @@ pub enum SelectionError {
     NoMatch {
         /// The pattern.
         pattern: String,
-        /// Names of similar variables, as part of the message.
+        /// Similar names, otherwise the first names, as the end of the message.
         near: String,
     },
     /// `exclude` excludes every included variable.
@@ -40,7 +40,7 @@ impl Selection {
     ///
     /// # Errors
     ///
-    /// [`SelectionError`] if a pattern matches no name or no name is left.
+    /// [`SelectionError`] if a pattern matches no name, or if there are names and none is selected.
     pub fn choose<N: AsRef<str>>(&self, names: &[N]) -> Result<Vec<usize>, SelectionError> {
         let mut open = vec![true; names.len()];
         for pattern in &self.exclude {
@@ -117,8 +117,8 @@ fn matches_pattern(pattern: &[char], name: &str) -> bool {
 /// Largest edit distance of two similar names.
 const EDITS: usize = 2;
 
-/// Returns up to five of `names` that contain `name`, are contained in it, or have an edit distance of
-/// at most two.
+/// Returns up to [`SHOWN`] of `names` that contain `name`, are contained in it, or have an edit distance of
+/// at most [`EDITS`], the most similar first.
 fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let edits = |known: &str| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase());
     let near = |known: &&str| {
@@ -128,7 +128,7 @@ fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str>
     };
     let mut similar: Vec<_> = names.filter(near).collect();
     similar.sort_by_key(|known| edits(known));
-    similar.truncate(5);
+    similar.truncate(SHOWN);
     similar
 }
 

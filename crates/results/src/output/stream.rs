@@ -13,15 +13,16 @@ use rustix::io::Errno;
 
 use super::{DESCRIPTOR, STANDARD_OUTPUT, is_stream};
 
-/// Time limit of the wait for a process that reads a named pipe, and interval of the attempts.
+/// Longest wait for a process that reads a named pipe.
 const READER: Duration = Duration::from_secs(10);
+/// Interval between two attempts to open a named pipe.
 const ATTEMPTS: Duration = Duration::from_millis(50);
-/// Time after which a warning tells that a pipe is full.
+/// Time for which a pipe must be full before a warning is logged.
 const FULL: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
-/// Number of bytes that a pipe takes at once if it takes any.
+/// Number of bytes that a pipe always takes in one write if it takes any.
 const ATOMIC: usize = 4096;
 
-/// Standard output, for the results only.
+/// Standard output, once it is reserved for the results.
 static RESERVED: Mutex<Option<File>> = Mutex::new(None);
 
 /// Reserves standard output for the results: what this process and its FMUs print goes to standard
@@ -38,7 +39,8 @@ pub fn reserve_standard_output() -> io::Result<()> {
     Ok(())
 }
 
-/// Opens a pipe or a device; `None` if the path leads to none.
+/// Opens a pipe or a device; `None` if the path leads to none. Waits up to [`READER`] for a process that reads a
+/// named pipe; without one, this is an error.
 pub(super) fn open(path: &Path) -> io::Result<Option<File>> {
     if path == Path::new(STANDARD_OUTPUT)
         && let Some(file) = &*RESERVED.lock().unwrap_or_else(PoisonError::into_inner)
@@ -73,7 +75,7 @@ pub(super) fn open(path: &Path) -> io::Result<Option<File>> {
     }
 }
 
-/// Writes to a pipe or a device, with a warning if it takes nothing for some time.
+/// Writes to a pipe or a device, and logs a warning each time that it takes nothing for [`FULL`].
 pub(super) fn write(file: &mut File, bytes: &[u8], path: &Path) -> io::Result<()> {
     for part in bytes.chunks(ATOMIC) {
         let mut events = [PollFd::new(&*file, PollFlags::OUT)];

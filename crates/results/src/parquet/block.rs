@@ -16,8 +16,9 @@ const PADDING: usize = 8;
 /// Columns of fixed capacity. Texts of all columns are stored together, row by row.
 #[derive(Debug)]
 pub(super) struct Block {
-    /// Number of rows; then the capacity in rows.
+    /// Number of rows.
     rows: usize,
+    /// Capacity in rows.
     room: usize,
     reals: Vec<f64>,
     integers: Vec<i32>,
@@ -26,12 +27,13 @@ pub(super) struct Block {
     is_long: Vec<bool>,
     booleans: Vec<bool>,
     texts: Vec<u8>,
-    /// End of each text.
+    /// End of each text in `texts`.
     ends: Vec<usize>,
     /// Number of texts in a row.
     strings: usize,
-    /// Whether each value of the clocked columns is there, row by row, and the number of these columns.
+    /// For each row, whether each clocked column has a value.
     present: Vec<bool>,
+    /// Number of clocked columns.
     clocked: usize,
 }
 
@@ -91,7 +93,7 @@ impl Block {
         for (place, value) in reals.zip(std::iter::once(&time).chain(row.reals)) {
             *place = *value;
         }
-        // A type without columns has no storage, so `skip` yields nothing.
+        // `skip` instead of a slice: a type without columns has no storage, and a slice would panic.
         let mut integers = self.integers.iter_mut().skip(self.rows).step_by(stride);
         let mut longs = self.longs.iter_mut().skip(self.rows).step_by(stride);
         for (is_long, value) in self.is_long.iter().zip(row.integers) {
@@ -115,20 +117,20 @@ impl Block {
         self.rows += 1;
     }
 
-    /// Returns the definition levels of the first `rows` of a clocked column: 0 is null.
+    /// Returns the definition levels of the first `rows` of the clocked column number `clocked`: 0 for null, else 1.
     pub(super) fn levels(&self, clocked: usize, rows: usize) -> Vec<i16> {
         let flags = self.present.iter().skip(clocked).step_by(self.clocked.max(1));
         flags.take(rows).map(|present| i16::from(*present)).collect()
     }
 
-    /// Returns a reader of the first `rows` of the columns.
+    /// Returns a reader of the first `rows` of the columns, or of all rows if there are fewer.
     pub(super) fn reader(&self, rows: usize) -> Reader<'_> {
         let rows = rows.min(self.rows);
         Reader { block: self, rows, reals: 0, integers: 0, longs: 0, booleans: 0, strings: 0 }
     }
 }
 
-/// A reader that returns the columns of each type one after another.
+/// A reader that returns the columns of each type one after another; a call beyond the last column panics.
 pub(super) struct Reader<'a> {
     block: &'a Block,
     rows: usize,

@@ -58,12 +58,12 @@ impl Footer {
         self.schema.clone()
     }
 
-    /// Adds a row group to this and all later footers.
-    pub(super) fn keep(&mut self, group: RowGroupMetaData) {
+    /// Adds a row group to all later footers.
+    pub(super) fn add(&mut self, group: RowGroupMetaData) {
         self.groups.push(group);
     }
 
-    /// Renders the footer with all row groups so far and an optional further one.
+    /// Renders the footer with all row groups that were added, and with `last` behind them in this footer only.
     pub(super) fn render(
         &mut self,
         last: Option<RowGroupMetaData>,
@@ -105,12 +105,15 @@ fn field(name: &str, kind: ColumnKind, repetition: Repetition) -> Result<TypePtr
     Ok(Arc::new(built))
 }
 
-/// Returns the metadata of a row group, written at offset 0, for the offset `by`.
-pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaData, ParquetError> {
-    let by = i64::try_from(by).map_err(|error| ParquetError::General(error.to_string()))?;
+/// Returns the metadata that a row group, written at offset 0, has at `start`.
+pub(super) fn at_offset(
+    group: &RowGroupMetaData,
+    start: u64,
+) -> Result<RowGroupMetaData, ParquetError> {
+    let start = i64::try_from(start).map_err(|error| ParquetError::General(error.to_string()))?;
     let columns = group.columns().iter().map(|column| {
-        let dictionary = column.dictionary_page_offset().map(|offset| offset + by);
-        let data = column.data_page_offset() + by;
+        let dictionary = column.dictionary_page_offset().map(|offset| offset + start);
+        let data = column.data_page_offset() + start;
         let builder = column.clone().into_builder();
         builder.set_data_page_offset(data).set_dictionary_page_offset(dictionary).build()
     });
@@ -120,11 +123,11 @@ pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaDat
         .set_num_rows(group.num_rows())
         .set_total_byte_size(group.total_byte_size())
         .set_column_metadata(columns)
-        .set_file_offset(by)
+        .set_file_offset(start)
         .build()
 }
 
-/// Returns the units in the footer, by name.
+/// Returns the units in the footer, by name of the column; none if the file is of another program.
 pub(crate) fn units(metadata: &FileMetaData) -> BTreeMap<String, String> {
     metadata
         .key_value_metadata()

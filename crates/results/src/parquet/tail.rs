@@ -3,8 +3,8 @@
 //!
 //! The last eight bytes of a file are the length L of the footer and `PAR1`. A reader takes the L bytes
 //! before them, decodes the metadata at their start, and ignores what follows the metadata. So one
-//! write of eight bytes, at a multiple of eight, replaces one footer by another; a kill cannot divide
-//! it, as it can a longer write, after each page of memory.
+//! write of eight bytes, at a multiple of eight, replaces one footer by another. A kill can cut a longer
+//! write between two pages of memory, but not this one.
 //!
 //! A new tail behind the present one first gets its last eight bytes, with the L that leads to the
 //! present footer; then all bytes before them; then its own L. A new tail that fits in front of the
@@ -19,8 +19,9 @@ const LINK: usize = 8;
 #[derive(Debug)]
 pub(super) struct Tail {
     pub(super) file: OutputFile,
-    /// Start of the present tail, and of its footer.
+    /// Start of the present tail.
     start: u64,
+    /// Start of the present footer.
     footer_start: u64,
     /// The present footer, including its last eight bytes.
     footer: Vec<u8>,
@@ -40,23 +41,25 @@ impl Tail {
         Ok(tail)
     }
 
-    /// Start of the present tail. A new tail must end before it or begin behind the end of the file.
+    /// Returns the start of the present tail. A new tail must end at or before it, or start at or behind the end of
+    /// the file.
     pub(super) fn start(&self) -> u64 {
         self.start
     }
 
-    /// Removes the first `size` bytes, which are a full row group now, from the tail.
-    pub(super) fn keep(&mut self, size: u64) {
+    /// Removes the first `size` bytes, which are a full row group now, from the tail; they stay in the file.
+    pub(super) fn detach_group(&mut self, size: u64) {
         self.start += size;
     }
 
-    /// Moves the present footer, without a row group, to `offset` behind the end of the file.
+    /// Moves the present footer, without a row group, to `offset`, at or behind the end of the file.
     pub(super) fn move_footer(&mut self, offset: u64) -> Result<(), ResultsError> {
         let footer = self.footer.clone();
         self.replace(offset, &[], footer)
     }
 
-    /// Replaces the present tail. After a failure the present one is still there.
+    /// Replaces the present tail by the row group `group` at `offset` and `footer`. After a failure the present tail
+    /// remains.
     pub(super) fn replace(
         &mut self,
         offset: u64,
@@ -76,6 +79,8 @@ impl Tail {
         Ok(())
     }
 
+    /// Writes the row group at `offset` and the footer at `start`, so that the file is readable after each call of
+    /// the operating system.
     fn write(
         &mut self,
         offset: u64,

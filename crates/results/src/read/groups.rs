@@ -76,8 +76,7 @@ pub(super) fn visit(
     order
 }
 
-/// Checks that the columns lie inside the file according to the footer. The crate `parquet` panics
-/// otherwise.
+/// Checks that the footer states places inside the file for the columns. The crate `parquet` panics otherwise.
 fn check_places(
     reader: &SerializedFileReader<File>,
     group: usize,
@@ -144,7 +143,8 @@ fn visit_group(
     }
 }
 
-/// Reads the next cells of a column as numbers. `is_unsigned`: its integers have no sign.
+/// Replaces `cells` by the next cells of a column as numbers, none after the last row. `is_unsigned`: its integers
+/// have no sign. A column of texts is an error.
 fn read(
     reader: &mut ColumnReader,
     cells: &mut Vec<f64>,
@@ -170,6 +170,7 @@ fn read(
     }
 }
 
+/// Replaces `cells` by the next [`ROWS`] or fewer cells, converted by `number`; null is NaN.
 fn batch<T: DataType>(
     reader: &mut ColumnReaderImpl<T>,
     cells: &mut Vec<f64>,

@@ -11,7 +11,7 @@ use crate::ColumnKind;
 
 /// Number of bytes read at once.
 const BUFFER: usize = 256 * 1024;
-/// Number of bytes of the start of a file that tell a text from a binary file.
+/// Number of bytes at the start of a file that are examined to tell a text from a binary file.
 const SNIFFED: usize = 1024;
 
 /// The layout of a CSV file.
@@ -24,7 +24,8 @@ pub(super) struct Layout {
     is_closed: bool,
 }
 
-/// Opens the file as UTF-8; UTF-16, as spreadsheets write it, is converted.
+/// Opens the file as UTF-8; UTF-16, as spreadsheets write it, is converted. A Parquet or other binary file is an
+/// error.
 fn open(path: &Path) -> Result<Box<dyn Read>, ResultsError> {
     let failed = |error: &std::io::Error| unreadable(path, error);
     let mut file = File::open(path).map_err(|error| failed(&error))?;
@@ -58,17 +59,18 @@ fn reader(path: &Path, delimiter: u8) -> Result<Reader<Box<dyn Read>>, ResultsEr
     Ok(builder.from_reader(open(path)?))
 }
 
-/// Returns the sign between the names: a semicolon or a tab if there is one outside of quotes, otherwise a comma.
+/// Returns the character between the names in the first line: a semicolon or a tab if there is one outside of
+/// quotes, otherwise a comma.
 fn delimiter(path: &Path) -> Result<u8, ResultsError> {
     let mut line = Vec::new();
     let mut text = BufReader::new(open(path)?).take(BUFFER as u64);
     text.read_until(b'\n', &mut line).map_err(|error| unreadable(path, &error))?;
     let mut is_quoted = false;
-    line.retain(|sign| {
-        is_quoted ^= *sign == b'"';
+    line.retain(|byte| {
+        is_quoted ^= *byte == b'"';
         !is_quoted
     });
-    Ok([b';', b'\t'].into_iter().find(|sign| line.contains(sign)).unwrap_or(b','))
+    Ok([b';', b'\t'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b','))
 }
 
 pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError> {
@@ -105,7 +107,7 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
     Ok((layout, columns))
 }
 
-/// Returns the text of a cell in the line of the units, without brackets.
+/// Returns the text of a cell in the line of the units, without the brackets around it.
 fn unit(cell: &[u8]) -> String {
     let text = String::from_utf8_lossy(cell);
     text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']).trim().to_owned()
@@ -125,7 +127,8 @@ pub(super) fn visit(
     if layout.has_units {
         reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))?;
     }
-    // A line that is no row counts as incomplete if it is the last one and is not ended, otherwise as an error.
+    // The error of a line with too few or too many values. It is ignored if this is the last line and has no end of
+    // line: then the line is incomplete.
     let mut wrong: Option<ResultsError> = None;
     while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))? {
         if let Some(error) = wrong {
@@ -171,19 +174,19 @@ fn ragged(line: u64, count: usize, expected: usize, delimiter: u8) -> String {
     )
 }
 
-/// Whether the last line of the file is ended.
+/// Whether the file ends with an end of line.
 fn is_ended(path: &Path) -> bool {
     let mut end = [0; 2];
     let read = |mut file: File| {
         file.seek(SeekFrom::End(-2))?;
         file.read_exact(&mut end)
     };
-    // UTF-16 has the sign in one of two bytes.
+    // In UTF-16 the character is in one of two bytes.
     File::open(path).and_then(read).is_ok() && (end[1] == b'\n' || end == [b'\n', 0])
 }
 
-/// Parses a number or a Boolean; an empty cell is NaN. If the values are not separated by commas, a comma is the
-/// decimal sign.
+/// Parses a number or a Boolean; an empty cell is NaN, another text `None`. If the values are not separated by
+/// commas, a comma may be the decimal sign.
 fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
     match std::str::from_utf8(cell).ok()?.trim() {
         "" => Some(f64::NAN),

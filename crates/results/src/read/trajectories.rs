@@ -13,8 +13,8 @@ use std::path::Path;
 use super::{Clock, Column, ResultsError, Visitor, unreadable};
 use crate::ColumnKind;
 
-/// Largest number of bytes of the texts of a file.
-const TEXTS: u64 = 1 << 30;
+/// Largest number of bytes of a matrix that is read as a whole.
+const WHOLE: u64 = 1 << 30;
 
 /// Where the values of a file are.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ enum Place {
     Varying(usize, f64),
 }
 
-/// A matrix of the file: column after column.
+/// A matrix of the file, stored column after column.
 #[derive(Debug, Clone, Copy)]
 struct Matrix {
     offset: u64,
@@ -77,6 +77,7 @@ impl Precision {
 }
 
 impl Matrix {
+    /// Returns the number of bytes; `None` if it overflows.
     fn size(&self) -> Option<u64> {
         let count = self.rows.checked_mul(self.columns)?.checked_mul(self.precision.size())?;
         u64::try_from(count).ok()
@@ -106,7 +107,7 @@ impl<'a> Source<'a> {
         moved.map(drop).map_err(|error| unreadable(self.path, &error))
     }
 
-    /// Reads the header at `offset`; returns the name of the matrix, and the offset behind it.
+    /// Reads the header at `offset`; returns the name of the matrix, the matrix, and the offset of its end.
     fn matrix(&mut self, offset: u64) -> Result<(String, Matrix, u64), ResultsError> {
         let foreign = |reason: &str| unreadable(self.path, &format!("{reason}, {EXPECTED}"));
         let mut header = [0; 20];
@@ -147,9 +148,9 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Reads all numbers of a matrix of bounded size.
+    /// Reads all numbers of a matrix; none if it has more than [`WHOLE`] bytes.
     fn numbers(&mut self, matrix: &Matrix) -> Result<Vec<f64>, ResultsError> {
-        let size = matrix.size().filter(|size| *size <= TEXTS).unwrap_or(0);
+        let size = matrix.size().filter(|size| *size <= WHOLE).unwrap_or(0);
         let mut bytes = vec![0; usize::try_from(size).unwrap_or(0)];
         self.seek(matrix.offset)?;
         self.read(&mut bytes)?;
@@ -157,7 +158,7 @@ impl<'a> Source<'a> {
         Ok(numbers.map(|bytes| matrix.precision.number(bytes)).collect())
     }
 
-    /// Reads the columns of a matrix of texts.
+    /// Reads the columns of a matrix of character codes as texts.
     fn texts(&mut self, matrix: &Matrix) -> Result<Vec<String>, ResultsError> {
         let codes = self.numbers(matrix)?;
         Ok(codes
@@ -167,7 +168,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The end of a sentence on a file that is not read.
+/// The end of the message about a file that is not supported.
 const EXPECTED: &str = "expected results of Dymola or OpenModelica (version 4, binTrans); \
                         save others as CSV or Parquet first";
 
@@ -207,18 +208,18 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
     };
     let information = source.numbers(&matrix("dataInfo")?)?;
     let varying = matrix("data_2")?;
-    let (constant, constants) = match matrices.get("data_1").copied() {
+    let (constant_rows, constants) = match matrices.get("data_1").copied() {
         Some(matrix) => (matrix.rows, source.numbers(&matrix)?),
         None => (0, Vec::new()),
     };
-    let mut read = Vec::new();
+    let mut entries = Vec::new();
     for (at, name) in names.into_iter().enumerate() {
         let [group, row] = [0, 1].map(|field| information.get(4 * at + field).copied());
         let row = row.filter(|row| row.abs() >= 1.0).unwrap_or(f64::NAN);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0")]
         let index = (row.abs() - 1.0) as usize;
         let place = match group {
-            Some(1.0) if index < constant => {
+            Some(1.0) if index < constant_rows => {
                 constants.get(index).map(|value| Place::Constant(value * row.signum()))
             }
             Some(0.0 | 2.0) if index < varying.rows => Some(Place::Varying(index, row.signum())),
@@ -228,15 +229,16 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
         let place = place.ok_or_else(|| foreign(format!("it has no values of {name}")))?;
         let unit = descriptions.get(at).and_then(|text| unit(text));
         let name = if group == Some(0.0) { super::super::TIME.to_owned() } else { name };
-        read.push((Column { name, kind: ColumnKind::Real, unit, clocked: false }, place));
+        entries.push((Column { name, kind: ColumnKind::Real, unit, clocked: false }, place));
     }
-    // What varies comes first: large models have thousands of parameters.
-    read.sort_by_key(|(_, place)| matches!(place, Place::Constant(_)));
-    let (columns, places) = read.into_iter().unzip();
+    // Variables that vary come first: large models have thousands of parameters.
+    entries.sort_by_key(|(_, place)| matches!(place, Place::Constant(_)));
+    let (columns, places) = entries.into_iter().unzip();
     Ok((Layout { varying, places }, columns))
 }
 
-/// Checks the four lines of `Aclass`, which are the rows of a matrix of character codes.
+/// Checks the first and the fourth row of `Aclass`, a matrix of character codes with four rows: the class and the
+/// layout of the file.
 fn check_class(codes: &[f64]) -> Result<(), String> {
     let line = |row: usize| text(codes.iter().skip(row).step_by(4).copied().map(byte));
     match (line(0).as_str(), line(3).as_str()) {
@@ -245,7 +247,8 @@ fn check_class(codes: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Returns the unit at the end of a description: `angle [rad]`, of Dymola also `angle [rad|deg]`, `on [:#(type=Boolean)]`.
+/// Returns the unit at the end of a description: `rad` of `angle [rad]` and, as Dymola writes it, of
+/// `angle [rad|deg]`; `None` without one, as in `on [:#(type=Boolean)]`.
 fn unit(description: &str) -> Option<String> {
     let (_, unit) = description.strip_suffix(']')?.rsplit_once('[')?;
     let unit = unit.split(['|', ':']).next().unwrap_or_default().trim();
