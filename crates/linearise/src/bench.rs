@@ -17,6 +17,7 @@ use slave::Slave as _;
 const RESPONSE: f64 = 1e-2;
 /// Height of the first trial pulse, relative to the typical size of the input.
 const TRIAL: f64 = 1e-2;
+/// Smallest and largest height of a pulse, relative to the typical size of the input.
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 0.1;
 /// The drift over a record, relative to the typical sizes, above which the fit includes it.
@@ -39,12 +40,17 @@ pub(super) struct Bench<'p> {
     pub(super) y: Vec<f64>,
     start: f64,
     pub(super) step: f64,
-    /// The readings of an undisturbed run, with the inputs of the operating point.
+    /// The readings of an undisturbed run, with the inputs of the operating point; empty before the first response.
     rest: DMatrix<f64>,
 }
 
-/// A pulse of an input: direction and height.
-pub(super) type Pulse = (Side, f64);
+/// A pulse of an input.
+#[derive(Clone, Copy)]
+pub(super) struct Pulse {
+    pub(super) side: Side,
+    /// The absolute height in the unit of the input.
+    pub(super) height: f64,
+}
 
 impl<'p> Bench<'p> {
     pub(super) fn new(
@@ -111,27 +117,27 @@ impl<'p> Bench<'p> {
     /// Returns the linear response of the readings to `shape`(step, input), per unit of the shape,
     /// and the largest error of each reading.
     ///
-    /// The limit of small pulses is extrapolated from `heights` heights: `height` and its halves.
+    /// The limit of small pulses is extrapolated from `heights` heights: the height of `pulse` and its halves. With one
+    /// height the errors are infinite.
     pub(super) fn response(
         &mut self,
         count: usize,
         heights: usize,
-        (side, height): Pulse,
+        pulse: Pulse,
         shape: impl Fn(usize, usize) -> f64,
     ) -> Result<(DMatrix<f64>, Vec<f64>), LineariseError> {
         if self.rest.nrows() != count + 1 {
             self.rest = self.run(count, |_, _| 0.0)?;
         }
         let mut levels = Vec::with_capacity(heights);
-        let highest = height;
-        let mut height = if side == Side::Below { -height } else { height };
+        let mut height = if pulse.side == Side::Below { -pulse.height } else { pulse.height };
         for _ in 0..heights {
-            let there = self.run(count, |step, input| height * shape(step, input))?;
-            levels.push(if side == Side::Both {
-                let back = self.run(count, |step, input| -height * shape(step, input))?;
-                (there - back) / (2.0 * height)
+            let plus = self.run(count, |step, input| height * shape(step, input))?;
+            levels.push(if pulse.side == Side::Both {
+                let minus = self.run(count, |step, input| -height * shape(step, input))?;
+                (plus - minus) / (2.0 * height)
             } else {
-                (there - &self.rest) / height
+                (plus - &self.rest) / height
             });
             height *= 0.5;
         }
@@ -139,21 +145,21 @@ impl<'p> Bench<'p> {
         let response = DMatrix::from_fn(count + 1, errors.len(), |row, column| {
             let values: Vec<f64> = levels.iter().map(|level| level[(row, column)]).collect();
             let rounding = f64::EPSILON * self.rest[(row, column)].abs();
-            let noise = |level: usize| rounding / highest / 0.5_f64.powi(exponent(level));
-            let order = |order| side.exponent(order);
-            let (value, error) = extrapolate(&values, noise, 2.0, order);
+            let noise = |level: usize| rounding / pulse.height / 0.5_f64.powi(exponent(level));
+            let power = |order| pulse.side.exponent(order);
+            let (value, error) = extrapolate(&values, noise, 2.0, power);
             errors[column] = errors[column].max(error);
             value
         });
         Ok((response, errors))
     }
 
-    /// Returns the drift of the states over the first step.
+    /// Returns the drift of the states over the first step. [`Bench::response`] must have run before.
     pub(super) fn drift(&self) -> Vec<f64> {
         (0..self.states.len()).map(|k| self.rest[(1, k)] - self.rest[(0, k)]).collect()
     }
 
-    /// Returns the largest drift of a state over the whole run, relative to its typical size.
+    /// Returns the largest drift of a state over the whole undisturbed run, relative to its typical size.
     fn largest_drift(&self) -> f64 {
         let last = self.rest.nrows() - 1;
         let drift = |k: usize| (self.rest[(last, k)] - self.rest[(0, k)]).abs() / self.scale(k);
@@ -171,13 +177,14 @@ impl<'p> Bench<'p> {
         let scale = part.scale(value);
         let shape =
             |step: usize, other: usize| f64::from(u8::from(other == input && step < count / 2));
-        let trial = reach(part, value, TRIAL * scale)?;
-        let (response, _) = self.response(count, 1, trial, shape)?;
+        let (side, height) = reach(part, value, TRIAL * scale)?;
+        let (response, _) = self.response(count, 1, Pulse { side, height }, shape)?;
         let largest = (0..self.states.len())
             .map(|k| response.column(k).amax() / self.scale(k))
             .fold(0.0, f64::max);
-        let fitting = (RESPONSE / largest).clamp(SMALLEST * scale, LARGEST * scale);
-        let pulse = reach(part, value, fitting)?;
+        let target = (RESPONSE / largest).clamp(SMALLEST * scale, LARGEST * scale);
+        let (side, height) = reach(part, value, target)?;
+        let pulse = Pulse { side, height };
         let (response, errors) = self.response(count, HEIGHTS, pulse, shape)?;
         Ok((pulse, response, errors))
     }
@@ -194,14 +201,14 @@ impl<'p> Bench<'p> {
             pulses: Vec::with_capacity(m),
             noise: vec![0.0; self.readings.len()],
             count,
-            drifts: false,
+            is_drifting: false,
         };
         for input in 0..m {
             let (pulse, response, errors) = self.pulse(input, count)?;
-            let response = response * pulse.1;
+            let response = response * pulse.height;
             for (k, noise) in record.noise.iter_mut().enumerate() {
                 let size = response.column(k).amax() + self.rest.column(k).amax();
-                *noise = noise.max(f64::EPSILON * size + errors[k] * pulse.1);
+                *noise = noise.max(f64::EPSILON * size + errors[k] * pulse.height);
             }
             for step in 0..count {
                 let row = input * count + step;
@@ -213,13 +220,13 @@ impl<'p> Bench<'p> {
                 for k in 0..self.parts.outputs.len() {
                     record.outputs[(row, k)] = response[(step + 1, n + k)];
                 }
-                let held = if step < count / 2 { pulse.1 } else { 0.0 };
-                record.before[(row, n + input)] = held;
-                record.after[(row, n + input)] = held;
+                let value = if step < count / 2 { pulse.height } else { 0.0 };
+                record.before[(row, n + input)] = value;
+                record.after[(row, n + input)] = value;
             }
             record.pulses.push(pulse);
         }
-        record.drifts = self.largest_drift() > DRIFT;
+        record.is_drifting = self.largest_drift() > DRIFT;
         Ok(record)
     }
 }
@@ -234,13 +241,14 @@ pub(super) struct Record {
     pub(super) change: DMatrix<f64>,
     /// Outputs at the end of the step.
     pub(super) outputs: DMatrix<f64>,
+    /// The pulse of each input.
     pub(super) pulses: Vec<Pulse>,
     /// The error of each reading: rounding, and the remainder of the extrapolation.
     pub(super) noise: Vec<f64>,
     /// Number of steps after each pulse.
     count: usize,
     /// Whether the operating point drifts during the record.
-    pub(super) drifts: bool,
+    pub(super) is_drifting: bool,
 }
 
 impl Record {
@@ -254,8 +262,8 @@ impl Record {
         self.with_time(&self.after, 1, degree)
     }
 
-    /// Returns [X, t X, ..., t^degree X], where t is the elapsed fraction of the record: the fitted
-    /// coefficients are polynomials of time.
+    /// Returns [X, t X, ..., t^degree X]: the fitted coefficients are polynomials of time. t is the elapsed fraction of
+    /// the record; the rows of each pulse begin `first` steps after its start.
     fn with_time(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
         let columns = x.ncols();
         DMatrix::from_fn(x.nrows(), (degree + 1) * columns, |i, j| {
@@ -265,12 +273,12 @@ impl Record {
     }
 }
 
-/// Converts a count to an exponent.
+/// Converts a count to an exponent; a larger one becomes `i32::MAX`.
 fn exponent(count: usize) -> i32 {
     i32::try_from(count).unwrap_or(i32::MAX)
 }
 
-/// Converts a count to a floating-point number.
+/// Converts a count to a floating-point number; beyond 32 bits it becomes `u32::MAX`.
 pub(super) fn index(count: usize) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }

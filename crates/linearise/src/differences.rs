@@ -6,8 +6,9 @@ use super::LineariseError;
 use super::parts::Part;
 use super::point::Equations;
 
-/// Number of steps of a ladder.
+/// Number of steps for which each difference quotient is computed.
 const LEVELS: usize = 8;
+/// Ratio of each step to the next smaller one.
 const RATIO: f64 = 4.0;
 /// The first step, relative to the typical size of a change.
 const FIRST: f64 = 1e-2;
@@ -21,14 +22,14 @@ pub(super) enum Side {
 }
 
 impl Side {
-    /// Returns the power of the step that the error term `order` of a difference quotient has.
+    /// Returns the exponent of the step in the error term number `order` of a difference quotient.
     pub(super) fn exponent(self, order: i32) -> i32 {
         if self == Side::Both { 2 * order } else { order }
     }
 }
 
-/// Returns how far `part` can be changed about `value`, at most `size`, and on which side. At a
-/// limit it is one side only.
+/// Returns on which side of `value` and by how much, at most `size`, `part` can be changed within `min` and `max`.
+/// If one side has less room than `size`, only the side with more room is used.
 ///
 /// # Errors
 ///
@@ -57,7 +58,8 @@ pub(super) type Estimate = (f64, f64);
 /// Returns the limit h -> 0 of a sequence whose value k belongs to the step h / ratio^k.
 ///
 /// The errors are powers `exponent`(1), `exponent`(2), ... of h; `noise`(k) is the rounding error
-/// of value k. The result is the entry of the extrapolation table with the smallest error.
+/// of value k. The result is the entry of the extrapolation table with the smallest error; a single value has an
+/// infinite error, without values the result is NaN.
 ///
 /// C. J. F. Ridders, Accurate computation of F'(x) and F'(x) F''(x), Adv. Eng. Softw. 4 (1982).
 pub(super) fn extrapolate(
@@ -84,15 +86,16 @@ pub(super) fn extrapolate(
     best
 }
 
-/// The values of a vector function about `value`, for all steps from the first one down.
+/// Difference quotients of a vector function at a point, for steps from the first one down.
 struct Samples {
     side: Side,
-    /// The function at `value`.
+    /// The function at the point.
     middle: Vec<f64>,
     /// The distance of the two points of each step.
     widths: Vec<f64>,
-    /// Difference quotients, and the difference of the slopes on both sides: component, step.
+    /// For each component, the difference quotient of each step.
     slopes: Vec<Vec<f64>>,
+    /// For each component, the right slope minus the left slope of each step; of no use with one side.
     kinks: Vec<Vec<f64>>,
 }
 
@@ -130,8 +133,8 @@ impl Samples {
     /// Returns the slope of a component. `magnitude`, the size of its largest term, determines the
     /// rounding error.
     ///
-    /// With two sides, half of the difference between the right and the left slope is added to the
-    /// error, because there is no derivative at a kink.
+    /// With two sides, half of the difference between the right and the left slope is added to the error if it is
+    /// larger than four times its own error, because there is no derivative at a kink.
     fn slope(&self, row: usize, magnitude: f64) -> Estimate {
         let noise = |level: usize| f64::EPSILON * magnitude / self.widths[level];
         let exponent = |order| self.side.exponent(order);
@@ -140,8 +143,8 @@ impl Samples {
             return (slope, error);
         }
         let noise = |level: usize| 4.0 * noise(level);
-        let (kink, uncertain) = extrapolate(&self.kinks[row], noise, RATIO, |order| 2 * order - 1);
-        (slope, if kink.abs() > 4.0 * uncertain { error + 0.5 * kink.abs() } else { error })
+        let (kink, kink_error) = extrapolate(&self.kinks[row], noise, RATIO, |order| 2 * order - 1);
+        (slope, if kink.abs() > 4.0 * kink_error { error + 0.5 * kink.abs() } else { error })
     }
 }
 
@@ -166,8 +169,7 @@ pub(super) fn of_equations(
         steps: Vec::with_capacity(scales.len()),
     };
     let mut columns = Vec::with_capacity(scales.len());
-    // The rounding error of a sum is that of its largest term, which may be much larger than the
-    // sum.
+    // The rounding error of a sum is the rounding error of its largest term, which may be much larger than the sum.
     let mut magnitudes = vec![0.0_f64; rows];
     for (column, scale) in scales.iter().enumerate() {
         let (part, value) = equations.known(column);

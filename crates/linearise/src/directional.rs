@@ -16,9 +16,10 @@ pub(super) fn jacobian(
     states: &[State],
 ) -> Result<DMatrix<f64>, LineariseError> {
     let (rows, knowns) = references(parts, states);
-    let asked: Vec<usize> = (0..rows.len()).filter(|&row| !knowns.contains(&rows[row])).collect();
-    listed(parts, states, &rows, &asked)?;
-    let unknowns: Vec<u32> = asked.iter().map(|&row| rows[row]).collect();
+    let unknown_rows: Vec<usize> =
+        (0..rows.len()).filter(|&row| !knowns.contains(&rows[row])).collect();
+    check_listed(parts, states, &rows, &unknown_rows)?;
+    let unknowns: Vec<u32> = unknown_rows.iter().map(|&row| rows[row]).collect();
     let mut jacobian =
         DMatrix::from_fn(rows.len(), knowns.len(), |i, j| f64::from(rows[i] == knowns[j]));
     let mut values = vec![0.0; unknowns.len()];
@@ -26,7 +27,7 @@ pub(super) fn jacobian(
         if !unknowns.is_empty() {
             component.directional_derivative(&unknowns, &[known], &[1.0], &mut values)?;
         }
-        for (&row, &value) in asked.iter().zip(&values) {
+        for (&row, &value) in unknown_rows.iter().zip(&values) {
             if !value.is_finite() {
                 let name = format!("the derivative of {}", row_name(states, parts, row));
                 return Err(LineariseError::NotFinite { name, value });
@@ -45,13 +46,13 @@ pub(super) fn references(parts: &Parts, states: &[State]) -> (Vec<u32>, Vec<u32>
     (rows, columns.map(|part| part.reference).collect())
 }
 
-/// Checks that `Outputs` or `Derivatives` list the variable: only those have directional
+/// Checks that `Outputs` or `Derivatives` list the variables of `unknown_rows`: only those have directional
 /// derivatives.
-fn listed(
+fn check_listed(
     parts: &Parts,
     states: &[State],
     rows: &[u32],
-    asked: &[usize],
+    unknown_rows: &[usize],
 ) -> Result<(), LineariseError> {
     let variables = &parts.description.variables;
     let listed = parts.description.structure.outputs.iter().filter_map(|unknown| {
@@ -59,8 +60,8 @@ fn listed(
     });
     let listed: Vec<u32> = listed.collect();
     let is_rate = |reference: &u32| states.iter().any(|state| state.derivative == *reference);
-    let missing = asked.iter().find(|&&row| !listed.contains(&rows[row]) && !is_rate(&rows[row]));
-    let Some(&row) = missing else { return Ok(()) };
+    let is_missing = |row: &&usize| !listed.contains(&rows[**row]) && !is_rate(&rows[**row]);
+    let Some(&row) = unknown_rows.iter().find(is_missing) else { return Ok(()) };
     Err(LineariseError::Role {
         name: row_name(states, parts, row),
         actual: "a variable that ModelStructure does not list: it has no directional derivative"

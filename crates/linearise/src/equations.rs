@@ -13,10 +13,11 @@ const DIFFERENCE: f64 = 6e-6;
 
 /// The equations x' = f(t, x, u), y = h(t, x, u) of an FMU for model exchange.
 ///
-/// They are functions of t, x and u: where a trajectory begins ([`PlantEquations::begin`]) the discrete variables are
-/// those of the start, made consistent with t, x and u by an event. So the memory of discrete variables, such as the
-/// side of a hysteresis or the samples of a part in discrete time, is that of the start. The order of x is that of the
-/// FMU, that of u and y the one of the request; u has its inputs, then its faults.
+/// They are functions of t, x and u: at the start of a trajectory ([`PlantEquations::begin`]) the discrete variables
+/// return to their values after initialisation, and an event makes them consistent with t, x and u. So discrete
+/// variables with a memory, such as the side of a hysteresis or the samples of a part in discrete time, do not
+/// remember earlier trajectories. An FMU that cannot save its state keeps its discrete variables instead. The states x
+/// have the order of the FMU; u has the inputs and then the faults of the request, y its outputs.
 pub struct PlantEquations {
     component: Box<dyn ModelExchange>,
     names: Names,
@@ -26,25 +27,30 @@ pub struct PlantEquations {
     outputs: Vec<u32>,
     /// The states and inputs, by which the rows are differentiated.
     knowns: Vec<u32>,
-    /// Of the derivatives of the states and the outputs those that are no knowns: their rows, and these.
-    asked_rows: Vec<usize>,
-    asked: Vec<u32>,
-    changes: Vec<f64>,
-    /// Of the others: the row and the position of the known that it is.
-    equal: Vec<(usize, usize)>,
+    /// The rows (derivatives of the states, outputs) whose variable is none of `knowns`.
+    unknown_rows: Vec<usize>,
+    /// The variables of these rows.
+    unknowns: Vec<u32>,
+    /// Their directional derivatives by one known.
+    derivatives: Vec<f64>,
+    /// The other rows, with the position of their variable in `knowns`.
+    known_rows: Vec<(usize, usize)>,
+    /// The typical sizes of `knowns`.
     scales: Vec<f64>,
-    differentiates: bool,
-    /// Whether the FMU can save its state, so that a trajectory begins from that of the start.
-    restores: bool,
+    has_directional_derivatives: bool,
+    /// Whether the FMU can save its state, so that each trajectory starts from the state after initialisation.
+    can_restore: bool,
+    /// The event indicators at the end of the last step, and now.
     indicators: [Vec<f64>; 2],
-    /// Rows at two points, of finite differences.
+    /// The rows at two points, for finite differences.
     values: [Vec<f64>; 2],
+    /// A column of the Jacobian.
     column: Vec<f64>,
     /// The inputs after initialisation.
     start_inputs: Vec<f64>,
 }
 
-/// The names of states and outputs.
+/// The names of the states, and of the rows: derivatives of the states, outputs.
 struct Names {
     states: Vec<String>,
     rows: Vec<String>,
@@ -57,7 +63,7 @@ impl PlantEquations {
     /// # Errors
     ///
     /// [`LineariseError`]: a name or value of the request is wrong, a function of the FMU fails, or the FMU has no
-    /// continuous states, no model exchange, or events and no way to save its state.
+    /// continuous states, no model exchange, or event indicators and no way to save its state.
     pub fn new(fmu: &Fmu, request: &Linearise) -> Result<Self, LineariseError> {
         let description = &fmu.elements()?;
         let model = description.model_name.clone();
@@ -74,22 +80,23 @@ impl PlantEquations {
         let mut component = fmu.instantiate_equations(NAME)?;
         initialise(&mut *component, &parts, request)?;
         settle(&mut *component)?;
-        let restores = flags.can_get_and_set_fmu_state;
-        if restores {
+        let can_restore = flags.can_get_and_set_fmu_state;
+        if can_restore {
             component.save_state(0)?;
         } else if component.number_of_event_indicators()? > 0 {
             return Err(lacks("canGetAndSetFMUstate, without which its events cannot be undone"));
         }
-        let differentiates = flags.provides_directional_derivative
+        let has_directional_derivatives = flags.provides_directional_derivative
             && directional::jacobian(&mut *component, &parts, &states).is_ok();
-        Self::of(component, &parts, &states, [differentiates, restores])
+        Self::of(component, &parts, &states, has_directional_derivatives, can_restore)
     }
 
     fn of(
         mut component: Box<dyn ModelExchange>,
         parts: &Parts<'_>,
         states: &[State],
-        [differentiates, restores]: [bool; 2],
+        has_directional_derivatives: bool,
+        can_restore: bool,
     ) -> Result<Self, LineariseError> {
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
         let inputs: Vec<u32> = references(&parts.inputs);
@@ -113,22 +120,22 @@ impl PlantEquations {
             rows: (0..count).map(|row| row_name(states, parts, row)).collect(),
         };
         let (rows, knowns) = directional::references(parts, states);
-        let is = |row: usize| knowns.iter().position(|known| *known == rows[row]);
-        let asked_rows: Vec<usize> = (0..count).filter(|&row| is(row).is_none()).collect();
+        let known = |row: usize| knowns.iter().position(|known| *known == rows[row]);
+        let unknown_rows: Vec<usize> = (0..count).filter(|&row| known(row).is_none()).collect();
         Ok(Self {
             component,
             names,
             next_event: None,
             inputs,
             outputs: references(&parts.outputs),
-            asked: asked_rows.iter().map(|&row| rows[row]).collect(),
-            changes: vec![0.0; asked_rows.len()],
-            equal: (0..count).filter_map(|row| Some((row, is(row)?))).collect(),
-            asked_rows,
+            unknowns: unknown_rows.iter().map(|&row| rows[row]).collect(),
+            derivatives: vec![0.0; unknown_rows.len()],
+            known_rows: (0..count).filter_map(|row| Some((row, known(row)?))).collect(),
+            unknown_rows,
             knowns,
             scales,
-            differentiates,
-            restores,
+            has_directional_derivatives,
+            can_restore,
             indicators: [indicators.clone(), indicators],
             values: [vec![0.0; count], vec![0.0; count]],
             column: vec![0.0; count],
@@ -136,26 +143,27 @@ impl PlantEquations {
         })
     }
 
-    /// The names of the states.
+    /// Returns the names of the states.
     #[must_use]
     pub fn states(&self) -> &[String] {
         &self.names.states
     }
 
-    /// The inputs after initialisation: those that the request states, else their start values.
+    /// Returns the inputs after initialisation: the values of the request, otherwise the start values of the FMU.
     #[must_use]
     pub fn start_inputs(&self) -> &[f64] {
         &self.start_inputs
     }
 
     /// Begins a trajectory at `time` in s with the states `x` and the inputs `u`: an event makes the discrete variables
-    /// consistent with them. It may change `x`.
+    /// consistent with them, and may change `x`.
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails.
+    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU asks for the end of the
+    /// simulation.
     pub fn begin(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
-        if self.restores {
+        if self.can_restore {
             self.component.restore_state(0)?;
         }
         self.set(time, x, u)?;
@@ -164,8 +172,8 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Whether an event indicator has another sign at `time` in s with the states `x` and the inputs `u` than where the last
-    /// step ended.
+    /// Whether an event indicator has another sign at `time` in s, with the states `x` and the inputs `u`, than at the
+    /// end of the last step.
     ///
     /// # Errors
     ///
@@ -177,12 +185,13 @@ impl PlantEquations {
         Ok(before.iter().zip(&*now).any(|(before, now)| (*before > 0.0) != (*now > 0.0)))
     }
 
-    /// Ends an integration step at `time` in s with the states `x` and the inputs `u`; an event that lies in it, and may
-    /// change `x`, happens here.
+    /// Ends an integration step at `time` in s with the states `x` and the inputs `u`. An event during the step takes
+    /// place here, and may change `x`.
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, or it asks for the end of the simulation.
+    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU asks for the end of the
+    /// simulation.
     pub fn complete(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         let mut is_event = self.crosses(time, x, u)?;
         is_event |= self.next_event.is_some_and(|next| next <= time);
@@ -201,6 +210,7 @@ impl PlantEquations {
         Ok(())
     }
 
+    /// Iterates an event; sets `x` to the states after it.
     fn event(&mut self, x: &mut [f64]) -> Result<(), LineariseError> {
         self.component.enter_event_mode()?;
         self.next_event = settle(&mut *self.component)?;
@@ -221,7 +231,7 @@ impl PlantEquations {
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, or a derivative is no number.
+    /// [`LineariseError`]: a function of the FMU fails, or a derivative is not finite.
     pub fn rates(
         &mut self,
         time: f64,
@@ -238,7 +248,7 @@ impl PlantEquations {
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, or an output is no number.
+    /// [`LineariseError`]: a function of the FMU fails, or an output is not finite.
     pub fn outputs(
         &mut self,
         time: f64,
@@ -255,7 +265,7 @@ impl PlantEquations {
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, or a derivative is no number.
+    /// [`LineariseError`]: a function of the FMU fails, or a derivative is not finite.
     pub fn jacobian(
         &mut self,
         time: f64,
@@ -265,7 +275,7 @@ impl PlantEquations {
     ) -> Result<(), LineariseError> {
         self.set(time, x, u)?;
         for at in 0..self.knowns.len() {
-            if self.differentiates {
+            if self.has_directional_derivatives {
                 self.derivatives_by(at)?;
             } else {
                 self.differences_by(at, x, u)?;
@@ -276,22 +286,23 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `column` to the directional derivatives by the known at `at`. A row that is a known itself is not asked for.
+    /// Sets `column` to the directional derivatives by the known at `at`. A row that is a known itself is 1 or 0 and
+    /// needs no call.
     fn derivatives_by(&mut self, at: usize) -> Result<(), LineariseError> {
-        let Self { component, knowns, asked, changes, column, .. } = self;
-        if !asked.is_empty() {
-            component.directional_derivative(asked, &[knowns[at]], &[1.0], changes)?;
+        let Self { component, knowns, unknowns, derivatives, column, .. } = self;
+        if !unknowns.is_empty() {
+            component.directional_derivative(unknowns, &[knowns[at]], &[1.0], derivatives)?;
         }
-        for (&row, &change) in self.asked_rows.iter().zip(&*changes) {
-            column[row] = change;
+        for (&row, &derivative) in self.unknown_rows.iter().zip(&*derivatives) {
+            column[row] = derivative;
         }
-        for &(row, known) in &self.equal {
+        for &(row, known) in &self.known_rows {
             column[row] = f64::from(u8::from(known == at));
         }
         Ok(())
     }
 
-    /// Sets `column` to two-sided differences by the known at `at`.
+    /// Sets `column` to two-sided difference quotients by the known at `at`.
     fn differences_by(&mut self, at: usize, x: &[f64], u: &[f64]) -> Result<(), LineariseError> {
         let n = x.len();
         let value = *x.get(at).unwrap_or_else(|| &u[at - n]);
@@ -311,7 +322,8 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets the known at `at` to `value`, the other states being `x`.
+    /// Sets the known at `at` to `value` in the FMU; if it is one of the `n` states, the other states are `x`. Uses
+    /// `column` as a buffer.
     fn change(&mut self, at: usize, n: usize, value: f64, x: &[f64]) -> Result<(), LineariseError> {
         if at >= n {
             self.component.set_real(&[self.inputs[at - n]], &[value])?;
@@ -325,6 +337,7 @@ impl PlantEquations {
     }
 }
 
+/// Checks that all values are finite.
 fn all_finite(names: &[String], values: &[f64]) -> Result<(), LineariseError> {
     for (name, &value) in names.iter().zip(values) {
         finite(name, value)?;

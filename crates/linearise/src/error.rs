@@ -7,7 +7,7 @@ use slave::CallError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LineariseError {
-    /// The FMU cannot be instantiated.
+    /// The FMU cannot be read or instantiated.
     #[error(transparent)]
     Fmu(#[from] FmuError),
     /// The FMU has no variable of this name.
@@ -98,7 +98,7 @@ pub enum LineariseError {
         /// Number of calls.
         iterations: usize,
     },
-    /// A value of the FMU is not a number.
+    /// A value of the FMU is NaN or infinite.
     #[error("{name} is {value}, expected a finite number")]
     NotFinite {
         /// The quantity.
@@ -144,7 +144,7 @@ pub enum LineariseError {
         /// `modelName` of the FMU.
         model: String,
     },
-    /// The request must name the states, but does not.
+    /// The third method needs the names of the states, and the request has none.
     #[error(
         "{model} is linearised by steps from an FMU state, but its description does not list its \
          states: name the variables that are its states{candidates}"

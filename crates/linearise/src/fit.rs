@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 pub(super) struct Fit {
     /// T, one row per column of X.
     pub(super) solution: DMatrix<f64>,
-    /// Standard deviation of each entry of T, from the residual of Y.
+    /// Standard deviation of each entry of T, from the residual of Y and its rounding error.
     pub(super) deviations: DMatrix<f64>,
 }
 
@@ -16,13 +16,14 @@ pub(super) struct Directions {
     pub(super) contrast: f64,
     /// Column indices in pivot order: the last columns are the least independent.
     order: Vec<usize>,
+    /// Absolute diagonal entries of R, in the same order.
     diagonal: Vec<f64>,
 }
 
 impl Directions {
     pub(super) fn of(x: &DMatrix<f64>) -> Self {
         let columns = x.ncols();
-        let qr = scaled(x).0.col_piv_qr();
+        let qr = normalise(x).0.col_piv_qr();
         let mut order = DMatrix::from_fn(1, columns, |_, column| column);
         qr.p().permute_columns(&mut order);
         let r = qr.r();
@@ -40,8 +41,8 @@ impl Directions {
     }
 }
 
-/// Scales the columns to length one; returns also their lengths. A zero column is not changed.
-fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+/// Scales the columns to length one; also returns their lengths. A zero column is not changed and has the length 1.
+fn normalise(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     let lengths = x.column_iter().map(|column| column.norm());
     let lengths: Vec<f64> = lengths.map(|length| if length > 0.0 { length } else { 1.0 }).collect();
     (DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / lengths[j]), lengths)
@@ -50,21 +51,21 @@ fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
 /// Returns the T with the least norm of X T - Y; `None` if a diagonal entry of R is exactly zero or a result is not
 /// finite. Columns that are dependent up to rounding pass; [`Directions`] detects them.
 ///
-/// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with
-/// more rows than columns; `y`: r x k. About 2 r c^2 multiplications.
+/// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with at least as many
+/// rows as columns; `y`: r x k. About 2 r c^2 multiplications.
 ///
 /// `noise`: the rounding error of each column of Y, which the standard deviations include.
 pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>, noise: &[f64]) -> Option<Fit> {
     let (rows, columns) = x.shape();
-    let (scaled, lengths) = scaled(x);
+    let (scaled, lengths) = normalise(x);
     let qr = scaled.clone().qr();
     let r = qr.r();
     let mut solution = r.solve_upper_triangular(&(qr.q().transpose() * y))?;
-    let left = y - &scaled * &solution;
+    let residual = y - &scaled * &solution;
     let inverse = r.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
     let freedom = f64::from(u32::try_from(rows.saturating_sub(columns).max(1)).ok()?).sqrt();
     let mut deviations = DMatrix::from_fn(columns, y.ncols(), |i, j| {
-        inverse.row(i).norm() * (left.column(j).norm() / freedom + noise[j])
+        inverse.row(i).norm() * (residual.column(j).norm() / freedom + noise[j])
     });
     for (row, length) in lengths.iter().enumerate() {
         solution.row_mut(row).scale_mut(1.0 / length);

@@ -2,10 +2,11 @@
 //!
 //! x' = A (x - `x_0`) + B (u - `u_0`) + F (f - `f_0`) + x'_0, y = `y_0` + C (x - `x_0`) + D (u - `u_0`) + G (f - `f_0`)
 //!
-//! Three methods; the first one that the FMU offers is used:
+//! Three methods; an FMU with model exchange is linearised there, by the first or the second method, any other FMU in
+//! co-simulation by the first or the third:
 //!
-//! 1. `fmi2GetDirectionalDerivative`, preferably in model exchange, otherwise in co-simulation. In model
-//!    exchange the result is compared with the second method.
+//! 1. `fmi2GetDirectionalDerivative`, if the interface has it. In model exchange the result is compared with the
+//!    second method.
 //! 2. Model exchange: finite differences of `fmi2GetDerivatives` and of the outputs in continuous-time
 //!    mode, with constant discrete states.
 //! 3. Co-simulation with FMU states: a step map, fitted to the responses to small pulses of the inputs
@@ -37,12 +38,12 @@ use result::{MethodResult, RawResult, assemble};
 
 /// Communication steps in s that are tried if the FMU states none.
 const STEPS: [f64; 3] = [1e-3, 1e-2, 1e-4];
-/// Relative error at which no further step is tried.
+/// Relative error below which no further step is tried.
 const ACCURATE: f64 = 1e-6;
 
 /// A request: the FMU variables of the linear plant, and its operating point.
 ///
-/// All named variables are continuous Reals. The operating point need not be an equilibrium.
+/// Inputs, faults, outputs and states are continuous Reals. The operating point need not be an equilibrium.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Linearise {
     /// The control inputs u.
@@ -53,12 +54,12 @@ pub struct Linearise {
     pub outputs: Vec<String>,
     /// The states x in the requested order. If empty, all continuous states in the order of the
     /// FMU. States that are not named are left out; it is an error if a remaining state or output
-    /// depends on them.
+    /// depends on them. The third method needs all states by name.
     pub states: Vec<String>,
     /// The operating point as names and values: parameters, start values, inputs, and in model
     /// exchange the continuous states. All other variables have their start values.
     pub at: Vec<(String, String)>,
-    /// Typical sizes of changes, in the unit of the variable. The default is `nominal`, otherwise
+    /// Typical sizes of changes by name, in the unit of the variable. The default is `nominal`, otherwise
     /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are
     /// relative to the typical size.
     pub typical: Vec<(String, f64)>,
@@ -66,14 +67,13 @@ pub struct Linearise {
     pub start_time: f64,
     /// The communication step in s of the third method; the default is `stepSize` of the
     /// `DefaultExperiment`. Without either, a thousandth of the experiment, 1 ms, 10 ms and 0.1 ms are
-    /// tried, and the most accurate result is used.
+    /// tried until the relative error is below 1e-6, and the most accurate result is used.
     pub step: Option<f64>,
 }
 
 /// Returns the matrices of `fmu` about the operating point of `request`.
 ///
-/// The [crate documentation](crate) lists the methods. The first one that the FMU offers is used;
-/// [`Linearisation::method`] names it.
+/// The [crate documentation](crate) says which method is used; [`Linearisation::method`] names it.
 ///
 /// * Directional derivatives: as exact as those of the FMU. One call per state and input.
 /// * Differences in model exchange: two-sided (one-sided at `min` or `max`), eight steps from 1 % of
@@ -83,7 +83,7 @@ pub struct Linearise {
 /// * Steps in co-simulation: pulses of each input over 8 to 512 steps, central differences in their
 ///   height, least squares for the step map [Phi, Gamma], its logarithm; for steps of h, 2 h and 4 h,
 ///   extrapolated to h = 0. The records get longer until the errors are small. The map must predict the
-///   response to another input signal within 1 %. About 60 runs for each input and length.
+///   response to another input signal within 1 %. About 60 runs for each input and record length.
 ///
 ///   Away from an equilibrium the FMU drifts during the record. The map is then a polynomial of time,
 ///   and its value at the start is used. This works for states on which the inputs act directly; for
@@ -111,7 +111,8 @@ pub struct Linearise {
 /// # Errors
 ///
 /// [`LineariseError`] if a name or value is invalid, if a function of the FMU fails, if the FMU offers
-/// none of the three methods, or if the result is not accurate enough.
+/// none of the three methods, if a state that is left out influences the others, or if the result of the third method
+/// is not accurate enough.
 pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, LineariseError> {
     let description = &fmu.elements()?;
     let parts = Parts::of(description, request)?;
@@ -154,8 +155,10 @@ fn by_equations(
     let nominals = nominals(&mut *equations.component, states.len());
     let mut with_nominals: Vec<Part> = states.iter().map(|state| state.part.clone()).collect();
     for (part, nominal) in with_nominals.iter_mut().zip(nominals) {
-        let told = nominal.is_finite() && nominal > 0.0 && nominal.to_bits() != 1.0_f64.to_bits();
-        if told && !request.typical.iter().any(|(name, _)| *name == part.name) {
+        // 1 is also the nominal value of states for which the FMU states none.
+        let is_stated =
+            nominal.is_finite() && nominal > 0.0 && nominal.to_bits() != 1.0_f64.to_bits();
+        if is_stated && !request.typical.iter().any(|(name, _)| *name == part.name) {
             part.typical = Some(nominal);
         }
     }
@@ -164,7 +167,7 @@ fn by_equations(
         .then(|| directional::jacobian(&mut *equations.component, parts, states))
         .transpose()?;
     let differences = differences::of_equations(&mut equations, &scales);
-    let (jacobian, how) = match (derivatives, differences) {
+    let (jacobian, method) = match (derivatives, differences) {
         (Some(jacobian), differences) => {
             let disagreement = differences.ok().and_then(|differences| {
                 result::disagreement(parts, states, &scales, &jacobian, &differences)
@@ -180,10 +183,12 @@ fn by_equations(
         }
     };
     let (x, u) = (equations.x, equations.u);
-    let raw = RawResult { states: with_nominals, x, u, y: outputs, rates: values, jacobian, how };
+    let raw =
+        RawResult { states: with_nominals, x, u, y: outputs, rates: values, jacobian, method };
     assemble(parts, request, raw)
 }
 
+/// Returns the typical sizes of the states, then of the inputs.
 fn scales(states: &[Part], x: &[f64], inputs: &[Part], u: &[f64]) -> Vec<f64> {
     let pairs = states.iter().zip(x).chain(inputs.iter().zip(u));
     pairs.map(|(part, &value)| part.scale(value)).collect()
@@ -203,16 +208,16 @@ fn by_derivatives(
         .iter()
         .map(|state| Part { reference: state.derivative, ..state.part.clone() })
         .collect();
-    let findings = RawResult {
+    let raw = RawResult {
         states: states.iter().map(|state| state.part.clone()).collect(),
         x: read(&mut component, states.iter().map(|state| &state.part))?,
         u: read(&mut component, parts.inputs.iter())?,
         y: read(&mut component, parts.outputs.iter())?,
         rates: read(&mut component, rates.iter())?,
         jacobian: directional::jacobian(&mut component, parts, states)?,
-        how: MethodResult::Derivatives(Interface::CoSimulation, None),
+        method: MethodResult::Derivatives(Interface::CoSimulation, None),
     };
-    assemble(parts, request, findings)
+    assemble(parts, request, raw)
 }
 
 /// Linearises in co-simulation by communication steps from an FMU state.
@@ -245,8 +250,8 @@ fn by_steps(
     assemble(parts, request, raw)
 }
 
-/// Linearises by communication steps of several sizes, for an FMU that states none; returns the most
-/// accurate result.
+/// Linearises by communication steps of several sizes, for an FMU that states none, until a result is accurate;
+/// returns the most accurate result. It is an error if no size gives one.
 fn by_derived_step(
     fmu: &Fmu,
     parts: &Parts,
@@ -255,9 +260,9 @@ fn by_derived_step(
 ) -> Result<RawResult, LineariseError> {
     let experiment = parts.description.default_experiment;
     let length = experiment
-        .and_then(|experiment| Some(experiment.stop_time? - experiment.start_time.unwrap_or(0.0)));
-    let of_length = length.filter(|length| length.is_finite() && *length > 0.0);
-    let first = of_length.map(|length| length / 1000.0);
+        .and_then(|experiment| Some(experiment.stop_time? - experiment.start_time.unwrap_or(0.0)))
+        .filter(|length| length.is_finite() && *length > 0.0);
+    let first = length.map(|length| length / 1000.0);
     let others = STEPS.into_iter().filter(|step| first != Some(*step));
     let tried: Vec<f64> = first.into_iter().chain(others).collect();
     let mut best: Option<steps::RecordResult> = None;
@@ -265,11 +270,11 @@ fn by_derived_step(
     for &step in &tried {
         match steps::of_steps(fmu, parts, states, request, step) {
             Ok(record) => {
-                let enough = record.relative < ACCURATE;
+                let is_accurate = record.relative < ACCURATE;
                 if best.as_ref().is_none_or(|known| record.relative < known.relative) {
                     best = Some(record);
                 }
-                if enough {
+                if is_accurate {
                     break;
                 }
             }
@@ -283,7 +288,7 @@ fn by_derived_step(
     })
 }
 
-/// Lists the continuous Reals that may be states, as part of a sentence.
+/// Lists up to ten continuous Reals that may be states, as part of a sentence; an empty text if there are none.
 fn candidates(description: &ModelDescription) -> String {
     let readable = description.variables.iter().filter(|variable| {
         matches!(variable.causality, Causality::Output | Causality::Local)

@@ -69,11 +69,11 @@ impl<'a> Parts<'a> {
         description: &'a ModelDescription,
         request: &Linearise,
     ) -> Result<Self, LineariseError> {
-        distinct(request.inputs.iter().chain(&request.faults), "inputs and faults")?;
-        distinct(&request.outputs, "outputs")?;
-        distinct(&request.states, "states")?;
-        distinct(request.at.iter().map(|(name, _)| name), "values of the operating point")?;
-        distinct(request.typical.iter().map(|(name, _)| name), "typical sizes")?;
+        check_distinct(request.inputs.iter().chain(&request.faults), "inputs and faults")?;
+        check_distinct(&request.outputs, "outputs")?;
+        check_distinct(&request.states, "states")?;
+        check_distinct(request.at.iter().map(|(name, _)| name), "values of the operating point")?;
+        check_distinct(request.typical.iter().map(|(name, _)| name), "typical sizes")?;
         let part = |name: &String, allowed: &[Causality], expected| {
             let variable = find(description, name)?;
             part(description, request, variable, allowed, expected)
@@ -98,18 +98,18 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// Returns the continuous states in the order of `Derivatives`.
+    /// Returns all continuous states, in the order of `Derivatives`.
     pub(super) fn states(&self, request: &Linearise) -> Result<Vec<State>, LineariseError> {
         let variables = &self.description.variables;
         let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
         let mut states = Vec::new();
         for unknown in &self.description.structure.derivatives {
             let derivative = at(unknown.index);
-            let of = derivative.and_then(|variable| match &variable.kind {
+            let state = derivative.and_then(|variable| match &variable.kind {
                 Kind::Real(real) => at(real.derivative?),
                 _ => None,
             });
-            let (Some(derivative), Some(state)) = (derivative, of) else {
+            let (Some(derivative), Some(state)) = (derivative, state) else {
                 let index = unknown.index;
                 let text = format!("the variable {index} is not the derivative of a state");
                 return Err(LineariseError::Structure { text });
@@ -130,7 +130,8 @@ impl<'a> Parts<'a> {
     }
 }
 
-fn distinct<'n>(
+/// Checks that no name is in the list twice.
+fn check_distinct<'n>(
     names: impl IntoIterator<Item = &'n String>,
     list: &'static str,
 ) -> Result<(), LineariseError> {
@@ -152,7 +153,7 @@ pub(super) fn find<'a>(
     })
 }
 
-/// Resolves a continuous Real with one of the allowed causalities.
+/// Resolves a continuous Real with one of the allowed causalities; any other variable is an error.
 fn part(
     description: &ModelDescription,
     request: &Linearise,
@@ -187,20 +188,21 @@ fn part(
     })
 }
 
-/// Returns an attribute of the variable, otherwise the attribute of its declared type.
+/// Returns an attribute of the variable, otherwise the attribute of its declared type; `None` if neither states it.
 fn attribute<T>(
     description: &ModelDescription,
     real: &RealType,
-    of: impl Fn(&RealType) -> Option<T>,
+    get: impl Fn(&RealType) -> Option<T>,
 ) -> Option<T> {
-    of(real).or_else(|| {
+    get(real).or_else(|| {
         let declared = real.declared_type.as_ref()?;
         let declared = description.types.iter().find(|known| known.name == *declared)?;
         let Kind::Real(real) = &declared.kind else { return None };
-        of(real)
+        get(real)
     })
 }
 
+/// Parses the values of the operating point.
 fn settings(
     description: &ModelDescription,
     request: &Linearise,

@@ -14,8 +14,8 @@ const EVENT_ITERATIONS: usize = 1000;
 /// Name of the instances.
 pub(super) const NAME: &str = "linearise";
 
-/// Initialises an instance with the values of the operating point. States without a start value are
-/// not set yet.
+/// Initialises an instance with the values of the operating point, except states without a start value, which must be
+/// set later.
 pub(super) fn initialise(
     component: &mut (impl Slave + ?Sized),
     parts: &Parts,
@@ -38,26 +38,26 @@ pub(super) fn initialise(
 }
 
 fn set(component: &mut (impl Slave + ?Sized), setting: &Setting) -> Result<(), LineariseError> {
-    let to = [setting.reference];
-    let done = match &setting.value {
-        Value::Real(value) => component.set_real(&to, &[*value]),
-        Value::Integer(value) => component.set_integer(&to, &[*value]),
-        Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
-        Value::String(value) => component.set_string(&to, std::slice::from_ref(value)),
+    let reference = [setting.reference];
+    let result = match &setting.value {
+        Value::Real(value) => component.set_real(&reference, &[*value]),
+        Value::Integer(value) => component.set_integer(&reference, &[*value]),
+        Value::Boolean(value) => component.set_boolean(&reference, &[i32::from(*value)]),
+        Value::String(value) => component.set_string(&reference, std::slice::from_ref(value)),
         Value::Binary(_) => Err(slave::absent("fmi3SetBinary")),
     };
-    done.map_err(|source| refused(&setting.name, &setting.text, source))
+    result.map_err(|source| refused(&setting.name, &setting.text, source))
 }
 
 fn refused(name: &str, value: &impl ToString, source: CallError) -> LineariseError {
     LineariseError::Refused { name: name.to_owned(), value: value.to_string(), source }
 }
 
-/// Returns an error if a setting can neither be set as a start value nor as one of `states`.
+/// Returns an error if a setting is no input, has no start value that may be set, and is none of `states`.
 pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), LineariseError> {
     let is_state = |name: &String| states.iter().any(|state| state.part.name == *name);
-    let lost = |setting: &&Setting| !setting.settable && !is_state(&setting.name);
-    let Some(setting) = parts.settings.iter().find(lost) else { return Ok(()) };
+    let is_fixed = |setting: &&Setting| !setting.settable && !is_state(&setting.name);
+    let Some(setting) = parts.settings.iter().find(is_fixed) else { return Ok(()) };
     let variable = super::parts::find(parts.description, &setting.name)?;
     let causality = variable.causality;
     let expected = match causality {
@@ -87,6 +87,7 @@ pub(super) fn read<'p>(
     Ok(values)
 }
 
+/// Returns `value`, or an error that names it if it is NaN or infinite.
 pub(super) fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
     if value.is_finite() {
         return Ok(value);
@@ -104,10 +105,12 @@ pub(super) struct Equations<'p> {
     inputs: Vec<u32>,
     outputs: Vec<u32>,
     /// Whether the FMU can save and restore its state.
-    restores: bool,
+    can_restore: bool,
 }
 
 impl<'p> Equations<'p> {
+    /// Initialises an instance, sets the states of the operating point and iterates the event that this causes. It is
+    /// an error if the event changes a state.
     pub(super) fn at(
         fmu: &Fmu,
         parts: &'p Parts<'p>,
@@ -119,13 +122,13 @@ impl<'p> Equations<'p> {
         settle(&mut *component)?;
         let mut x = vec![0.0; states.len()];
         component.get_continuous_states(&mut x)?;
-        if place(parts, states, &mut x) {
+        if insert_states(parts, states, &mut x) {
             set_states(&mut *component, states, &x)?;
             component.enter_event_mode()?;
             settle(&mut *component)?;
-            let mut reached = x.clone();
-            component.get_continuous_states(&mut reached)?;
-            for (state, (&required, &actual)) in states.iter().zip(x.iter().zip(&reached)) {
+            let mut after_event = x.clone();
+            component.get_continuous_states(&mut after_event)?;
+            for (state, (&required, &actual)) in states.iter().zip(x.iter().zip(&after_event)) {
                 if (required - actual).abs() > 1e-12 * state.part.scale(required) {
                     let name = state.part.name.clone();
                     return Err(LineariseError::Moved { name, required, actual });
@@ -134,13 +137,13 @@ impl<'p> Equations<'p> {
         }
         let u = read(&mut *component, parts.inputs.iter())?;
         let flags = fmu.description().model_exchange.as_ref();
-        let restores = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
-        if restores {
+        let can_restore = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
+        if can_restore {
             component.save_state(0)?;
         }
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
         let (inputs, outputs) = (references(&parts.inputs), references(&parts.outputs));
-        Ok(Self { component, parts, states, x, u, inputs, outputs, restores })
+        Ok(Self { component, parts, states, x, u, inputs, outputs, can_restore })
     }
 
     /// Returns the state or input of a column of the Jacobian and its value at the operating point.
@@ -151,13 +154,13 @@ impl<'p> Equations<'p> {
         }
     }
 
-    /// Evaluates derivatives and outputs with the variable of one column at another value and all others at the
-    /// operating point.
+    /// Evaluates derivatives and outputs at the operating point; `change` is a column of the Jacobian whose variable
+    /// has another value, and this value.
     pub(super) fn evaluate(
         &mut self,
         change: Option<(usize, f64)>,
     ) -> Result<Vec<f64>, LineariseError> {
-        if self.restores {
+        if self.can_restore {
             self.component.restore_state(0)?;
         }
         let (mut x, mut u) = (self.x.clone(), self.u.clone());
@@ -171,14 +174,14 @@ impl<'p> Equations<'p> {
         let (derivatives, outputs) = values.split_at_mut(self.states.len());
         let component = &mut self.component;
         // An FMU of OpenModelica 1.19 no longer computes its outputs once it has returned the derivatives.
-        let done = component
+        let result = component
             .set_continuous_states(&x)
             .and_then(|()| if u.is_empty() { Ok(()) } else { component.set_real(&self.inputs, &u) })
             .and_then(|()| {
                 if outputs.is_empty() { Ok(()) } else { component.get_real(&self.outputs, outputs) }
             })
             .and_then(|()| component.get_derivatives(derivatives));
-        done.map_err(|source| match change {
+        result.map_err(|source| match change {
             Some((column, value)) => refused(&self.known(column).0.name, &value, source),
             None => LineariseError::Call(source),
         })?;
@@ -189,7 +192,7 @@ impl<'p> Equations<'p> {
     }
 }
 
-/// Returns the current nominal value of each of `count` states; 1 if the FMU does not state it.
+/// Returns the current nominal value of each of `count` states; 1 for all if the FMU does not state them.
 pub(super) fn nominals(component: &mut dyn ModelExchange, count: usize) -> Vec<f64> {
     let mut nominals = vec![1.0; count];
     if component.get_nominals_of_continuous_states(&mut nominals).is_err() {
@@ -207,7 +210,7 @@ pub(super) fn row_name(states: &[State], parts: &Parts, row: usize) -> String {
 }
 
 /// Inserts the states of the operating point into `x`; returns whether there are any.
-fn place(parts: &Parts, states: &[State], x: &mut [f64]) -> bool {
+fn insert_states(parts: &Parts, states: &[State], x: &mut [f64]) -> bool {
     let mut any = false;
     for (state, value) in states.iter().zip(x) {
         let setting = parts.settings.iter().find(|setting| setting.name == state.part.name);
@@ -231,7 +234,8 @@ fn set_states(
     })
 }
 
-/// Iterates the event and enters continuous-time mode; returns the time of the next time event.
+/// Iterates the event and enters continuous-time mode; returns the time of the next time event, `None` without one. It
+/// is an error if the events do not end or the FMU asks for the end of the simulation.
 pub(super) fn settle(component: &mut dyn ModelExchange) -> Result<Option<f64>, LineariseError> {
     for _ in 0..EVENT_ITERATIONS {
         let info = component.update_discrete_states()?;

@@ -30,7 +30,7 @@ pub struct Matrices {
 }
 
 impl Matrices {
-    /// [A, B, F; C, D, G].
+    /// Returns [A, B, F; C, D, G].
     #[must_use]
     pub fn joined(&self) -> DMatrix<f64> {
         let Self { a, b, f, c, d, g } = self;
@@ -52,7 +52,7 @@ impl Matrices {
 pub struct Signal {
     /// Name of the variable.
     pub name: String,
-    /// Its unit, where the FMU states one.
+    /// Its unit, if the FMU states one.
     pub unit: Option<String>,
     /// Its value.
     pub value: f64,
@@ -60,7 +60,7 @@ pub struct Signal {
     pub typical: f64,
 }
 
-/// The method of a linearisation. `Display` writes a sentence for a report.
+/// The method of a linearisation. `Display` writes it as a phrase for a report.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// `fmi2GetDirectionalDerivative`.
@@ -68,7 +68,7 @@ pub enum Method {
         /// The interface of the instance.
         interface: Interface,
         /// The largest contradiction to differences of the same FMU; `None` if there was no
-        /// comparison or all contradictions are within the error of the differences.
+        /// comparison or no contradiction is larger than ten times the error of the difference.
         disagreement: Option<Disagreement>,
     },
     /// Finite differences.
@@ -112,7 +112,7 @@ pub struct Disagreement {
     pub derivative: f64,
     /// The difference quotient, extrapolated.
     pub difference: f64,
-    /// The disagreement beyond the estimated error, relative to the largest entry of the row in
+    /// The disagreement minus ten times the estimated error, relative to the largest entry of the row in
     /// units of the typical sizes.
     pub relative: f64,
 }
@@ -136,7 +136,7 @@ pub struct Linearisation {
     /// the typical sizes. A value far below one means that the operating point is practically an
     /// equilibrium.
     pub residual: f64,
-    /// How the matrices were found.
+    /// The method that gave the matrices.
     pub method: Method,
 }
 
@@ -194,7 +194,7 @@ pub(super) struct RawResult {
     pub(super) rates: Vec<f64>,
     /// Rows: derivatives of the states, outputs. Columns: states, inputs, faults.
     pub(super) jacobian: DMatrix<f64>,
-    pub(super) how: MethodResult,
+    pub(super) method: MethodResult,
 }
 
 /// The method, before the errors are split into blocks.
@@ -203,7 +203,7 @@ pub(super) enum MethodResult {
     Differences(Differences, DMatrix<f64>),
 }
 
-/// Returns `part` / `whole`; 0 / 0 is 0.
+/// Returns `part` / `whole`; 0 if `part` is 0, also for 0 / 0.
 fn ratio(part: f64, whole: f64) -> f64 {
     if part == 0.0 { 0.0 } else { part / whole }
 }
@@ -220,8 +220,8 @@ pub(super) fn relative_error(errors: &DMatrix<f64>, values: &DMatrix<f64>, scale
     (0..values.nrows()).map(relative).fold(0.0, f64::max)
 }
 
-/// Returns the largest contradiction between directional derivatives and differences beyond their
-/// error.
+/// Returns the entry in which directional derivatives and differences contradict most; `None` if no contradiction
+/// exceeds ten times the error of the difference by 1e-9 of the row.
 pub(super) fn disagreement(
     parts: &Parts,
     states: &[State],
@@ -253,13 +253,13 @@ pub(super) fn disagreement(
     worst
 }
 
-/// Selects the states of the request and splits the Jacobian into its blocks.
+/// Selects the states of the request and splits the Jacobian into its blocks. Same errors as [`select_states`].
 pub(super) fn assemble(
     parts: &Parts,
     request: &Linearise,
     raw: RawResult,
 ) -> Result<Linearisation, LineariseError> {
-    let chosen = chosen(parts, request, &raw)?;
+    let chosen = select_states(parts, request, &raw)?;
     let all = raw.states.len();
     let signal = |part: &Part, value: f64| Signal {
         name: part.name.clone(),
@@ -287,7 +287,7 @@ pub(super) fn assemble(
         residual: chosen.iter().map(residual).fold(0.0, f64::max),
         inputs,
         faults,
-        method: match raw.how {
+        method: match raw.method {
             MethodResult::Derivatives(interface, disagreement) => {
                 Method::DirectionalDerivatives { interface, disagreement }
             }
@@ -298,7 +298,7 @@ pub(super) fn assemble(
     })
 }
 
-/// Splits a matrix whose first rows and columns belong to `all` states, of which `chosen` are kept.
+/// Splits a matrix whose first rows and columns belong to `all` states into the blocks of the states `chosen`.
 fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matrices {
     let rates = m.select_rows(chosen);
     let outputs = m.rows(all, parts.outputs.len()).into_owned();
@@ -313,9 +313,9 @@ fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matr
     }
 }
 
-/// Returns the positions of the requested states. It is an error if a remaining row depends on a
-/// state that is left out.
-fn chosen(
+/// Returns the positions of the requested states, or of all states if the request names none. It is an error if a name
+/// is no state, or if a remaining row depends on a state that is left out.
+fn select_states(
     parts: &Parts,
     request: &Linearise,
     raw: &RawResult,
@@ -342,7 +342,7 @@ fn chosen(
     for row in rows {
         let size = row_size(&raw.jacobian, row, &scales);
         for left_out in (0..all).filter(|column| !chosen.contains(column)) {
-            let error = match &raw.how {
+            let error = match &raw.method {
                 MethodResult::Derivatives(..) => 0.0,
                 MethodResult::Differences(_, errors) => errors[(row, left_out)],
             };

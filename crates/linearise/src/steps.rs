@@ -4,7 +4,7 @@
 use control::logarithm::logarithm_of_one_plus;
 use nalgebra::DMatrix;
 
-use super::bench::{Bench, Record, index};
+use super::bench::{Bench, Pulse, Record, index};
 use super::differences::{Side, extrapolate};
 use super::fit::{Directions, least_squares};
 use super::parts::{Part, Parts};
@@ -15,10 +15,11 @@ use fmu_import::Fmu;
 /// Minimum and maximum number of steps of a record.
 const MIN_STEPS: usize = 8;
 const MAX_STEPS: usize = 512;
-/// Relative error at which longer records are no longer tried.
+/// Relative error below which longer records are not tried.
 const SUFFICIENT_ERROR: f64 = 1e-8;
 /// The largest accepted relative error.
 const MAX_ERROR: f64 = 0.1;
+/// The error if the least squares have no finite result.
 const INACCURATE: LineariseError =
     LineariseError::Inaccurate { relative: f64::INFINITY, allowed: MAX_ERROR };
 /// Degree in time of the coefficients if the operating point drifts.
@@ -33,7 +34,7 @@ const MAX_PREDICTION_ERROR: f64 = 1e-2;
 /// The result of records of one length.
 pub(super) struct RecordResult {
     pub(super) raw: RawResult,
-    /// The largest error relative to its row.
+    /// The largest error of an entry, relative to the largest entry of its row.
     pub(super) relative: f64,
 }
 
@@ -43,12 +44,14 @@ struct Map {
     deviations: DMatrix<f64>,
 }
 
-/// The step map: x[k+1] - x[k] = `change` [x; u], y = `outputs` [x; u].
+/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]].
 struct Discrete {
+    /// The coefficients at the start of the record.
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
-    /// The coefficients of the powers of time; no columns without drift.
+    /// The coefficients of the powers of time, for `change` and for `outputs`; no columns without drift.
     powers: [DMatrix<f64>; 2],
+    /// Standard deviations of the rows of `change`, then of `outputs`.
     deviations: DMatrix<f64>,
 }
 
@@ -67,8 +70,8 @@ impl Discrete {
     }
 }
 
-/// Linearises by steps of `step` s and its multiples. The records get longer until the errors are
-/// small: a short record sees little of slow states, a long one drifts.
+/// Linearises by steps of `step` s and its multiples; returns the most accurate result. The records get longer until
+/// the errors are small: a short record excites slow states little, during a long one the operating point drifts.
 pub(super) fn of_steps(
     fmu: &Fmu,
     parts: &Parts,
@@ -85,9 +88,9 @@ pub(super) fn of_steps(
     while count <= MAX_STEPS {
         match of_count(&mut benches, parts, states, count) {
             Ok(record) if best.as_ref().is_none_or(|known| record.relative < known.relative) => {
-                let enough = record.relative < SUFFICIENT_ERROR;
+                let is_accurate = record.relative < SUFFICIENT_ERROR;
                 best = Some(record);
-                if enough {
+                if is_accurate {
                     break;
                 }
             }
@@ -138,7 +141,7 @@ fn of_count(
         return Err(LineariseError::Inaccurate { relative, allowed: MAX_ERROR });
     }
     let names = parts.inputs.iter().map(|part| part.name.clone());
-    let heights = names.zip(record.pulses.iter().map(|pulse| pulse.1)).collect();
+    let heights = names.zip(record.pulses.iter().map(|pulse| pulse.height)).collect();
     let how = Differences::OfSteps { step: bench.step, count, heights, missed };
     let raw = RawResult {
         states: states.to_vec(),
@@ -147,11 +150,12 @@ fn of_count(
         y: bench.y.clone(),
         rates: (0..n).map(|k| values[(k, columns)]).collect(),
         jacobian,
-        how: MethodResult::Differences(how, errors),
+        method: MethodResult::Differences(how, errors),
     };
     Ok(RecordResult { raw, relative })
 }
 
+/// Returns the error that names the variables without an independent direction; none without `directions`.
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
     let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
     let weak = directions.map(|directions| directions.weak(MIN_CONTRAST)).unwrap_or_default();
@@ -162,8 +166,8 @@ fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -
     }
 }
 
-/// Returns the continuous systems of all step sizes that have one, the shortest step last; at least
-/// two.
+/// Returns the continuous systems of the step sizes up to the first that has none, at least two, the shortest step
+/// last. `bench` has the shortest step, `longer` the others, the longest first.
 fn maps(
     bench: &Bench,
     longer: &mut [Bench],
@@ -190,28 +194,30 @@ fn maps(
 
 /// Returns the degree in time of the coefficients.
 fn degree(record: &Record) -> usize {
-    if record.drifts { DEGREE } else { 0 }
+    if record.is_drifting { DEGREE } else { 0 }
 }
 
-/// Fits the continuous system to a record. If the operating point drifts, the effect of the last
-/// degree in time is added to the error.
+/// Fits the continuous system to a record; `None` if the fit is not finite or has no real logarithm. If the operating
+/// point drifts, the effect of the last degree in time is added to the error.
 fn map(bench: &Bench, record: &Record, parts: &Parts, states: &[Part]) -> Option<Map> {
-    let of = |degree| continuous(bench, &fit(record, parts, states, degree)?, record);
+    let fitted = |degree| continuous(bench, &fit(record, parts, states, degree)?, record);
     let degree = degree(record);
-    let mut map = of(degree)?;
+    let mut map = fitted(degree)?;
     if degree > 0 {
-        map.deviations += (&map.values - of(degree - 1)?.values).abs();
+        map.deviations += (&map.values - fitted(degree - 1)?.values).abs();
     }
     Some(map)
 }
 
+/// Fits the step map to a record, with coefficients that are polynomials of `degree` in time; `None` if the result is
+/// not finite. The row of an output that is a state itself is exact.
 fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option<Discrete> {
     let width = record.before.ncols();
     let (state_noise, output_noise) = record.noise.split_at(states.len());
     let change = least_squares(&record.for_change(degree), &record.change, state_noise)?;
     let outputs = least_squares(&record.for_outputs(degree), &record.outputs, output_noise)?;
-    let at_zero = |of: &DMatrix<f64>| of.rows(0, width).transpose();
-    let powers = |of: &DMatrix<f64>| of.rows(width, of.nrows() - width).transpose();
+    let at_zero = |matrix: &DMatrix<f64>| matrix.rows(0, width).transpose();
+    let powers = |matrix: &DMatrix<f64>| matrix.rows(width, matrix.nrows() - width).transpose();
     let mut discrete = Discrete {
         change: at_zero(&change.solution),
         outputs: at_zero(&outputs.solution),
@@ -220,8 +226,8 @@ fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option
     };
     let deviations = &mut discrete.deviations;
     deviations.rows_mut(0, states.len()).copy_from(&at_zero(&change.deviations));
-    let mut below = deviations.rows_mut(states.len(), parts.outputs.len());
-    below.copy_from(&at_zero(&outputs.deviations));
+    let mut output_rows = deviations.rows_mut(states.len(), parts.outputs.len());
+    output_rows.copy_from(&at_zero(&outputs.deviations));
     for (row, output) in parts.outputs.iter().enumerate() {
         if let Some(state) = states.iter().position(|part| part.reference == output.reference) {
             discrete.outputs.row_mut(row).fill(0.0);
@@ -233,12 +239,13 @@ fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option
     Some(discrete)
 }
 
-/// Returns the continuous system whose exact step is the map, in units of the typical sizes: [A, B,
-/// x'] = log([Phi, Gamma, g; 0, I]) / h, where g is the drift over one step.
+/// Returns the continuous system whose exact step is the map: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
+/// the drift over one step; `None` if there is no real logarithm. The logarithm is taken in units of the typical sizes
+/// and of the pulse heights.
 fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
     let (n, width) = discrete.change.shape();
     let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();
-    scales.extend(record.pulses.iter().map(|pulse| pulse.1));
+    scales.extend(record.pulses.iter().map(|pulse| pulse.height));
     scales.push(1.0);
     let drift = bench.drift();
     let entry = |i: usize, j: usize| if j < width { discrete.change[(i, j)] } else { drift[i] };
@@ -259,8 +266,8 @@ fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map
     Some(Map { values, deviations })
 }
 
-/// Extrapolates each entry to step zero. An exact FMU gives the same entry for every step; the
-/// error of an integration method of order q is of order h^q.
+/// Extrapolates each entry to step zero; returns the values and their errors. An exact FMU gives the same entry for
+/// every step; the error of an integration method of order q is of order h^q.
 fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
     let (rows, columns) = maps[0].values.shape();
     let mut values = DMatrix::zeros(rows, columns);
@@ -285,14 +292,14 @@ fn prediction_error(
 ) -> Result<f64, LineariseError> {
     let n = discrete.change.nrows();
     let shape = |step: usize, input: usize| {
-        let (side, height) = record.pulses[input];
+        let Pulse { side, height } = record.pulses[input];
         let on = (step / 2 + input).count_ones().is_multiple_of(2);
         let sign = if side == Side::Below { -1.0 } else { 1.0 };
         if on { 0.5 * sign * height } else { 0.0 }
     };
-    let both = record.pulses.iter().all(|(side, _)| *side == Side::Both);
-    let side = if both { Side::Both } else { Side::Above };
-    let (response, _) = bench.response(count, 2, (side, 1.0), shape)?;
+    let is_both = record.pulses.iter().all(|pulse| pulse.side == Side::Both);
+    let side = if is_both { Side::Both } else { Side::Above };
+    let (response, _) = bench.response(count, 2, Pulse { side, height: 1.0 }, shape)?;
     let mut state = DMatrix::zeros(n, 1);
     let mut expected = DMatrix::zeros(count + 1, response.ncols());
     for step in 0..count {
