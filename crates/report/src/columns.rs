@@ -25,13 +25,13 @@ pub(crate) struct Columns {
 enum Column {
     /// The value of all rows; `null` is NaN.
     Constant { constant: Option<f64> },
-    /// The numbers in double precision, little endian: all first bytes, then all second bytes and so on, since
-    /// neighbours differ little in most of them; compressed (zlib), in base64.
+    /// The numbers in double precision, little endian: all first bytes, then all second bytes and so on, because
+    /// neighbouring numbers have most bytes in common; compressed (zlib), in base64.
     Block { block: String },
 }
 
 impl Columns {
-    /// Adds a column and returns its number.
+    /// Adds a column, unless there is an equal one; returns its number.
     pub(crate) fn add(&mut self, values: &[f64]) -> usize {
         let (key, column) = if let Some(value) = constant(values) {
             let constant = Some(value).filter(|value| !value.is_nan());
@@ -47,7 +47,8 @@ impl Columns {
     }
 }
 
-/// Returns the value of all rows, if it is one that JSON has, or NaN.
+/// Returns the value that all rows have, NaN without rows; `None` if rows differ, or for infinity, which JSON cannot
+/// express.
 fn constant(values: &[f64]) -> Option<f64> {
     let first = values.first().copied().unwrap_or(f64::NAN);
     let same = values

@@ -16,16 +16,16 @@ use crate::{Error, View};
 pub struct Difference {
     /// The variable.
     pub name: String,
-    /// The largest absolute difference.
+    /// The largest absolute difference; infinite if a value differs from NaN or infinity.
     pub largest: f64,
-    /// Its time in s.
+    /// The time of the largest difference in s; NaN if the variables are equal.
     pub at: f64,
     /// The root of the mean square over [`Difference::rows`].
     pub rms: f64,
     /// The number of rows that were compared: those at which one of the runs has a value.
     pub rows: u64,
-    /// The largest absolute difference, divided by the range of the variable in both runs; 0 if they are
-    /// equal, infinite if only the range is 0.
+    /// The largest absolute difference, divided by the range of the variable in both runs; 0 if the runs are
+    /// equal, infinite if they differ and the range is 0.
     pub relative: f64,
 }
 
@@ -47,12 +47,12 @@ pub struct Comparison {
     pub rows: u64,
     /// Number of rows of this run outside of the time of the other one.
     pub outside: u64,
-    /// Number of rows of the other run outside of the time of this one.
+    /// Number of rows of the other run outside of the time of this one; 0 if a range of time was requested.
     pub outside_there: u64,
 }
 
 impl Comparison {
-    /// Whether all that was compared is equal.
+    /// Whether all compared values are equal.
     #[must_use]
     pub fn is_equal(&self) -> bool {
         self.differences.iter().all(|difference| difference.largest <= 0.0)
@@ -71,9 +71,9 @@ impl Comparison {
                 sentences.push(format!("{} of {one} outside of the time of {other}", rows(count)));
             }
         }
-        for (names, whose) in [(&self.only_here, here), (&self.only_there, there)] {
+        for (names, run) in [(&self.only_here, here), (&self.only_there, there)] {
             if !names.is_empty() {
-                sentences.push(format!("only in {whose}: {}", crate::listed(names, limit)));
+                sentences.push(format!("only in {run}: {}", crate::listed(names, limit)));
             }
         }
         if !self.texts.is_empty() {
@@ -89,35 +89,38 @@ impl Comparison {
     }
 }
 
-/// What two runs have in common.
-pub(crate) struct Compared {
+/// The comparison of two runs, and its results by column.
+pub(crate) struct ComparisonResult {
     pub(crate) comparison: Comparison,
     /// Whether the other run has each of the columns.
     pub(crate) common: Vec<bool>,
-    /// By column: the largest difference divided by the range of the column, or 0 for a column that the other run lacks.
+    /// [`Difference::relative`] of each column; 0 for a column that the other run lacks.
     pub(crate) relative: Vec<f64>,
 }
 
-/// Compares the columns at `positions` with those of the same names in `other`, at the times of the rows
+/// Compares the columns at `positions` with the columns of the same names in `other`, at the times of the rows
 /// of `view`. Between rows, the other run is interpolated linearly; integers and Booleans are held. Rows
-/// with the same time, as at events, are compared in their order. Also returns the rows that the plots of the groups
-/// have: the columns of this run, then those of the other one, which are NaN where it has no value.
+/// with the same time, as at events, are compared in their order.
+///
+/// Also returns the rows for the plot of each group: the columns of this run, then the columns of the other one, with
+/// NaN where it has no value.
 pub(crate) fn compare(
     view: &View<'_>,
     positions: &[usize],
     groups: &[Group],
     other: &Table,
-) -> Result<(Compared, Vec<Samples>), Error> {
+) -> Result<(ComparisonResult, Vec<Samples>), Error> {
     let table = view.table;
-    let named =
-        |table: &Table, name: &str| table.columns().iter().position(|column| column.name == name);
-    let there =
-        |at: usize| named(other, &table.columns()[at].name).filter(|there| *there != other.time());
-    let partners: Vec<Option<usize>> = positions.iter().map(|at| there(*at)).collect();
-    let positions_there: Vec<usize> = partners.iter().flatten().copied().collect();
+    let partner = |at: &usize| {
+        let name = &table.columns()[*at].name;
+        let partner = other.columns().iter().position(|column| column.name == *name);
+        partner.filter(|partner| *partner != other.time())
+    };
+    let partners: Vec<Option<usize>> = positions.iter().map(partner).collect();
+    let other_positions: Vec<usize> = partners.iter().flatten().copied().collect();
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(BATCHES);
-        let reader = scope.spawn(move || pass_on(other, &positions_there, &sender));
+        let reader = scope.spawn(move || send_rows(other, &other_positions, &sender));
         let mut series = Series::new(receiver);
         let mut sums: Vec<_> = positions.iter().map(|at| Sum::new(&table.columns()[*at])).collect();
         let collector = |group: &Group| Collector::new(2 * group.members.len(), group.block, true);
@@ -125,19 +128,20 @@ pub(crate) fn compare(
         let mut others = vec![f64::NAN; positions.len()];
         let mut comparison = Comparison::default();
         view.visit(positions, &mut |time, row| {
-            let part = series.advance_to(time);
-            let count = if part.is_some() { &mut comparison.rows } else { &mut comparison.outside };
+            let fraction = series.advance_to(time);
+            let count =
+                if fraction.is_some() { &mut comparison.rows } else { &mut comparison.outside };
             *count += 1;
             let mut column = 0;
-            for ((sum, value), (there, other)) in
+            for ((sum, value), (partner, other)) in
                 sums.iter_mut().zip(row).zip(partners.iter().zip(&mut others))
             {
                 *other = f64::NAN;
-                if there.is_none() {
+                if partner.is_none() {
                     continue;
                 }
-                if let Some(part) = part {
-                    *other = series.value(column, part, sum.holds);
+                if let Some(fraction) = fraction {
+                    *other = series.value(column, fraction, sum.is_held);
                     sum.push(time, *value, *other);
                 }
                 column += 1;
@@ -158,37 +162,38 @@ pub(crate) fn compare(
         let common: Vec<bool> = partners.iter().map(Option::is_some).collect();
         let differences: Vec<_> = sums.into_iter().map(Sum::finish).collect();
         let relative = differences.iter().map(|difference| difference.relative).collect();
-        let compared = differences.into_iter().zip(&common).filter(|(_, is)| **is);
+        let compared = differences.into_iter().zip(&common).filter(|(_, is_common)| **is_common);
         comparison.differences = compared.map(|(difference, _)| difference).collect();
         comparison.differences.sort_by(|one, other| other.relative.total_cmp(&one.relative));
         let samples = collectors.into_iter().map(Collector::finish).collect();
-        Ok((Compared { comparison, common, relative }, samples))
+        Ok((ComparisonResult { comparison, common, relative }, samples))
     })
 }
 
-/// Returns the names of the columns of `all` but the time that `rest` does not have.
-pub(crate) fn missing<'a>(all: &'a Table, positions: &[usize], rest: &Table) -> Vec<String> {
-    let columns = positions.iter().filter(|at| **at != all.time()).map(|at| &all.columns()[*at]);
-    let is_missing =
-        |column: &&'a Column| rest.columns().iter().all(|other| other.name != column.name);
-    columns.filter(is_missing).map(|column| column.name.clone()).collect()
+/// Returns the names of the columns of `table` at `positions`, except the time, that `other` does not have.
+pub(crate) fn missing(table: &Table, positions: &[usize], other: &Table) -> Vec<String> {
+    let columns = positions.iter().filter(|at| **at != table.time());
+    let names = columns.map(|at| &table.columns()[*at].name);
+    let is_missing = |name: &&String| other.columns().iter().all(|column| column.name != **name);
+    names.filter(is_missing).cloned().collect()
 }
 
-/// Rows of a file that a thread passes on at once, and the number of such batches that wait.
+/// Number of rows of the other run that its thread sends at once.
 const BATCH: usize = 1024;
+/// Largest number of such batches that wait for the comparison.
 const BATCHES: usize = 8;
 
 /// A row: its time and its values.
 type Row = (f64, Vec<f64>);
 
-/// Passes on the rows of a file in batches.
-fn pass_on(
+/// Sends the rows of a file in batches.
+fn send_rows(
     table: &Table,
     positions: &[usize],
     sender: &SyncSender<VecDeque<Row>>,
 ) -> Result<(), ResultsError> {
     let mut rows = VecDeque::new();
-    // Without a receiver, the comparison has ended by an error.
+    // A send fails only after the comparison has ended by an error, which is reported instead.
     let send = |rows: &mut VecDeque<Row>| drop(sender.send(std::mem::take(rows)));
     table.visit(positions, &mut |time, row| {
         rows.push_back((time, row.to_vec()));
@@ -200,26 +205,31 @@ fn pass_on(
     Ok(())
 }
 
-/// The rows of the other run: the last one up to a time, and the next one.
+/// The rows of the other run around the present time of the comparison.
 struct Series {
     receiver: Receiver<VecDeque<Row>>,
+    /// The rest of the last batch.
     rows: VecDeque<Row>,
+    /// The last row up to the present time.
     before: Option<Row>,
+    /// The row after it.
     next: Option<Row>,
-    /// The first and the last time asked for.
-    asked: Option<(f64, f64)>,
-    /// Number of rows before the first time asked for.
+    /// The first and the last time of [`Series::advance_to`].
+    requested: Option<(f64, f64)>,
+    /// Number of rows before the first of these times.
     early: u64,
 }
 
 impl Series {
     fn new(receiver: Receiver<VecDeque<Row>>) -> Self {
         let rows = VecDeque::new();
-        let mut series = Self { receiver, rows, before: None, next: None, asked: None, early: 0 };
+        let (before, next, requested) = (None, None, None);
+        let mut series = Self { receiver, rows, before, next, requested, early: 0 };
         series.advance();
         series
     }
 
+    /// Advances by one row; waits for it.
     fn advance(&mut self) {
         if self.rows.is_empty() {
             self.rows = self.receiver.recv().unwrap_or_default();
@@ -228,12 +238,13 @@ impl Series {
             std::mem::replace(&mut self.next, self.rows.pop_front()).or(self.before.take());
     }
 
-    /// Advances to `time`, which does not decrease from call to call; returns the part of the way to the next row, None
-    /// outside of the run.
+    /// Advances to `time`, which does not decrease from call to call; returns the fraction of the time from the row
+    /// before to the next row, `None` outside of the run. Further calls with the time of several rows advance by one
+    /// row each, up to the last of them.
     #[expect(clippy::float_cmp, reason = "rows of the same time")]
     fn advance_to(&mut self, time: f64) -> Option<f64> {
-        let is_first = self.asked.is_none();
-        self.asked = Some((self.asked.map_or(time, |(first, _)| first), time));
+        let is_first = self.requested.is_none();
+        self.requested = Some((self.requested.map_or(time, |(first, _)| first), time));
         while self.next.as_ref().is_some_and(|next| next.0 < time) {
             self.early += u64::from(is_first);
             self.advance();
@@ -250,17 +261,20 @@ impl Series {
         Some((time - start) / (end - start))
     }
 
-    fn value(&self, column: usize, part: f64, holds: bool) -> f64 {
+    /// Returns the value of a column at this fraction between the rows: interpolated, or the value of the row before if
+    /// the column is held.
+    fn value(&self, column: usize, fraction: f64, is_held: bool) -> f64 {
         let value = |row: &Option<Row>| row.as_ref().map_or(f64::NAN, |row| row.1[column]);
-        if holds || part == 0.0 {
+        if is_held || fraction == 0.0 {
             return value(&self.before);
         }
-        value(&self.before) * (1.0 - part) + value(&self.next) * part
+        value(&self.before) * (1.0 - fraction) + value(&self.next) * fraction
     }
 
-    /// Reads the rest, and returns the number of rows before the first and after the last time asked for.
+    /// Reads the rest, and returns the number of rows before the first and after the last time of
+    /// [`Series::advance_to`]; 0 if it was not called.
     fn outside(&mut self) -> u64 {
-        let Some((_, last)) = self.asked else { return 0 };
+        let Some((_, last)) = self.requested else { return 0 };
         let mut outside = self.early;
         while let Some(next) = &self.next {
             outside += u64::from(next.0 > last);
@@ -273,12 +287,16 @@ impl Series {
 /// Collects the difference of a variable row by row.
 struct Sum {
     name: String,
-    holds: bool,
+    /// Whether the variable keeps its value between two rows.
+    is_held: bool,
+    /// The largest absolute difference and its time.
     largest: (f64, f64),
+    /// Sum of the squares of the differences.
     squares: f64,
     /// Sum of the squares of the scaled differences, for differences whose squares overflow.
     scaled_squares: f64,
     rows: u64,
+    /// The smallest and the largest finite value of both runs.
     range: (f64, f64),
 }
 
@@ -286,7 +304,7 @@ impl Sum {
     fn new(column: &Column) -> Self {
         Self {
             name: column.name.clone(),
-            holds: crate::holds(column),
+            is_held: crate::is_held(column),
             largest: (0.0, f64::NAN),
             squares: 0.0,
             scaled_squares: 0.0,
@@ -299,7 +317,7 @@ impl Sum {
         if value.is_nan() && other.is_nan() {
             return;
         }
-        // A value that is not finite differs from any number.
+        // A value that is not finite differs by infinity from every other value, and not from itself.
         let difference = if value.to_bits() == other.to_bits() { 0.0 } else { value - other };
         let size = if difference.is_nan() { f64::INFINITY } else { difference.abs() };
         if size > self.largest.0 {

@@ -14,13 +14,17 @@ const ERROR: u32 = 0x2000_0000;
 pub(crate) struct Message {
     /// Bus and identifier, as in the file.
     pub(crate) name: String,
+    /// Number of frames.
     pub(crate) count: usize,
+    /// Time of the first frame in s.
     pub(crate) first: f64,
+    /// Time of the last frame in s.
     pub(crate) last: f64,
-    /// Shortest and longest time between two frames in s; NaN for one frame.
+    /// Shortest time between two frames in s; NaN for one frame.
     pub(crate) shortest: f64,
+    /// Longest time between two frames in s; NaN for one frame.
     pub(crate) longest: f64,
-    /// The time of each frame but the first in s, and the time since the frame before in ms.
+    /// The time of each frame except the first in s, and the time since the frame before in ms.
     pub(crate) intervals: Vec<(f64, f64)>,
 }
 
@@ -33,7 +37,7 @@ impl Message {
 
     fn push(&mut self, time: f64) {
         let interval = time - self.last;
-        // The other operand where one is NaN.
+        // Before the second frame both are NaN: `min` and `max` then return the interval.
         self.shortest = self.shortest.min(interval);
         self.longest = self.longest.max(interval);
         self.intervals.push((time, 1e3 * interval));
@@ -41,14 +45,15 @@ impl Message {
         self.last = time;
     }
 
-    /// Returns the mean time between two frames in s.
+    /// Returns the mean time between two frames in s; NaN for one frame.
     #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 frames")]
     pub(crate) fn mean(&self) -> f64 {
         (self.last - self.first) / (self.count as f64 - 1.0)
     }
 }
 
-/// Reads the frames of a trace from time `from` to `to` in s: lines `(time) bus identifier#data`.
+/// Reads the frames of a trace from time `from` to `to` in s: lines `(time) bus identifier#data`. Returns the messages
+/// in the order of bus and identifier. A line that is neither empty nor a frame is an error.
 pub(crate) fn read(path: &Path, (from, to): (f64, f64)) -> Result<Vec<Message>, Error> {
     let unreadable = |source| Error::Trace { file: name(path), source };
     let mut messages: BTreeMap<(String, String), Message> = BTreeMap::new();
@@ -65,20 +70,20 @@ pub(crate) fn read(path: &Path, (from, to): (f64, f64)) -> Result<Vec<Message>, 
         if !(from..=to).contains(&time) {
             continue;
         }
-        let known = messages.entry((bus.to_owned(), identifier.to_owned()));
-        known
+        messages
+            .entry((bus.to_owned(), identifier.to_owned()))
             .and_modify(|message| message.push(time))
             .or_insert_with(|| Message::new(format!("{bus} {identifier}"), time));
     }
     Ok(messages.into_values().collect())
 }
 
-/// Returns time, bus and identifier of a line.
+/// Returns time, bus and identifier of a line, `error` for an error frame; `None` if it is no frame.
 fn parse(line: &str) -> Option<(f64, &str, &str)> {
     let (time, rest) = line.trim_start().strip_prefix('(')?.split_once(')')?;
     let (bus, frame) = rest.trim().split_once(char::is_whitespace)?;
     let (identifier, _) = frame.trim().split_once('#')?;
-    // As SocketCAN marks them.
+    // SocketCAN marks error frames by a bit of the identifier.
     let flags = u32::from_str_radix(identifier, 16).ok()?;
     let identifier = if flags & ERROR == 0 { identifier } else { "error" };
     let time: f64 = time.trim().parse().ok()?;

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use crate::{Connection, Run};
 
-/// Sizes in units of the drawing.
+/// Sizes in units of the drawing: a box, the gaps between columns and rows of boxes, the margin.
 const WIDTH: usize = 170;
 const HEIGHT: usize = 48;
 const ACROSS: usize = 110;
@@ -15,9 +15,8 @@ const EDGE: usize = 12;
 /// Largest number of characters of a name in a box.
 const LETTERS: usize = 20;
 
-/// Draws the system. An FMU stands right of those that it depends on, but for connections that close a
-/// loop, which return below the boxes. The arrows name their connections in a tooltip; the table of
-/// connections says the same as text.
+/// Draws the system. An FMU is to the right of the FMUs that it depends on; arrows that close a loop return below the
+/// boxes. The arrows name their connections in a tooltip; the list of connections says the same as text.
 pub(crate) fn graph(run: &Run) -> Markup {
     let mut arrows: BTreeMap<(usize, usize), Vec<&Connection>> = BTreeMap::new();
     for connection in &run.connections {
@@ -93,6 +92,8 @@ fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
     }
 }
 
+/// Returns the name of a single connection whose output and input have the same name, otherwise the number of
+/// connections.
 fn label_of(connections: &[&Connection]) -> String {
     match connections {
         [only] if only.output == only.input => short(&only.output),
@@ -101,6 +102,7 @@ fn label_of(connections: &[&Connection]) -> String {
     }
 }
 
+/// Returns a name with at most [`LETTERS`] characters, the last one an ellipsis if it is shortened.
 fn short(name: &str) -> String {
     if name.chars().count() <= LETTERS {
         return name.to_owned();
@@ -108,8 +110,8 @@ fn short(name: &str) -> String {
     name.chars().take(LETTERS - 1).chain(['…']).collect()
 }
 
-/// The column of each FMU: the longest way to it from an FMU without predecessors, over connections that
-/// close no loop in a depth-first search.
+/// Returns the column of each FMU: the length of the longest path to it from an FMU without predecessors, over
+/// connections that close no loop in a depth-first search.
 fn columns(count: usize, arrows: &BTreeMap<(usize, usize), Vec<&Connection>>) -> Vec<usize> {
     let mut order =
         Order { arrows, state: vec![State::New; count], forward: Vec::new(), done: Vec::new() };
@@ -125,6 +127,7 @@ fn columns(count: usize, arrows: &BTreeMap<(usize, usize), Vec<&Connection>>) ->
     columns
 }
 
+/// The state of an FMU in the search: not visited, on the path to the present FMU, or left.
 #[derive(Clone, Copy, PartialEq)]
 enum State {
     New,
@@ -132,20 +135,23 @@ enum State {
     Done,
 }
 
+/// A depth-first search.
 struct Order<'a> {
     arrows: &'a BTreeMap<(usize, usize), Vec<&'a Connection>>,
     state: Vec<State>,
+    /// The arrows that close no loop.
     forward: Vec<(usize, usize)>,
-    /// FMUs after all that depend on them.
+    /// The FMUs, each after all FMUs that depend on it.
     done: Vec<usize>,
 }
 
 impl Order<'_> {
     fn visit(&mut self, fmu: usize) {
-        // A stack of its own: a chain of thousands of FMUs must not exhaust that of the thread.
+        // An explicit stack: a chain of thousands of FMUs must not exhaust the stack of the thread. Each FMU is pushed
+        // a second time below its successors, to be left after them.
         let mut open = vec![(fmu, false)];
-        while let Some((fmu, left)) = open.pop() {
-            if left {
+        while let Some((fmu, is_visited)) = open.pop() {
+            if is_visited {
                 self.state[fmu] = State::Done;
                 self.done.push(fmu);
             } else if self.state[fmu] == State::New {
@@ -153,9 +159,8 @@ impl Order<'_> {
                 open.push((fmu, true));
                 let successors = self.arrows.range((fmu, 0)..=(fmu, usize::MAX));
                 for (arrow, _) in successors.filter(|((from, to), _)| from != to) {
-                    match self.state[arrow.1] {
-                        State::Open => {}
-                        _ => self.forward.push(*arrow),
+                    if self.state[arrow.1] != State::Open {
+                        self.forward.push(*arrow);
                     }
                     open.push((arrow.1, false));
                 }

@@ -1,8 +1,8 @@
 //! The report of a run: one HTML file, which needs no other file and no network.
 //!
-//! [`page`] reads a results file and writes interactive plots, statistics of each variable and, if it
-//! is given a second results file, the difference of both; of a bus trace, the frames. [`Run`] adds what
-//! only the run itself knows: the system as a graph, the algorithm and the messages.
+//! [`page`] reads a results file and writes interactive plots and statistics of each variable; with a second results
+//! file, the difference of both; with a bus trace, its frames. [`Run`] adds what the results file does not contain:
+//! the system as a graph, the algorithm and the messages.
 #![forbid(unsafe_code)]
 
 mod columns;
@@ -41,10 +41,10 @@ pub struct Request<'a> {
     pub results: &'a Path,
     /// A second results file, from which the first one is subtracted.
     pub against: Option<&'a Path>,
-    /// The variables, by name or pattern; everything if it is empty.
+    /// The variables, by name or pattern; all variables if it is empty.
     pub variables: &'a [String],
-    /// The first and the last time of the rows that are read, in s; negative and positive infinity are those of the
-    /// file.
+    /// The first and the last time of the rows that are read, in s; negative and positive infinity stand for the start
+    /// and the end of the file.
     pub range: (f64, f64),
     /// The units of variables for files without units, such as CSV: name and unit.
     pub units: &'a [(String, String)],
@@ -54,10 +54,10 @@ pub struct Request<'a> {
     pub run: Option<&'a Run>,
 }
 
-/// What is known of a run beside its results.
+/// The properties of a run that its results file does not contain.
 #[derive(Debug, Default)]
 pub struct Run {
-    /// How far it came and how long it took.
+    /// A sentence: the time that it reached, and how long it took.
     pub outcome: String,
     /// Whether it ended early.
     pub failed: bool,
@@ -71,9 +71,9 @@ pub struct Run {
     pub disturbed: Vec<String>,
     /// The variables whose plot the configuration asks for, by name or pattern.
     pub plotted: Vec<String>,
-    /// The algorithm, and the reason of each setting.
+    /// Sentences on the algorithm and the reason of each setting.
     pub algorithm: Vec<String>,
-    /// Changes and faults of the scenario.
+    /// Changes and faults of the scenario, and interventions.
     pub marks: Vec<Mark>,
     /// Warnings and errors of the run, in their order.
     pub messages: Vec<Message>,
@@ -88,10 +88,10 @@ pub struct Message {
     pub text: String,
 }
 
-/// A mark on the axis of time: what happened there.
+/// A mark on the axis of time, for an event of the run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mark {
-    /// What kind of thing it is.
+    /// Its kind.
     pub kind: MarkKind,
     /// Its time in s, or its start.
     pub time: f64,
@@ -109,7 +109,7 @@ pub enum MarkKind {
     Change,
     /// The scenario disturbs a connection.
     Fault,
-    /// Somebody changed the run while it was running.
+    /// The user changed the run while it was running.
     Intervention,
     /// A warning or an error.
     Message,
@@ -205,7 +205,7 @@ pub enum Error {
         /// Its start.
         actual: String,
     },
-    /// The two files have nothing in common.
+    /// The two files have no variable with numbers in common.
     #[error("{file} and {other} have no variable in common")]
     Apart {
         /// The first file.
@@ -215,7 +215,8 @@ pub enum Error {
     },
 }
 
-/// The text by which a later report recognises a report of the results file `results`.
+/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in any
+/// folder.
 #[must_use]
 pub fn identity(results: &Path) -> String {
     format!("aso-ftc report of {}", name(results))
@@ -230,12 +231,13 @@ pub fn identity(results: &Path) -> String {
 ///
 /// # Errors
 ///
-/// [`Error`]: a file cannot be read, has no variable with numbers, or has none in common with the other.
+/// [`Error`]: a file cannot be read, has no variable with numbers, no row in the requested range, or no variable in
+/// common with the other file; a requested variable does not exist; a line of the bus trace is no frame.
 pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     let table = Table::open(request.results)?;
     let view = View { table: &table, range: request.range };
     let read = read(&view, request)?;
-    let Read { positions, columns, statistics, texts, .. } = &read;
+    let FirstPass { positions, columns, statistics, texts, .. } = &read;
     let (rows, left_out) = (read.rows, read.left_out);
     if rows == 0 && view.is_part() {
         let (from, to) = request.range;
@@ -243,7 +245,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     }
     let signals = Signals::new(columns, request.run);
     let groups = plots::groups(columns, statistics, &signals, rows, request.against.is_some());
-    let (mut compared, samples) = match request.against {
+    let (compared, samples) = match request.against {
         Some(path) => {
             let other = Table::open(path)?;
             let (mut compared, samples) = difference::compare(&view, positions, &groups, &other)?;
@@ -288,7 +290,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         picture: pictures::svg(&name(request.results), &drawn, columns),
     };
     let html = page::render(&content, &plots);
-    Ok(Page { html, comparison: compared.take().map(|compared| compared.comparison) })
+    Ok(Page { html, comparison: compared.map(|compared| compared.comparison) })
 }
 
 /// The rows of a file in a range of time.
@@ -311,7 +313,7 @@ impl View<'_> {
         })
     }
 
-    /// Whether rows of the file may be outside.
+    /// Whether rows of the file may be outside of the range.
     fn is_part(&self) -> bool {
         self.range.0.is_finite() || self.range.1.is_finite()
     }
@@ -329,8 +331,9 @@ fn collect(view: &View<'_>, positions: &[usize], groups: &[Group]) -> Result<Vec
     Ok(collectors.into_iter().map(Collector::finish).collect())
 }
 
-/// What the first reading of the results file finds.
-struct Read {
+/// The result of the first pass over the results file.
+struct FirstPass {
+    /// The positions of the variables in the file.
     positions: Vec<usize>,
     columns: Vec<Column>,
     statistics: Vec<Statistics>,
@@ -343,7 +346,8 @@ struct Read {
     left_out: usize,
 }
 
-fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
+/// Reads the results file once for the statistics; again for each variable of a CSV file that turns out to be a text.
+fn read(view: &View<'_>, request: &Request<'_>) -> Result<FirstPass, Error> {
     let table = view.table;
     let selection = Selection { include: request.variables.to_vec(), exclude: Vec::new() };
     let mut chosen = table.choose(&selection)?;
@@ -364,11 +368,11 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
         let visited = view.visit(positions, &mut |time, row| {
             rows += 1;
             events.push(time);
-            statistics.iter_mut().zip(row).for_each(|(built, value)| built.push(time, *value));
+            statistics.iter_mut().zip(row).for_each(|(builder, value)| builder.push(time, *value));
         });
         match visited {
             Ok(()) => {
-                return Ok(Read {
+                return Ok(FirstPass {
                     positions: positions.to_vec(),
                     statistics: statistics.into_iter().map(statistics::Builder::finish).collect(),
                     columns,
@@ -378,7 +382,7 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
                     left_out: rest.len(),
                 });
             }
-            // CSV states no types: a column of texts is found by its first one.
+            // CSV states no types: a column of texts is recognised by its first text.
             Err(ResultsError::Number { name, .. })
                 if columns.iter().any(|column| column.name == name) =>
             {
@@ -390,14 +394,16 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
     }
 }
 
-/// The times at which several rows follow each other, as at events.
+/// The times that several consecutive rows have, as at events.
 #[derive(Default)]
 struct Events {
-    /// The first ones, at most [`MARKS`].
+    /// The first [`MARKS`] of these times.
     times: Vec<f64>,
-    /// The number of all.
+    /// The number of all of them.
     count: usize,
+    /// The time of the row before.
     before: Option<f64>,
+    /// The last of these times.
     last: Option<f64>,
 }
 
@@ -414,23 +420,24 @@ impl Events {
     }
 }
 
+/// Returns the column with the unit of the request, if the file states none.
 fn with_unit(column: &Column, request: &Request<'_>) -> Column {
     let known = request.units.iter().find(|(name, _)| *name == column.name);
     let unit = column.unit.clone().or_else(|| known.map(|(_, unit)| unit.clone()));
     Column { unit, ..column.clone() }
 }
 
-/// The name of a file, without its folder.
+/// Returns the name of a file, without its folder.
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Whether a variable keeps its value between two rows.
-fn holds(column: &Column) -> bool {
+fn is_held(column: &Column) -> bool {
     !matches!(column.kind, ColumnKind::Real)
 }
 
-/// Names in a sentence, at most `limit` of them.
+/// Returns a list of names for a sentence: at most `limit` of them, and how many more there are.
 fn listed(names: &[String], limit: usize) -> String {
     let more = names.len().saturating_sub(limit);
     let shown = names.iter().take(limit).cloned().collect::<Vec<_>>().join(", ");

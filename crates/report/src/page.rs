@@ -21,13 +21,14 @@ const SCRIPT: &str = include_str!("page/plots.js");
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
-/// Largest number of connections and of messages that are listed.
+/// Largest number of entries of a list: marks, messages, connections, identifiers, names.
 const LISTED: usize = 200;
-/// Largest number of rows of a table that is not folded.
+/// Largest number of rows of a table that is not folded, and number of differences above the fold.
 const OPEN: usize = 10;
 /// The range of all times.
 const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
+/// The content of a page, except its plots.
 pub(crate) struct Content<'a> {
     pub(crate) request: &'a Request<'a>,
     pub(crate) columns: &'a [Column],
@@ -54,10 +55,11 @@ struct Data<'a> {
     marks: &'a [Mark],
     /// The times of events.
     events: &'a [f64],
-    /// The command that writes such a page.
+    /// See [`command`].
     command: String,
 }
 
+/// Returns the HTML document.
 pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
     let request = content.request;
     let file = request.results.display().to_string();
@@ -104,7 +106,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
                         }
                     }
                     @if let Some(comparison) = content.comparison { (differences(comparison, other.as_deref().unwrap_or_default())) }
-                    (happened(&marks, content.events))
+                    (timeline(&marks, content.events))
                     (statistics(content))
                     @if let (Some(messages), Some(file)) = (content.frames, request.bus_trace) { (bus_frames(messages, file)) }
                     @if let Some(run) = request.run { (system(run)) (messages(run)) }
@@ -142,19 +144,19 @@ fn outcome(run: &Run) -> Markup {
     html! {
         p.outcome.failed[run.failed] role="status" { (run.outcome) }
         @if !run.messages.is_empty() {
-            p { a href="#messages" { (counted(run.messages.len())) } }
+            p { a href="#messages" { (message_count(run.messages.len())) } }
         }
     }
 }
 
-fn counted(messages: usize) -> String {
+fn message_count(messages: usize) -> String {
     match messages {
         1 => "1 warning or error".to_owned(),
         several => format!("{several} warnings and errors"),
     }
 }
 
-/// The answer to the question how much two runs differ.
+/// Says at the top of the page how much the two runs differ.
 fn largest(comparison: &Comparison, other: &str) -> Markup {
     html! {
         @if comparison.is_equal() {
@@ -168,7 +170,7 @@ fn largest(comparison: &Comparison, other: &str) -> Markup {
     }
 }
 
-/// All marks in the order of their times: of the scenario, and messages with a time.
+/// Returns the marks in the order of their times: at most [`MARKS`] of the run, and as many messages with a time.
 fn marks(run: Option<&Run>) -> Vec<Mark> {
     let Some(run) = run else { return Vec::new() };
     let messages = run.messages.iter().filter_map(|message| {
@@ -181,12 +183,12 @@ fn marks(run: Option<&Run>) -> Vec<Mark> {
     marks
 }
 
-/// A table that is folded if it has many rows.
+/// A table that is folded if `count`, the number of its rows, is larger than [`OPEN`].
 fn folded(count: usize, summary: &str, table: &Markup) -> Markup {
     html! { details open[count <= OPEN] { summary { (summary) } (table) } }
 }
 
-/// The titles of a table: of columns of texts, then of numbers, then of texts.
+/// The titles of a table: columns of texts, then columns of numbers, then columns of texts.
 fn titles(texts: &[&str], numbers: &[&str], last: &[&str]) -> Markup {
     html! {
         thead {
@@ -199,7 +201,8 @@ fn titles(texts: &[&str], numbers: &[&str], last: &[&str]) -> Markup {
     }
 }
 
-fn happened(marks: &[Mark], events: &Events) -> Markup {
+/// The marks in a table, and the number of events.
+fn timeline(marks: &[Mark], events: &Events) -> Markup {
     let table = html! {
         div.scroll tabindex="0" role="region" aria-labelledby="happened" {
             table {
@@ -235,7 +238,7 @@ fn happened(marks: &[Mark], events: &Events) -> Markup {
     }
 }
 
-/// The variables that keep one value.
+/// The variables that do not change, with their values.
 fn unchanged(content: &Content<'_>) -> Markup {
     let count = content.flat.len();
     html! {
@@ -285,7 +288,7 @@ fn controls(other: Option<&str>) -> Markup {
     }
 }
 
-/// The command for a page with the same content, in the words of a shell.
+/// Returns the command for a page of the same files, quoted for a shell; without range, variables, units and trace.
 fn command(request: &Request<'_>) -> String {
     let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "_-./".contains(sign);
     let quoted = |path: &Path| {
@@ -296,12 +299,12 @@ fn command(request: &Request<'_>) -> String {
     format!("aso-ftc report {}{}", quoted(request.results), against.unwrap_or_default())
 }
 
-/// A number with six digits, all of them in a tooltip.
+/// A cell with a number in six digits, and with all digits in a tooltip.
 fn number(value: f64) -> Markup {
     html! { td.number title=(value) { (short(value)) } }
 }
 
-/// A number with six digits.
+/// Returns a number with six significant digits; a dash for NaN.
 fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
     if value.is_nan() {
@@ -313,7 +316,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// What mean and rms of a variable are over.
+/// Says over what the mean and the rms of a variable are taken.
 fn basis(statistics: &Statistics) -> String {
     match statistics.basis {
         Basis::Time(length) => format!("time, {} s", short(length)),

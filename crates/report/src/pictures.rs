@@ -10,10 +10,11 @@ use crate::samples::Samples;
 const BYTES: usize = 300_000;
 /// Largest number of plots in it.
 const PANELS: usize = 6;
+/// The colours of the curves, in their order.
 const INKS: [Ink; 7] =
     [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
 
-/// Draws the first plots, as many as fit.
+/// Draws the first plots, as many as fit into [`BYTES`]; returns an empty text if none fits.
 pub(crate) fn svg(title: &str, groups: &[(&Group, &Samples)], columns: &[Column]) -> String {
     let mut panels: Vec<_> =
         groups.iter().take(PANELS).map(|(group, samples)| panel(group, samples, columns)).collect();
@@ -24,8 +25,8 @@ pub(crate) fn svg(title: &str, groups: &[(&Group, &Samples)], columns: &[Column]
             return svg;
         }
         panels = figure.panels;
-        let fits = panels.len() * BYTES / svg.len();
-        panels.truncate(fits.min(panels.len() - 1));
+        let count = panels.len() * BYTES / svg.len();
+        panels.truncate(count.min(panels.len() - 1));
     }
     String::new()
 }

@@ -11,38 +11,39 @@ use crate::statistics::Statistics;
 
 /// Largest number of curves in a plot: the number of colours.
 const CURVES: usize = 7;
-/// Largest number of values of the plots of a page that vary, 16 MB; in the file they have at most 21 MB.
+/// Largest number of values in the plots of a page, without variables that do not change: 16 MB, and at most 21 MB in
+/// the file.
 const VALUES: usize = 2_000_000;
 /// Least number of blocks of rows of a plot.
 const BLOCKS: usize = 300;
-/// Largest ratio of the sizes of two curves in a plot: more, and the smaller one is a line.
+/// Largest ratio of the sizes of two curves in a plot. Beyond it the smaller one would look like a straight line.
 const RATIO: f64 = 30.0;
-/// Largest number of plots that are not folded.
+/// Largest number of plots of variables that are not folded.
 const SHOWN: usize = 6;
 
 /// Variables of an FMU with the same unit and similar size, which share a plot.
 pub(crate) struct Group {
-    /// How soon the first of its variables is shown, and the position of its FMU.
+    /// The rank of its most important variable, and the position of its FMU.
     key: (Rank, usize),
     /// Whether no variable changes.
     pub(crate) is_flat: bool,
     pub(crate) unit: String,
-    /// Their positions among the columns.
+    /// The positions of its variables among the columns.
     pub(crate) members: Vec<usize>,
-    /// The largest absolute value of the first one.
+    /// The largest absolute value of its first variable.
     size: f64,
-    /// Number of rows of which the extremes remain; 1 if all rows remain.
+    /// Number of rows of a block of the [`Collector`]; 1 if all rows remain.
     pub(crate) block: usize,
 }
 
 impl Group {
-    /// Whether it is one of those that are shown first.
+    /// Whether it is shown first: a variable is plotted by the configuration, connected or an output.
     fn is_first(&self) -> bool {
         self.key.0 < Rank::Other
     }
 
     /// Whether this group has room for a variable of the group `other`.
-    fn takes(&self, other: &Self) -> bool {
+    fn has_room_for(&self, other: &Self) -> bool {
         let ratio = other.size.max(self.size) / other.size.min(self.size);
         (self.is_first(), self.key.1) == (other.is_first(), other.key.1)
             && self.is_flat == other.is_flat
@@ -52,7 +53,8 @@ impl Group {
     }
 }
 
-/// Groups the columns, and decides how many of the `rows` each plot has. `is_paired`: there is a second run.
+/// Groups the columns in the order in which they are shown, and decides how many of the `rows` each plot has.
+/// `is_paired`: there is a second run.
 pub(crate) fn groups(
     columns: &[Column],
     statistics: &[Statistics],
@@ -63,32 +65,32 @@ pub(crate) fn groups(
     let is_flat = |one: &Statistics| one.smallest.0 >= one.largest.0 && one.not_finite == 0;
     let mut groups: Vec<Group> = Vec::new();
     for (at, (column, statistics)) in columns.iter().zip(statistics).enumerate() {
-        let alone = Group {
-            key: (signals.ranks[at], signals.fmu[at]),
+        let single = Group {
+            key: (signals.ranks[at], signals.fmu_positions[at]),
             is_flat: is_flat(statistics),
             unit: column.unit.clone().unwrap_or_default(),
             members: vec![at],
             size: statistics.smallest.0.abs().max(statistics.largest.0.abs()),
             block: 1,
         };
-        match groups.iter_mut().find(|group| group.takes(&alone)) {
+        match groups.iter_mut().find(|group| group.has_room_for(&single)) {
             Some(group) => {
-                group.key = group.key.min(alone.key);
+                group.key = group.key.min(single.key);
                 group.members.push(at);
             }
-            None => groups.push(alone),
+            None => groups.push(single),
         }
     }
     groups.sort_by_key(|group| group.key);
     let runs = if is_paired { 2 } else { 1 };
     let flat = statistics.iter().filter(|one| is_flat(one)).count();
-    // Columns that do not vary need memory in the browser only.
+    // Columns that do not change are small in the file; they need memory in the browser only.
     let share = VALUES / (runs * (statistics.len() - flat) + flat / 32).max(1);
     if rows > share {
         for group in &mut groups {
             let has_gaps = group.members.iter().any(|at| statistics[*at].not_finite > 0);
-            let remaining = Collector::remaining(runs * group.members.len(), is_paired, has_gaps);
-            group.block = rows.div_ceil((share / remaining).max(BLOCKS)).max(2);
+            let max_rows = Collector::max_rows(runs * group.members.len(), is_paired, has_gaps);
+            group.block = rows.div_ceil((share / max_rows).max(BLOCKS)).max(2);
         }
     }
     groups
@@ -104,13 +106,13 @@ pub(crate) struct Plots {
     columns: Columns,
 }
 
-/// The rows of plots.
+/// The rows that one or more plots have.
 #[derive(Serialize, PartialEq, Eq)]
 struct Grid {
     /// Column of the times in s.
     time: usize,
     rows: usize,
-    /// The number of rows of which these are some.
+    /// The number of all rows, of which the plots may have only some.
     total: usize,
 }
 
@@ -139,9 +141,9 @@ struct Curve {
 }
 
 impl Plots {
-    /// Adds the plots of the groups. The samples of each have the columns of this run, then those of the other one;
-    /// `is_compared` says which variables the other one has. The first plots are not folded: of the variables that
-    /// are shown first, or of any if there are none of these.
+    /// Adds the plots of the groups. The samples of each have the columns of this run, then the columns of the other
+    /// one; `is_compared` says which variables the other one has. The first [`SHOWN`] plots are not folded, as far as
+    /// their groups are shown first, or if no group is.
     pub(crate) fn add_all(
         &mut self,
         groups: &[(&Group, &Samples)],
@@ -172,7 +174,7 @@ impl Plots {
             let other = samples.columns.get(count + place).filter(|_| other);
             Curve {
                 name: columns[*at].name.clone(),
-                holds: crate::holds(&columns[*at]),
+                holds: crate::is_held(&columns[*at]),
                 dots: false,
                 values: self.columns.add(&samples.columns[place]),
                 other: other.map(|values| self.columns.add(values)),
@@ -181,11 +183,12 @@ impl Plots {
         curves.collect()
     }
 
-    /// Adds the plots of the times between the frames of each message.
+    /// Adds the plots of the times between the frames of each message; the first of them is not folded if at most
+    /// [`SHOWN`] plots are before it.
     pub(crate) fn add_frames(&mut self, messages: &[Message]) {
         let share = VALUES / messages.len().max(1);
         for group in messages.chunks(CURVES) {
-            let samples = together(group, share);
+            let samples = merge_frames(group, share);
             let grid = self.grid(&samples);
             let curves = group.iter().zip(&samples.columns).map(|(message, values)| Curve {
                 name: message.name.clone(),
@@ -201,6 +204,7 @@ impl Plots {
         }
     }
 
+    /// Adds the times of the rows, unless there is an equal grid; returns the number of the grid.
     fn grid(&mut self, samples: &Samples) -> usize {
         let time = self.columns.add(&samples.time);
         let grid = Grid { time, rows: samples.time.len(), total: samples.total };
@@ -211,16 +215,17 @@ impl Plots {
     }
 }
 
-/// The frames of several messages in the order of their times: a row has the value of one message.
-fn together(messages: &[Message], share: usize) -> Samples {
+/// Returns the frames of several messages in the order of their times: each row has the value of one message and NaN
+/// for the others. Beyond `share` rows, only the extremes of blocks remain.
+fn merge_frames(messages: &[Message], share: usize) -> Samples {
     let frames = messages.iter().enumerate().flat_map(|(at, message)| {
         message.intervals.iter().map(move |(time, interval)| (*time, at, *interval))
     });
     let mut frames: Vec<_> = frames.collect();
     frames.sort_by(|one, other| one.0.total_cmp(&other.0));
     let block = if frames.len() > share {
-        let remaining = Collector::remaining(messages.len(), false, true);
-        frames.len().div_ceil((share / remaining).max(BLOCKS)).max(2)
+        let max_rows = Collector::max_rows(messages.len(), false, true);
+        frames.len().div_ceil((share / max_rows).max(BLOCKS)).max(2)
     } else {
         1
     };

@@ -1,4 +1,4 @@
-//! The rows of a plot: all of a short run; of a longer one those with the extremes of the curves.
+//! The rows of a plot: all rows of a short run, the rows with the extremes of the curves of a longer one.
 
 /// Rows of some columns.
 #[derive(Debug, Default)]
@@ -6,22 +6,25 @@ pub(crate) struct Samples {
     pub(crate) time: Vec<f64>,
     /// The values of each column, as many as there are times.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// The number of rows of which these are some.
+    /// The number of all rows, of which these may be only some.
     pub(crate) total: usize,
 }
 
 /// Collects the rows of a plot one by one.
 ///
-/// Of each block of neighbouring rows remain whole rows: those at which a column is lowest or highest, those at which
-/// the difference of a pair of columns is, and the first and the last one at which a column has no value. The first
-/// and the last row remain, too.
+/// Whole rows of each block of neighbouring rows remain: the rows at which a column, or the difference of a pair of
+/// columns, is lowest or highest, and the first and the last row at which it has no finite value. The first and the
+/// last row of all remain, too.
 pub(crate) struct Collector {
+    /// The rows that remain.
     samples: Samples,
+    /// The rows of the present block.
     block: Samples,
     /// Number of rows of a block; all rows remain if it is 1.
     length: usize,
     /// Whether the second half of the columns is subtracted from the first one.
     is_paired: bool,
+    /// Whether the present block is the last one.
     is_last: bool,
 }
 
@@ -31,8 +34,8 @@ impl Collector {
         Self { samples: empty(), block: empty(), length, is_paired, is_last: false }
     }
 
-    /// The largest number of rows that remain of a block, but for the first and the last one of all.
-    pub(crate) fn remaining(columns: usize, is_paired: bool, has_gaps: bool) -> usize {
+    /// Returns the largest number of rows that remain of a block, not counting the first and the last row of all.
+    pub(crate) fn max_rows(columns: usize, is_paired: bool, has_gaps: bool) -> usize {
         let curves = if is_paired { columns + columns / 2 } else { columns };
         curves * if has_gaps { 4 } else { 2 }
     }
@@ -53,14 +56,12 @@ impl Collector {
         self.samples
     }
 
-    /// Moves rows of the block to the samples.
+    /// Moves the rows that remain from the block to the samples, and empties the block.
     fn reduce(&mut self) {
         let rows = self.block.time.len();
-        let mut remains = vec![false; rows];
+        let mut marks = vec![false; rows];
         let mut mark = |row: Option<usize>| {
-            row.and_then(|row| remains.get_mut(row))
-                .into_iter()
-                .for_each(|remains| *remains = true);
+            row.and_then(|row| marks.get_mut(row)).into_iter().for_each(|mark| *mark = true);
         };
         if self.samples.time.is_empty() {
             mark(Some(0));
@@ -79,11 +80,7 @@ impl Collector {
             }
         }
         let move_rows = |from: &mut Vec<f64>, to: &mut Vec<f64>| {
-            to.extend(
-                from.drain(..)
-                    .zip(&remains)
-                    .filter_map(|(value, remains)| remains.then_some(value)),
-            );
+            to.extend(from.drain(..).zip(&marks).filter_map(|(value, mark)| mark.then_some(value)));
         };
         move_rows(&mut self.block.time, &mut self.samples.time);
         for (from, to) in self.block.columns.iter_mut().zip(&mut self.samples.columns) {
@@ -92,7 +89,8 @@ impl Collector {
     }
 }
 
-/// Returns the rows of the lowest and the highest value, and the first and the last row without a finite value.
+/// Returns the rows of the lowest and the highest finite value, and the first and the last row without a finite value,
+/// the last only if there are two; `None` for each that does not exist.
 fn extremes(values: impl Iterator<Item = f64> + Clone) -> [Option<usize>; 4] {
     let finite = || values.clone().enumerate().filter(|(_, value)| value.is_finite());
     let lowest = finite().min_by(|one, other| one.1.total_cmp(&other.1));

@@ -6,7 +6,7 @@ use results::{Column, Selection};
 
 use crate::{Connection, Run};
 
-/// Largest number of FMUs for which the column names of a file without a run are grouped.
+/// Largest number of FMUs that are taken from the names of the columns, for a file without a run.
 const NAMED: usize = 8;
 
 /// How soon a variable is shown.
@@ -22,12 +22,13 @@ pub(crate) enum Rank {
     Other,
 }
 
-/// The variables, by the position of their columns.
+/// The FMU and the rank of each variable, by the position of its column.
 pub(crate) struct Signals {
-    /// The names of the FMUs in the order of the system; an empty name for variables of none.
+    /// The names of the FMUs in the order of the system, then an empty name for variables of no FMU.
     pub(crate) fmus: Vec<String>,
-    /// The position of each variable's FMU.
-    pub(crate) fmu: Vec<usize>,
+    /// The position of each variable's FMU in `fmus`.
+    pub(crate) fmu_positions: Vec<usize>,
+    /// The rank of each variable; [`Rank::Other`] for all if the run is not known.
     pub(crate) ranks: Vec<Rank>,
 }
 
@@ -39,12 +40,12 @@ impl Signals {
             |run| run.fmus.iter().map(|fmu| fmu.name.clone()).collect(),
         );
         fmus.push(String::new());
-        let fmu = names.iter().map(|name| position(&fmus, name)).collect();
+        let fmu_positions = names.iter().map(|name| position(&fmus, name)).collect();
         let ranks = match run {
             Some(run) => ranks(&names, run),
             None => vec![Rank::Other; names.len()],
         };
-        Self { fmus, fmu, ranks }
+        Self { fmus, fmu_positions, ranks }
     }
 }
 
@@ -65,10 +66,11 @@ fn first_parts(names: &[&str]) -> Vec<String> {
 /// Returns the position of the FMU with the longest name that `name` starts with; the last position if there is none.
 fn position(fmus: &[String], name: &str) -> usize {
     let is_of = |fmu: &str| name.strip_prefix(fmu).is_some_and(|rest| rest.starts_with('.'));
-    let fits = fmus.iter().enumerate().filter(|(_, fmu)| !fmu.is_empty() && is_of(fmu));
-    fits.max_by_key(|(_, fmu)| fmu.len()).map_or(fmus.len() - 1, |(at, _)| at)
+    let matching = fmus.iter().enumerate().filter(|(_, fmu)| !fmu.is_empty() && is_of(fmu));
+    matching.max_by_key(|(_, fmu)| fmu.len()).map_or(fmus.len() - 1, |(at, _)| at)
 }
 
+/// Returns the ranks of the variables; patterns of plots that match nothing have no effect.
 fn ranks(names: &[&str], run: &Run) -> Vec<Rank> {
     let selection = Selection { include: run.plotted.clone(), exclude: Vec::new() };
     let chosen = if run.plotted.is_empty() { Ok(Vec::new()) } else { selection.choose(names) };

@@ -3,29 +3,29 @@
 use results::Column;
 
 /// Statistics of a variable. Values that are not finite are counted and otherwise left out; without any
-/// finite value all figures are NaN.
+/// finite value, `first` to `rms` are NaN.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// The first value.
+    /// The first finite value.
     pub first: f64,
-    /// The last value.
+    /// The last finite value.
     pub last: f64,
-    /// The smallest value, and its time in s.
+    /// The smallest value, and the first time in s at which the variable has it.
     pub smallest: (f64, f64),
-    /// The largest value, and its time in s.
+    /// The largest value, and the first time in s at which the variable has it.
     pub largest: (f64, f64),
     /// The mean over [`Statistics::basis`].
     pub mean: f64,
     /// The root of the mean of the square over [`Statistics::basis`].
     pub rms: f64,
-    /// What mean and rms are over.
+    /// The quantity over which mean and rms are taken.
     pub basis: Basis,
-    /// The number of rows without a finite value.
+    /// The number of rows without a finite value or a finite time.
     pub not_finite: u64,
 }
 
-/// What a mean is over.
+/// The quantity over which a mean is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Basis {
     /// Time, of this length in s: the integral by the trapezoidal rule (held values for integers and Booleans),
@@ -47,7 +47,7 @@ pub(crate) fn root(square: f64, scaled_square: f64) -> f64 {
 pub(crate) struct Builder {
     statistics: Statistics,
     /// Whether the variable keeps its value between two rows.
-    holds: bool,
+    is_held: bool,
     /// Time and value of the last finite row.
     before: Option<(f64, f64)>,
     /// Time in s between the first and the last finite row.
@@ -73,9 +73,9 @@ impl Builder {
             basis: Basis::Values(0),
             not_finite: 0,
         };
-        let holds = crate::holds(column);
+        let is_held = crate::is_held(column);
         let (integrals, sums) = ([0.0; 3], [0.0; 3]);
-        Self { statistics, holds, before: None, length: 0.0, integrals, count: 0, sums }
+        Self { statistics, is_held, before: None, length: 0.0, integrals, count: 0, sums }
     }
 
     pub(crate) fn push(&mut self, time: f64, value: f64) {
@@ -100,7 +100,7 @@ impl Builder {
         if let Some((at, old)) = self.before {
             let (step, starts) = ((time - at).max(0.0), with_squares(old));
             self.length += step;
-            let ends = if self.holds { starts } else { powers };
+            let ends = if self.is_held { starts } else { powers };
             for ((integral, start), end) in self.integrals.iter_mut().zip(starts).zip(ends) {
                 *integral += step * (0.5 * start + 0.5 * end);
             }
