@@ -10,7 +10,7 @@ use study::{Config, LoadedConfig};
 use crate::error;
 use crate::node::Node;
 
-/// Name of the file from which a configuration without a file seems to come, for its folder.
+/// Name of the file that a configuration given as text or dicts has in `folder`: its relative paths start there.
 const NAME: &str = "system.toml";
 
 /// Reads the `system.toml` at `path`; returns its content with absolute paths.
@@ -44,7 +44,8 @@ pub(crate) fn parse_toml<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py
     node.map_err(|error| invalid(error.message()).raise(py))?.to_python(py)
 }
 
-/// Reads a configuration given as text or as nested dicts.
+/// Reads a configuration given as text or as nested dicts. Relative paths start in `folder`. A `ConfigurationError`
+/// names the table and the text of a wrong entry.
 pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Config> {
     let py = description.py();
     let text = match description.extract::<String>() {
@@ -75,7 +76,9 @@ fn plain(py: Python<'_>, mut config: Config) -> PyResult<Bound<'_, PyAny>> {
     node.to_python(py)
 }
 
-/// Replaces the entries of `base` that `changes` states; adds settings and scenario entries.
+/// Replaces the entries of `base` that `changes` states, also settings of the same name and entries of
+/// `algorithm.every`; adds further ones, and all entries of the scenario. Covers the entries that a run may change, not
+/// the system itself.
 pub(crate) fn merge(base: &mut Config, changes: Config) {
     for (name, value, place) in changes.settings.0 {
         base.settings.0.retain(|(known, _, _)| *known != name);
@@ -107,12 +110,14 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     }
 }
 
+/// Replaces the value if there is a new one.
 fn set<T>(value: &mut Option<T>, new: Option<T>) {
     if new.is_some() {
         *value = new;
     }
 }
 
+/// Replaces the list if the new one is not empty.
 fn replace<T>(list: &mut Vec<T>, new: Vec<T>) {
     if !new.is_empty() {
         *list = new;

@@ -11,7 +11,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use crate::error::{self, Exception};
 use crate::guard::guarded;
 
-/// Most elements of an array whose start values are listed.
+/// Largest number of elements of an array whose start values are listed; a larger array has `None`.
 const ELEMENTS: usize = 1_000_000;
 
 /// Reads the model description of an FMU, an archive or a folder.
@@ -28,7 +28,8 @@ pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<
     Ok(described)
 }
 
-/// Returns the path of an FMU with a library for this platform, built if it has source code only.
+/// Returns the path of an FMU with a library for this platform: the FMU at `path`, or one that is built from it if it
+/// has source code only.
 #[pyfunction]
 pub(crate) fn compile(py: Python<'_>, path: PathBuf) -> PyResult<PathBuf> {
     let compiled = guarded(py, || fmu_import::compile(&path))?;
@@ -66,14 +67,14 @@ fn describe<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<'py,
     default.set_item("step_size", experiment.step_size)?;
     description.set_item("default_experiment", default)?;
     let variables = PyList::empty(py);
-    for own_variable in &fmu.variables {
-        variables.append(variable(py, own_variable, fmu)?)?;
+    for declared in &fmu.variables {
+        variables.append(variable(py, declared, fmu)?)?;
     }
     description.set_item("variables", variables)?;
     Ok(description)
 }
 
-/// Returns the capability flags of co-simulation, by the names of FMI 2.0.
+/// Returns the capability flags of co-simulation, by the names of FMI 2.0; none without co-simulation.
 fn capabilities<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
     let capabilities = PyDict::new(py);
     if let Some(flags) = &fmu.co_simulation {
@@ -98,24 +99,24 @@ fn capabilities<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<
     Ok(capabilities)
 }
 
-/// Returns a variable as a dict.
+/// Returns a variable of `description` as a dict.
 pub(crate) fn variable(
     py: Python<'_>,
     declared: &ScalarVariable,
-    of: &ModelDescription,
+    description: &ModelDescription,
 ) -> PyResult<Py<PyDict>> {
     let variable = PyDict::new(py);
     variable.set_item("name", &declared.name)?;
     variable.set_item("value_reference", declared.value_reference)?;
-    variable.set_item("type", declared.kind.element_in(of.version()))?;
+    variable.set_item("type", declared.kind.element_in(description.version()))?;
     variable.set_item("causality", declared.causality.as_str())?;
     variable.set_item("variability", declared.variability.as_str())?;
     variable
         .set_item("initial", declared.initial_in_force().map(fmu_description::Initial::as_str))?;
     variable.set_item("description", &declared.description)?;
     variable.set_item("declared_type", declared.kind.declared_type())?;
-    variable.set_item("shape", declared.extents(of))?;
-    variable.set_item("start", start(py, declared, of)?)?;
+    variable.set_item("shape", declared.extents(description))?;
+    variable.set_item("start", start(py, declared, description)?)?;
     let real = declared.kind.as_real();
     variable.set_item("unit", real.and_then(|real| real.unit.as_ref()))?;
     variable.set_item("nominal", real.and_then(|real| real.nominal))?;
@@ -132,13 +133,14 @@ pub(crate) fn variable(
     Ok(variable.unbind())
 }
 
-/// Returns the start value, for an array the list of its elements in row-major order.
+/// Returns the start value, for an array the list of its elements in row-major order; `None` without a start value and
+/// beyond [`ELEMENTS`].
 fn start<'py>(
     py: Python<'py>,
     declared: &ScalarVariable,
-    of: &ModelDescription,
+    description: &ModelDescription,
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
-    let Some(elements) = declared.start_values(of, ELEMENTS) else { return Ok(None) };
+    let Some(elements) = declared.start_values(description, ELEMENTS) else { return Ok(None) };
     let list = match elements {
         Elements::Real(values) => PyList::new(py, values)?,
         Elements::Integer(values) => PyList::new(py, values)?,

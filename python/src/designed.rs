@@ -20,8 +20,8 @@ pub(crate) struct Designed {
     design: Mutex<design::Design>,
 }
 
-/// Calls `work` without the interpreter; raises its error.
-fn designing<T: Send>(
+/// Calls `work` without the interpreter; raises its error as a `DesignError`.
+fn detached<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, design::Error> + Send,
 ) -> PyResult<T> {
@@ -31,7 +31,7 @@ fn designing<T: Send>(
 /// Designs the controller of the plant file at `path`.
 #[pyfunction]
 pub(crate) fn design_file(py: Python<'_>, path: PathBuf) -> PyResult<Designed> {
-    let design = designing(py, || design::design(&path))?;
+    let design = detached(py, || design::design(&path))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
@@ -44,12 +44,12 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
         Ok(text) => text,
         Err(_) => Node::from_python(plant)?.render()?,
     };
-    let design = designing(py, || design::design_text(&path, text))?;
+    let design = detached(py, || design::design_text(&path, text))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
-/// What is written for logs: the text of a plant file, why it has no controller, warnings.
-type Identified = (String, Option<String>, Vec<String>);
+/// The result of an identification: the text of a plant file, the reason why it has no controller, if so, and warnings.
+type Identification = (String, Option<String>, Vec<String>);
 
 /// Identifies a plant from the logs at `paths`.
 #[pyfunction]
@@ -59,11 +59,11 @@ pub(crate) fn identify(
     inputs: Vec<String>,
     outputs: Vec<String>,
     order: Option<usize>,
-) -> PyResult<Identified> {
+) -> PyResult<Identification> {
     let options = LogOptions { inputs, outputs, order };
     let limits = TimeLimits::default();
     let path = Path::new("plant.toml");
-    let new = designing(py, || new_plant_file(&paths, &options, path, &limits))?;
+    let new = detached(py, || new_plant_file(&paths, &options, path, &limits))?;
     Ok((new.text, new.refusal, new.warnings))
 }
 
@@ -74,6 +74,7 @@ type Rows = Vec<Vec<f64>>;
 type SourceFiles = (Vec<(PathBuf, String)>, Vec<String>);
 
 impl Designed {
+    /// Calls `work` with the design, which no other thread uses meanwhile.
     fn with<T>(&self, work: impl FnOnce(&mut design::Design) -> T) -> T {
         work(&mut self.design.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -105,7 +106,8 @@ impl Designed {
         text.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// A, B, C, D of a system of the loop, and the sample time of a sampled one.
+    /// A, B, C, D of a system of the loop, and its sample time in s, `None` in continuous time. `ValueError` for an
+    /// unknown name.
     fn system(&self, name: &str) -> PyResult<([Rows; 4], Option<f64>)> {
         let system = self.with(|design| {
             let whole = &design.closed_loop;
@@ -142,24 +144,24 @@ impl Designed {
     fn code(&self, py: Python<'_>, rust: bool, single: bool) -> PyResult<SourceFiles> {
         let language = if rust { design::Language::Rust } else { design::Language::C };
         let precision = if single { design::Precision::Single } else { design::Precision::Double };
-        let code = designing(py, || self.with(|design| design.code(language, precision)))?;
+        let code = detached(py, || self.with(|design| design.code(language, precision)))?;
         Ok((code.files, code.warnings))
     }
 
-    /// Makes the Kalman filter with the plant's FMU from the packed filter at `base`.
+    /// Writes the Kalman filter with the plant's FMU to `path`, from the packed filter at `base`.
     fn kalman_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        designing(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
+        detached(py, || self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page())))
     }
 
-    /// Makes the controller for the estimates of that filter from the packed controller at `base`.
+    /// Writes the controller for the estimates of that filter to `path`, from the packed controller at `base`.
     fn feedback_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        designing(py, || {
+        detached(py, || {
             self.with(|design| design.feedback_fmu(&base)?.write(&path, &design.page()))
         })
     }
 
-    /// Makes the controller FMU from the packed controller at `base`.
+    /// Writes the controller FMU to `path`, from the packed controller at `base`.
     fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        designing(py, || self.with(|design| design.fmu(&base)?.write(&path, &design.page())))
+        detached(py, || self.with(|design| design.fmu(&base)?.write(&path, &design.page())))
     }
 }

@@ -43,8 +43,8 @@ impl Exception {
         self
     }
 
-    /// Adds the time reached in s, if the error has no time of its own.
-    pub(crate) fn reached(self, time: f64) -> Self {
+    /// Adds the time reached in s, unless the exception states a time already.
+    pub(crate) fn with_time(self, time: f64) -> Self {
         if self.fields.iter().any(|(name, _)| *name == "time") {
             self
         } else {
@@ -52,7 +52,7 @@ impl Exception {
         }
     }
 
-    /// Raises the exception.
+    /// Returns the exception as an error of Python, or the error that prevents this.
     pub(crate) fn raise(self, py: Python<'_>) -> PyErr {
         self.object(py).map_or_else(|error| error, PyErr::from_value)
     }
@@ -158,7 +158,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             named("Value", name).text("value", value).text("expected", expected)
         }
         E::Setting { name, value, source } => {
-            called(named("Setting", name).text("value", value), source)
+            with_call(named("Setting", name).text("value", value), source)
         }
         E::NotSettable { name, value, .. } => named("NotSettable", name).text("value", value),
         E::LostSetting { name, value, actual } => {
@@ -174,7 +174,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             named("Resume", name).text("taken", saved).text("given", requested)
         }
         E::Call { slave, time, source } => {
-            called(failed("Call").text("fmu", slave).number("time", *time), source)
+            with_call(failed("Call").text("fmu", slave).number("time", *time), source)
         }
         E::NotFinite { name, value, time } => {
             failed("NotFinite").text("name", name).number("value", *value).number("time", *time)
@@ -192,7 +192,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
 }
 
 /// Adds function, status and messages of a failed call.
-fn called(error: Exception, call: &CallError) -> Exception {
+fn with_call(error: Exception, call: &CallError) -> Exception {
     let status = match &call.failure {
         Failure::Status(status) => status.name(),
         Failure::UnknownStatus(_) => "unknown status",

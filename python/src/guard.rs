@@ -11,8 +11,8 @@ use crate::python_slave::Raised;
 
 /// Calls `work` without the interpreter. A panic becomes an exception.
 pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let done = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
-    done.map_err(|panic| {
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
+    result.map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
         let sentence = format!("aso_ftc failed by an internal error, please report it: {text}");
@@ -20,9 +20,9 @@ pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) 
     })
 }
 
-/// Raises the exception with that of a Python slave as its cause. What is no `Exception`, such as
-/// `KeyboardInterrupt`, is raised itself.
-pub(crate) fn caused(py: Python<'_>, exception: Exception, raised: &Raised) -> PyErr {
+/// Returns `exception` as an error of Python whose cause is the exception that a Python slave raised, if any. Returns
+/// the cause itself if it is no `Exception`, such as `KeyboardInterrupt`.
+pub(crate) fn with_cause(py: Python<'_>, exception: Exception, raised: &Raised) -> PyErr {
     let cause = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some(cause) = cause else { return exception.raise(py) };
     if !cause.is_instance_of::<PyException>(py) {

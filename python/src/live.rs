@@ -6,8 +6,8 @@ use std::time::Duration;
 use live::{Action, Facts, Phase, Sample, Subject, Variable, View};
 use pyo3::prelude::*;
 
-/// Time in which an open page can see the end of the campaign.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time for which the page remains after the end of the campaign, so that an open page can show the end.
+const CLOSE_DELAY: Duration = Duration::from_secs(2);
 
 /// A page on this machine that shows the runs of a campaign.
 #[pyclass(frozen)]
@@ -18,6 +18,7 @@ pub(crate) struct LiveView {
 }
 
 impl LiveView {
+    /// Calls `act` with the view, unless it has ended.
     fn with(&self, act: impl FnOnce(&View)) {
         if let Some(view) = &*self.view.lock().unwrap_or_else(PoisonError::into_inner) {
             act(view);
@@ -50,8 +51,8 @@ impl LiveView {
         &self.address
     }
 
-    /// Publishes a run: its measures, its status with a line on it, the number of finished runs with this
-    /// one, and the time in s so far.
+    /// Publishes a finished run: the number of finished runs including this one, the time of the campaign so far in s,
+    /// the measures, and a line of text with its status.
     fn publish(&self, finished: f64, seconds: f64, measures: Vec<f64>, status: &str, line: String) {
         self.with(|view| {
             let values = measures;
@@ -60,8 +61,8 @@ impl LiveView {
         });
     }
 
-    /// Answers the requests of the page. Returns whether the campaign is to be held, which it is now if
-    /// `held`, and whether it is to be stopped.
+    /// Answers the requests of the page. `held` says whether the campaign is paused now; returns whether it is to be
+    /// paused from now on, and whether it is to be stopped.
     fn attend(&self, mut held: bool) -> (bool, bool) {
         let mut stopped = false;
         self.with(|view| {
@@ -97,7 +98,7 @@ impl LiveView {
     fn end(&self, py: Python<'_>, outcome: &str) {
         let view = self.view.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(view) = view {
-            py.detach(|| view.end(outcome, PATIENCE));
+            py.detach(|| view.end(outcome, CLOSE_DELAY));
         }
     }
 }

@@ -19,10 +19,12 @@ use tracing::{Event, Level, Metadata, Subscriber};
 const MODULE: &str = "aso_ftc._logging";
 /// `target` of the messages of FMUs.
 const FMU: &str = "fmu";
-/// Most messages that wait at the same time; further ones are counted only.
+/// Largest number of messages that wait at the same time; further ones are counted only.
 const WAITING: usize = 10_000;
 
+/// The messages that wait.
 static MESSAGES: Mutex<Vec<Message>> = Mutex::new(Vec::new());
+/// Number of messages that were dropped.
 static LOST: AtomicU64 = AtomicU64::new(0);
 /// The lowest level of `logging` that is passed on.
 static LEAST: AtomicU8 = AtomicU8::new(30);
@@ -37,16 +39,16 @@ struct Message {
 }
 
 thread_local! {
-    /// Whether the messages of this thread are left out.
+    /// Whether the messages of this thread are dropped.
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Calls `work`, without the messages of this thread if `quiet`.
 pub(crate) fn quietly<T>(quiet: bool, work: impl FnOnce() -> T) -> T {
     let before = QUIET.replace(quiet);
-    let done = catch_unwind(AssertUnwindSafe(work));
+    let result = catch_unwind(AssertUnwindSafe(work));
     QUIET.set(before);
-    done.unwrap_or_else(|panic| resume_unwind(panic))
+    result.unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// Starts to collect messages.
@@ -55,7 +57,7 @@ pub(crate) fn start() {
     let _ = tracing::subscriber::set_global_default(Collector);
 }
 
-/// Reads from Python's `logging` which levels are passed on.
+/// Reads from Python's `logging` the lowest level that is passed on; keeps the former one if this fails.
 pub(crate) fn adopt_level(py: Python<'_>) {
     let level = || py.import(MODULE)?.call_method0("level")?.extract::<u32>();
     if let Ok(level) = level() {
@@ -72,7 +74,7 @@ pub(crate) fn is_debugging() -> bool {
 ///
 /// # Errors
 ///
-/// The exception of a handler.
+/// The exception of a handler; the messages after this one are dropped.
 pub(crate) fn pass_on(py: Python<'_>) -> PyResult<()> {
     let messages = {
         let mut waiting = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
@@ -97,7 +99,7 @@ struct Collector;
 
 impl Subscriber for Collector {
     fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
-        // Python may change the level at any time.
+        // Not cached: Python may change the level at any time.
         Interest::sometimes()
     }
 
@@ -134,7 +136,7 @@ impl Subscriber for Collector {
     fn exit(&self, _: &Id) {}
 }
 
-/// Returns the level of `logging`.
+/// Returns the number of a level in Python's `logging`.
 fn level(level: Level) -> u8 {
     match level {
         Level::ERROR => 40,

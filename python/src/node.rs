@@ -10,7 +10,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toml::Spanned;
 
-/// Greatest depth of nested values.
+/// Largest depth of nested values.
 const DEPTH: usize = 32;
 
 /// A value of TOML.
@@ -104,12 +104,18 @@ impl Node {
         toml::to_string(self).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Converts a Python object: dict, list, tuple, number, bool, str, path, and objects of `NumPy`. An
-    /// entry of a dict that is `None` counts as absent.
+    /// Converts a Python object: a mapping, a list or another iterable, a number, bool, str, path, or an object of
+    /// `NumPy`. An entry of a dict that is `None` counts as absent.
+    ///
+    /// # Errors
+    ///
+    /// `TypeError` for any other object and for a key that is no str, `ValueError` for an integer beyond 64 bits and
+    /// for more than [`DEPTH`] nested values; the message states the place of the value.
     pub(crate) fn from_python(value: &Bound<'_, PyAny>) -> PyResult<Self> {
         convert(value, "", 0)
     }
 
+    /// Converts the value to bool, int, float, str, list or dict of Python.
     pub(crate) fn to_python<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::Boolean(value) => value.into_bound_py_any(py),

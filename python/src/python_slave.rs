@@ -24,15 +24,22 @@ pub(crate) struct PythonSlave {
     outputs: Vec<usize>,
     /// Values of all variables; a Boolean is 0 or 1.
     values: Vec<f64>,
+    /// Start time in s.
     start: f64,
     raised: Raised,
+    /// For each slot, the values and the state of the object.
     saved: Vec<Option<(Vec<f64>, Py<PyAny>)>>,
 }
 
 impl PythonSlave {
-    /// Describes `object` by its attributes `inputs` and `outputs`: names, or a mapping of names to start
-    /// values (`float`, `int` or `bool`, also of `NumPy`). The attribute `direct` (default true) says whether outputs
-    /// depend on the inputs of the same time.
+    /// Describes `object` by its attributes `inputs` and `outputs`: names, or a mapping of names to start values
+    /// (`float`, `int` or `bool`, also of `NumPy`); without start values all are `float` and 0. The attribute `direct`
+    /// (default true) says whether outputs depend on the inputs of the same time. With functions `save` and `restore`
+    /// the slave can save its state.
+    ///
+    /// # Errors
+    ///
+    /// `TypeError` if the object has no function `step` or a start value is no number; an exception of the object.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;
@@ -44,7 +51,7 @@ impl PythonSlave {
         let mut values = Vec::new();
         for (attribute, causality) in [("inputs", Causality::Input), ("outputs", Causality::Output)]
         {
-            for (name, start) in declared(object, attribute)? {
+            for (name, start) in declarations(object, attribute)? {
                 let reference = u32::try_from(variables.len()).unwrap_or(u32::MAX);
                 values.push(start.number());
                 variables.push(variable(name, reference, causality, start));
@@ -62,9 +69,9 @@ impl PythonSlave {
             Some(direct) => direct.is_truthy()?,
             None => true,
         };
-        let state = object.hasattr("save")? && object.hasattr("restore")?;
+        let can_save = object.hasattr("save")? && object.hasattr("restore")?;
         let structure = structure(&inputs, &outputs, direct);
-        let description = describe(name, variables, structure, state);
+        let description = describe(name, variables, structure, can_save);
         let object = object.clone().unbind();
         let (start, saved) = (0.0, Vec::new());
         Ok(Self { object, description, inputs, outputs, values, start, raised, saved })
@@ -87,6 +94,7 @@ impl PythonSlave {
         })
     }
 
+    /// Returns the values of the inputs by name, in their types.
     fn input_values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inputs = PyDict::new(py);
         for &position in &self.inputs {
@@ -96,8 +104,9 @@ impl PythonSlave {
         Ok(inputs)
     }
 
-    /// Takes over the outputs that a call returned; `None` keeps all of them.
-    fn take(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
+    /// Returns position and value of each output in the answer of a call, none for `None`. A name that is no output is
+    /// an error.
+    fn read_outputs(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
         if answer.is_none() {
             return Ok(Vec::new());
         }
@@ -109,8 +118,8 @@ impl PythonSlave {
         let mut outputs = Vec::new();
         for item in answer.items()?.iter() {
             let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
-            let named = |position: &&usize| self.description.variables[**position].name == name;
-            let Some(&position) = self.outputs.iter().find(named) else {
+            let has_name = |position: &&usize| self.description.variables[**position].name == name;
+            let Some(&position) = self.outputs.iter().find(has_name) else {
                 let name_of =
                     |position: &usize| self.description.variables[*position].name.as_str();
                 let known: Vec<_> = self.outputs.iter().map(name_of).collect();
@@ -122,12 +131,14 @@ impl PythonSlave {
         Ok(outputs)
     }
 
+    /// Sets the values at these positions.
     fn store(&mut self, outputs: Vec<(usize, f64)>) {
         for (position, value) in outputs {
             self.values[position] = value;
         }
     }
 
+    /// Reads values, converted; NaN stands for an unknown reference.
     fn read<T>(&self, references: &[u32], values: &mut [T], convert: impl Fn(f64) -> T) {
         for (reference, value) in references.iter().zip(values) {
             let known = usize::try_from(*reference).ok().and_then(|k| self.values.get(k));
@@ -135,6 +146,7 @@ impl PythonSlave {
         }
     }
 
+    /// Writes values; an unknown reference is ignored.
     fn write(&mut self, references: &[u32], values: impl Iterator<Item = f64>) {
         for (reference, value) in references.iter().zip(values) {
             let place = usize::try_from(*reference).ok().and_then(|k| self.values.get_mut(k));
@@ -160,7 +172,7 @@ impl Slave for PythonSlave {
         let outputs = self.call("start", |object| match object.getattr_opt("start")? {
             Some(function) => {
                 let inputs = self.input_values(object.py())?;
-                self.take(&function.call1((start, inputs))?)
+                self.read_outputs(&function.call1((start, inputs))?)
             }
             None => Ok(Vec::new()),
         })?;
@@ -209,7 +221,7 @@ impl Slave for PythonSlave {
     fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         let outputs = self.call("step", |object| {
             let inputs = self.input_values(object.py())?;
-            self.take(&object.call_method1("step", (time, size, inputs))?)
+            self.read_outputs(&object.call_method1("step", (time, size, inputs))?)
         })?;
         self.store(outputs);
         Ok(StepResult::Whole)
@@ -270,8 +282,8 @@ impl Start {
     }
 }
 
-/// Returns the variables that an attribute of the object declares.
-fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
+/// Returns the variables that an attribute of the object declares; none if the object lacks the attribute.
+fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
     let Some(declaration) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
     if let Ok(mapping) = declaration.cast::<PyMapping>() {
         let items = mapping.items()?;
@@ -323,9 +335,12 @@ fn variable(name: String, reference: u32, causality: Causality, start: Start) ->
 
 fn structure(inputs: &[usize], outputs: &[usize], direct: bool) -> ModelStructure {
     let index = |position: &usize| u32::try_from(position + 1).unwrap_or(u32::MAX);
-    let on: Vec<_> = if direct { inputs.iter().map(index).collect() } else { Vec::new() };
-    let unknown =
-        |output| Unknown { index: index(output), dependencies: Some(on.clone()), kinds: None };
+    let dependencies: Vec<_> = if direct { inputs.iter().map(index).collect() } else { Vec::new() };
+    let unknown = |output| Unknown {
+        index: index(output),
+        dependencies: Some(dependencies.clone()),
+        kinds: None,
+    };
     let outputs = outputs.iter().map(unknown).collect();
     ModelStructure { outputs, ..ModelStructure::default() }
 }
@@ -334,7 +349,7 @@ fn describe(
     name: &str,
     variables: Vec<ScalarVariable>,
     structure: ModelStructure,
-    state: bool,
+    can_save: bool,
 ) -> ModelDescription {
     ModelDescription {
         fmi_version: "2.0".to_owned(),
@@ -343,8 +358,8 @@ fn describe(
         co_simulation: Some(CoSimulation {
             model_identifier: name.to_owned(),
             can_handle_variable_communication_step_size: true,
-            can_get_and_set_fmu_state: state,
-            can_serialize_fmu_state: state,
+            can_get_and_set_fmu_state: can_save,
+            can_serialize_fmu_state: can_save,
             ..CoSimulation::default()
         }),
         variables,

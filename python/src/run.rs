@@ -17,7 +17,7 @@ use study::{AssemblyOptions, Config, LoadedConfig, PreparedRun, Run, RunEnd, Sto
 
 use crate::configuration::{merge, read};
 use crate::error::{self, Exception};
-use crate::guard::{caused, guarded};
+use crate::guard::{guarded, with_cause};
 use crate::logging;
 use crate::python_slave::{PythonSlave, Raised};
 use crate::stepper::Stepper;
@@ -33,7 +33,7 @@ static WORKER: OnceLock<PathBuf> = OnceLock::new();
 /// Sets the program that becomes the separate process of an FMU.
 #[pyfunction]
 pub(crate) fn set_worker(path: PathBuf) {
-    // The first call counts: the program does not change while the package is imported.
+    // Only the first call has an effect: the program does not change while the package is imported.
     let _ = WORKER.set(path);
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn clear(py: Python<'_>) {
     }
 }
 
-/// The number of FMUs that are open.
+/// Returns the number of FMUs that are open.
 #[pyfunction]
 pub(crate) fn open_fmus(py: Python<'_>) -> usize {
     py.detach(|| STORE.0.len())
@@ -80,8 +80,8 @@ impl Study {
         Ok(Self { config, folder, slaves })
     }
 
-    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables. `quiet`: without
-    /// messages, which the run of the same configuration repeats.
+    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables as dicts. `quiet`
+    /// drops the messages, which a run of the same configuration repeats.
     #[pyo3(signature = (changes, *, quiet = false))]
     fn check(
         &self,
@@ -90,7 +90,7 @@ impl Study {
         quiet: bool,
     ) -> PyResult<Vec<Py<PyDict>>> {
         logging::adopt_level(py);
-        let (loaded, (slaves, _)) = (self.loaded(changes)?, self.slaves(py)?);
+        let (loaded, (slaves, _)) = (self.with_changes(changes)?, self.slaves(py)?);
         let prepared = guarded(py, || logging::quietly(quiet, || prepare(loaded, slaves, &[])));
         logging::pass_on(py)?;
         let prepared = prepared?.map_err(|error| error::study(&error).raise(py))?;
@@ -105,7 +105,8 @@ impl Study {
         Ok(variables)
     }
 
-    /// Runs to the end. Returns the outcome, and the exception of a run that failed after its start.
+    /// Runs to the end. Returns the outcome, and the exception if the run failed or was ended after its start; an error
+    /// before the start is raised.
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     #[pyo3(signature = (changes, *, time_limit = None, cancel = None, progress = None, input = None, tables = None, prefix = None))]
     fn run(
@@ -120,15 +121,15 @@ impl Study {
         prefix: Option<&str>,
     ) -> PyResult<(Outcome, Option<Py<PyAny>>)> {
         logging::adopt_level(py);
-        let (loaded, (slaves, raised)) = (self.loaded(changes)?, self.slaves(py)?);
+        let (loaded, (slaves, raised)) = (self.with_changes(changes)?, self.slaves(py)?);
         let cancel = cancel.map(|cancel| cancel.get().flag.clone());
         let watch = Watch::new(py, time_limit, cancel, Progress::new(progress)?)?;
         let input = input.map(Input::new);
         let tables = tables.unwrap_or_default().iter().map(|table| self.table(table)).collect();
-        let ran = guarded(py, || run(loaded, slaves, watch, input, tables));
+        let result = guarded(py, || run(loaded, slaves, watch, input, tables));
         logging::pass_on(py)?;
-        let ran = ran?.map_err(|error| caused(py, error::study(&error), &raised))?;
-        let Ran { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = ran;
+        let run = result?.map_err(|error| with_cause(py, error::study(&error), &raised))?;
+        let EndedRun { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = run;
         let (recorded, binaries) = recorded;
         if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
             watch.finish(py);
@@ -149,7 +150,7 @@ impl Study {
             }
             (None, RunEnd::ByFmu(name)) => (name, None),
             (None, RunEnd::Failed(error)) => {
-                let error = caused(py, error::study(&error).reached(time), &raised);
+                let error = with_cause(py, error::study(&error).with_time(time), &raised);
                 ("failed".to_owned(), Some(error))
             }
             (None, RunEnd::AtStop | RunEnd::Interrupted) => ("stop time".to_owned(), None),
@@ -159,22 +160,22 @@ impl Study {
         Ok((outcome, exception.map(|error| error.into_value(py).into_any())))
     }
 
-    /// Initialises the FMUs for steps one by one.
+    /// Initialises the FMUs for steps one by one, without a results file and without checkpoints.
     fn simulation(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Stepper> {
         logging::adopt_level(py);
-        let (mut loaded, (slaves, raised)) = (self.loaded(changes)?, self.slaves(py)?);
+        let (mut loaded, (slaves, raised)) = (self.with_changes(changes)?, self.slaves(py)?);
         (loaded.config.results.file, loaded.config.checkpoint) =
             (None, CheckpointSettings::default());
         let started = guarded(py, || prepare(loaded, slaves, &[])?.start(None));
         logging::pass_on(py)?;
-        let run = started?.map_err(|error| caused(py, error::study(&error), &raised))?;
+        let run = started?.map_err(|error| with_cause(py, error::study(&error), &raised))?;
         Ok(Stepper::new(run, raised))
     }
 }
 
 impl Study {
     /// Returns the configuration of a run with these changes.
-    fn loaded(&self, changes: &Bound<'_, PyAny>) -> PyResult<LoadedConfig> {
+    fn with_changes(&self, changes: &Bound<'_, PyAny>) -> PyResult<LoadedConfig> {
         let mut config = self.config.clone();
         if changes.len()? > 0 {
             merge(&mut config, read(changes, &self.folder)?);
@@ -182,7 +183,7 @@ impl Study {
         Ok(LoadedConfig { config, source: None })
     }
 
-    /// Returns a table in memory with the path that its name has in the configuration.
+    /// Returns a table in memory, and the path by which the configuration refers to its name.
     fn table(&self, (name, times, values): &TableInMemory) -> (PathBuf, Signals) {
         let numbers = |bytes: &[u8]| -> Arc<[f64]> {
             bytes.as_chunks().0.iter().map(|bytes| f64::from_ne_bytes(*bytes)).collect()
@@ -191,6 +192,7 @@ impl Study {
         (self.folder.join(name), Signals { names: vec![name.clone()], times, columns })
     }
 
+    /// Returns the Python slaves of a run.
     fn slaves(&self, py: Python<'_>) -> PyResult<Slaves> {
         let raised = Raised::default();
         let mut slaves: Vec<(String, Box<dyn Slave>)> = Vec::new();
@@ -202,6 +204,7 @@ impl Study {
     }
 }
 
+/// Loads and connects the FMUs and the slaves.
 fn prepare(
     loaded: LoadedConfig,
     slaves: Vec<(String, Box<dyn Slave>)>,
@@ -211,7 +214,7 @@ fn prepare(
     if loaded.config.isolation.isolate != Some(true)
         && let Ok(here) = std::env::current_dir()
     {
-        // Without it, a crash is not explained.
+        // If this fails, only the explanation of a crash is missing.
         let _ = fmu_import::crash::leave_file(&here);
     }
     let worker = WORKER.get().map(PathBuf::as_path);
@@ -221,14 +224,19 @@ fn prepare(
 }
 
 /// A run that has ended.
-struct Ran {
+struct EndedRun {
     ended: RunEnd,
+    /// Time reached in s.
     time: f64,
+    /// Number of communication steps.
     steps: u64,
+    /// Wall-clock time of the steps in s.
     seconds: f64,
     /// The rows, and the names of the columns that hold values of the type Binary.
     recorded: (results::Columns, HashSet<String>),
+    /// The complete configuration as a `system.toml`.
     settings: String,
+    /// One sentence for each setting that was chosen.
     reasons: Vec<String>,
     watch: Watch,
 }
@@ -240,7 +248,7 @@ fn run(
     mut watch: Watch,
     mut input: Option<Input>,
     tables: Vec<(PathBuf, Signals)>,
-) -> Result<Ran, study::Error> {
+) -> Result<EndedRun, study::Error> {
     let prepared = prepare(loaded, slaves, &tables)?;
     let is_binary = |port: &&Port| matches!(prepared.system.variable(**port).kind, Kind::Binary(_));
     let binaries = prepared.ports.iter().filter(is_binary);
@@ -270,12 +278,13 @@ fn run(
     finished?;
     let recorded = (recorded.take(), binaries);
     let (steps, seconds) = (tally.steps, tally.seconds);
-    Ok(Ran { ended, time, steps, seconds, recorded, settings, reasons, watch })
+    Ok(EndedRun { ended, time, steps, seconds, recorded, settings, reasons, watch })
 }
 
 /// A function of time that returns values of inputs.
 struct Input {
     function: Py<PyAny>,
+    /// The inputs that were set so far, by name.
     ports: HashMap<String, Port>,
 }
 
@@ -312,7 +321,7 @@ impl Input {
 pub(crate) struct Outcome {
     /// The recorded columns.
     table: Py<Table>,
-    /// `stop time`, `time limit`, `cancelled`, `failed`, or the FMU that requested the end.
+    /// `stop time`, `time limit`, `cancelled`, `interrupted`, `failed`, or the name of the FMU that requested the end.
     end: String,
     /// Time reached in s.
     time: f64,
@@ -344,7 +353,7 @@ impl Outcome {
         Self { table, end, time, steps, seconds, settings, reasons }
     }
 
-    /// For pickle.
+    /// Returns the class and its arguments, for pickle.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,

@@ -11,7 +11,7 @@ use pyo3::types::{PyBytes, PyList};
 use study::Run;
 
 use crate::error;
-use crate::guard::{caused, guarded};
+use crate::guard::{guarded, with_cause};
 use crate::logging;
 use crate::python_slave::Raised;
 use crate::value;
@@ -46,20 +46,20 @@ impl Stepper {
         result
     }
 
-    /// Steps until `ended` holds for the number of steps so far and the time, or the run is finished;
-    /// returns the number of steps.
+    /// Steps until `is_done` holds for the number of steps so far and the time, or the run is finished; returns the
+    /// number of steps. An exception of a signal ends the steps, too.
     fn advance(
         &self,
         py: Python<'_>,
-        ended: impl Fn(u64, f64) -> bool + Send + Sync,
+        is_done: impl Fn(u64, f64) -> bool + Send + Sync,
     ) -> PyResult<u64> {
         let mut watch = Watch::new(py, None, None, Progress::None)?;
-        let stepped = guarded(py, || {
+        let steps = guarded(py, || {
             let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(run) = guard.as_mut() else { return Ok(None) };
             let simulation = &mut run.simulation;
             let mut steps = 0;
-            while !simulation.is_finished() && !ended(steps, simulation.time()) {
+            while !simulation.is_finished() && !is_done(steps, simulation.time()) {
                 simulation.step()?;
                 steps += 1;
                 if let ControlFlow::Break(()) = watch.after_step(simulation.time()) {
@@ -69,10 +69,10 @@ impl Stepper {
             Ok(Some(steps))
         });
         logging::pass_on(py)?;
-        let stepped = stepped?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        let steps = steps?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
         match watch.stop {
             Some(Stop::Raised(error)) => Err(error),
-            _ => stepped.ok_or_else(closed),
+            _ => steps.ok_or_else(closed),
         }
     }
 }
@@ -144,7 +144,7 @@ impl Stepper {
         })
     }
 
-    /// Reads a variable.
+    /// Reads a variable. `KeyError` for an unknown name.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         self.with(py, |run| {
             let time = run.simulation.time();
@@ -165,20 +165,20 @@ impl Stepper {
         })
     }
 
-    /// The state of all FMUs and connections as bytes.
+    /// Returns the state of all FMUs and connections as bytes.
     fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let saved = guarded(py, || {
             let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
             guard.as_mut().map(|run| run.simulation.checkpoint()).transpose()
         });
         logging::pass_on(py)?;
-        let saved = saved?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        let saved = saved?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
         let bytes = postcard::to_stdvec(&saved.ok_or_else(closed)?);
         let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Returns to a state of [`Stepper::save`].
+    /// Returns to a state that [`Stepper::save`] has returned. `ValueError` for other bytes.
     fn restore(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
         let checkpoint: Checkpoint = postcard::from_bytes(state).map_err(|_| {
             PyValueError::new_err("the bytes are no state that save() of this version has returned")
@@ -188,7 +188,8 @@ impl Stepper {
             guard.as_mut().map(|run| run.simulation.restore(&checkpoint)).transpose()
         });
         logging::pass_on(py)?;
-        let restored = restored?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        let restored =
+            restored?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
         restored.ok_or_else(closed)
     }
 
@@ -201,6 +202,6 @@ impl Stepper {
             terminated.and(run.simulation.free())
         });
         logging::pass_on(py)?;
-        ended?.map_err(|error| caused(py, error::system(&error), &self.raised))
+        ended?.map_err(|error| with_cause(py, error::system(&error), &self.raised))
     }
 }

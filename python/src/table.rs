@@ -30,8 +30,8 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Takes over the memory of the columns, without `prefix` in their names. Those in `binaries` were recorded as
-    /// hexadecimal digits and become bytes.
+    /// Takes over the memory of the columns. Their names lose `prefix`, unless `time` would remain. The columns named
+    /// in `binaries`, with prefix, were recorded as hexadecimal digits and become bytes.
     pub(crate) fn new(
         recorded: Columns,
         binaries: &HashSet<String>,
@@ -83,13 +83,13 @@ impl Table {
         bytes.map(|field| field.name().clone()).collect()
     }
 
-    /// Returns the columns as they were recorded.
+    /// Returns the columns with bytes as hexadecimal digits, as they were recorded, but without the prefix.
     fn recorded(&self) -> Columns {
         let arrays = self.batch.columns().iter().skip(1);
         let columns = self.columns.iter().skip(1).cloned();
         let clocked = columns.clone().zip(arrays.clone()).filter(|(column, _)| column.clocked);
-        let there = |array: &ArrayRef| (0..array.len()).map(|row| array.is_valid(row)).collect();
-        let present = clocked.map(|(_, array)| there(array)).collect();
+        let validity = |array: &ArrayRef| (0..array.len()).map(|row| array.is_valid(row)).collect();
+        let present = clocked.map(|(_, array)| validity(array)).collect();
         Columns {
             time: self.batch.column(0).as_primitive::<Float64Type>().values().to_vec(),
             columns: columns.zip(arrays.map(values)).collect(),
@@ -130,7 +130,7 @@ fn array(values: Values, nulls: Option<NullBuffer>) -> Result<ArrayRef, ArrowErr
     })
 }
 
-/// Decodes texts of hexadecimal digits.
+/// Decodes texts of hexadecimal digits; null for a null and for a text with other characters.
 fn bytes(texts: &results::Texts, nulls: Option<&NullBuffer>) -> ArrayRef {
     let rows = texts.offsets.len().saturating_sub(1);
     let value = |row| match nulls {
@@ -140,7 +140,7 @@ fn bytes(texts: &results::Texts, nulls: Option<&NullBuffer>) -> ArrayRef {
     Arc::new((0..rows).map(value).collect::<LargeBinaryArray>())
 }
 
-/// Returns the values of an array that [`array`] or [`bytes`] has made.
+/// Returns the values of an array that [`array`] or [`bytes`] returned; any value for a null.
 fn values(array: &ArrayRef) -> Values {
     match array.data_type() {
         DataType::Int32 => Values::Integer(array.as_primitive::<Int32Type>().values().to_vec()),
@@ -163,7 +163,7 @@ fn values(array: &ArrayRef) -> Values {
     }
 }
 
-/// Returns the numbers of an array with nulls as floating-point numbers, NaN for a null.
+/// Returns the integers of an array with nulls as floating-point numbers, NaN for a null; any other array unchanged.
 fn with_gaps(array: &ArrayRef) -> ArrayRef {
     #[expect(clippy::cast_precision_loss, reason = "as in pandas")]
     let numbers = match values(array) {
@@ -182,7 +182,7 @@ impl Table {
         self.columns.iter().map(|column| column.name.as_str()).collect()
     }
 
-    /// Units by name; `None` without unit.
+    /// Units by name of the column; `None` for a column without unit.
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let units = PyDict::new(py);
@@ -196,8 +196,8 @@ impl Table {
         self.batch.num_rows()
     }
 
-    /// The numbers of a column for `numpy.asarray`; `None` for texts and Booleans. Integers with gaps are floating-point
-    /// numbers with NaN in them, as in pandas.
+    /// The numbers of a column for `numpy.asarray`; `None` for texts, bytes, Booleans and an unknown name. Integers
+    /// with gaps become floating-point numbers with NaN, as in pandas.
     fn numbers(&self, name: &str) -> Option<Numbers> {
         let array = self.batch.column(self.position(name)?).clone();
         let is_number = array.data_type().is_primitive();
@@ -205,7 +205,7 @@ impl Table {
         is_number.then_some(Numbers { array })
     }
 
-    /// The values of a column as a list.
+    /// The values of a column as a list, with `None` in gaps; `None` for an unknown name.
     fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyList>>> {
         let Some(position) = self.position(name) else { return Ok(None) };
         let column = self.batch.column(position);
@@ -225,7 +225,8 @@ impl Table {
         }))
     }
 
-    /// The value of a column in a row; `None` for a clocked variable between its ticks.
+    /// The value of a column in a row; `None` for a clocked variable between its ticks. `ValueError` for an unknown
+    /// name or row.
     fn value<'py>(&self, py: Python<'py>, name: &str, row: usize) -> PyResult<Bound<'py, PyAny>> {
         let position = self.position(name).ok_or_else(|| PyValueError::new_err(name.to_owned()))?;
         if row >= self.batch.num_rows() {
@@ -275,7 +276,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // Another schema is optional for the producer; the caller converts.
+        // A producer may ignore the requested schema; the caller converts.
         let _ = requested_schema;
         let (batch, schema) = (self.batch.clone(), self.batch.schema());
         let reader = RecordBatchIterator::new([Ok(batch)], schema);
@@ -290,7 +291,7 @@ impl Table {
     }
 }
 
-/// The columns that [`Table::to_bytes`] has written.
+/// Returns the table from which [`Table::to_bytes`] returned `bytes`. `ValueError` for other bytes.
 #[pyfunction]
 pub(crate) fn table_from_bytes(bytes: &[u8]) -> PyResult<Table> {
     let recorded = postcard::from_bytes(bytes);
@@ -311,7 +312,7 @@ impl Numbers {
         self.array.len()
     }
 
-    /// Address, length and type of the numbers. `NumPy` keeps this object as long as its array.
+    /// Address, length and type of the numbers. `NumPy` keeps this object alive as long as its array.
     #[getter]
     fn __array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let endian = if cfg!(target_endian = "little") { '<' } else { '>' };

@@ -9,7 +9,7 @@ use slave::CallError;
 
 use crate::error::{self, Exception};
 
-/// Returns the port of an input without a connection or of a tunable parameter.
+/// Returns the port of an input without a connection or of a tunable parameter. Any other name is an error.
 pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
     let port = system.port(name).map_err(|error| error::system(&error))?;
     let variable = system.variable(port);
@@ -29,7 +29,8 @@ pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
     Err(Exception::new("ConfigurationError", "Role", sentence))
 }
 
-/// Sets a variable to a value of Python. `time` in s appears in the error.
+/// Sets a variable to a value of Python. An error of the FMU states `time` in s; a value of another type is a
+/// `ConfigurationError`.
 pub(crate) fn set(
     system: &mut System,
     port: Port,
@@ -53,12 +54,13 @@ pub(crate) fn set(
     system.set_value(port, &converted).map_err(|source| failed(py, system, port, time, source))
 }
 
+/// Returns the exception for a call of the FMU that failed.
 fn failed(py: Python<'_>, system: &System, port: Port, time: f64, source: CallError) -> PyErr {
     let slave = system.slaves[port.slave].0.clone();
     error::system(&SystemError::Call { slave, time, source }).raise(py)
 }
 
-/// Reads a variable. `time` in s appears in the error.
+/// Reads a variable. An error of the FMU states `time` in s.
 pub(crate) fn get<'py>(
     py: Python<'py>,
     system: &mut System,

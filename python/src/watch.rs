@@ -1,4 +1,4 @@
-//! What happens beside the steps of a run: signals, limits, progress, messages.
+//! The work between the steps of a run: signals, limits, progress, messages.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -13,10 +13,11 @@ use crate::logging;
 
 /// Interval at which a run looks for signals, in wall-clock time.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// A look at the clock every few steps, as long as these steps are short.
+/// Number of steps from one reading of the clock to the next, if the steps between the last two readings took less than
+/// [`SHORT`]; otherwise the clock is read after each step.
 const STRIDE: u32 = 8;
 const SHORT: Duration = Duration::from_millis(1);
-/// Parts of the progress bar.
+/// Number of parts of the progress bar.
 const PARTS: u64 = 400;
 
 /// A request to end a run, which any thread may make.
@@ -47,7 +48,7 @@ impl Cancel {
 
 /// Why a run was ended from outside.
 pub(crate) enum Stop {
-    /// An exception: a signal, or one of a callback.
+    /// The exception of a signal or of a callback.
     Raised(PyErr),
     /// The time limit in s.
     TimeLimit(f64),
@@ -55,7 +56,7 @@ pub(crate) enum Stop {
     Cancelled,
 }
 
-/// What a run reports while it goes on.
+/// The form in which a run reports its progress.
 pub(crate) enum Progress {
     None,
     Bar(ProgressBar),
@@ -63,7 +64,7 @@ pub(crate) enum Progress {
 }
 
 impl Progress {
-    /// `True` is a bar on standard error, a function receives the fraction.
+    /// `True` is a bar on standard error, a function receives the fraction, `None` and `False` are no progress.
     pub(crate) fn new(requested: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Some(requested) = requested else { return Ok(Self::None) };
         if requested.is_callable() {
@@ -100,24 +101,30 @@ impl Drop for Progress {
     }
 }
 
-/// Looks beside the steps of a run.
+/// Checks signals, limits and cancellation between the steps of a run; reports progress and messages.
 pub(crate) struct Watch {
-    /// Start and stop time of the run in s.
+    /// Start and stop time of the run in s, for the progress.
     pub(crate) span: (f64, f64),
+    /// End of the time limit, and the limit in s.
     deadline: Option<(Instant, f64)>,
     cancel: Option<Arc<AtomicBool>>,
     progress: Progress,
     /// Whether Python handles signals in this thread.
-    main: bool,
+    is_main: bool,
+    /// Number of steps until the next reading of the clock.
     left: u32,
+    /// Number of steps between two readings; 0 before the first.
     stride: u32,
-    clock: Instant,
-    looked: Instant,
+    last_reading: Instant,
+    /// Time of the last call of [`Watch::look`].
+    last_look: Instant,
+    /// Why the run is to end; `None` while it goes on.
     pub(crate) stop: Option<Stop>,
 }
 
 impl Watch {
-    /// Prepares for a run in the present thread, with a limit of wall-clock time in s.
+    /// Prepares for a run in the present thread, with a limit of wall-clock time in s. `ValueError` for a limit that is
+    /// negative or NaN.
     pub(crate) fn new(
         py: Python<'_>,
         limit: Option<f64>,
@@ -138,16 +145,17 @@ impl Watch {
             deadline: deadline.and_then(|(end, limit)| Some((end?, limit))),
             cancel,
             progress,
-            main: is_main(py)?,
+            is_main: is_main(py)?,
             left: 1,
             stride: 0,
-            clock: now,
-            looked: now,
+            last_reading: now,
+            last_look: now,
             stop: None,
         })
     }
 
-    /// Called after every step, at the time reached in s.
+    /// Checks after a step to `time` in s whether the run is to end, and sets `stop` then. Call it after every step; a
+    /// call before the first step is possible.
     #[inline]
     pub(crate) fn after_step(&mut self, time: f64) -> ControlFlow<()> {
         self.left -= 1;
@@ -160,39 +168,42 @@ impl Watch {
     #[cold]
     fn read_clock(&mut self, time: f64) -> ControlFlow<()> {
         let now = Instant::now();
-        // The first call is at the start, before any step.
-        let is_short = self.stride > 0 && now - self.clock < SHORT;
+        // Before the first reading no step was timed.
+        let is_short = self.stride > 0 && now - self.last_reading < SHORT;
         self.stride = if is_short { STRIDE } else { 1 };
-        (self.clock, self.left) = (now, self.stride);
+        (self.last_reading, self.left) = (now, self.stride);
         if self.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
             self.stop = Some(Stop::Cancelled);
         } else if let Some((_, limit)) = self.deadline.filter(|(end, _)| now >= *end) {
             self.stop = Some(Stop::TimeLimit(limit));
-        } else if now - self.looked >= INTERVAL {
-            self.looked = now;
+        } else if now - self.last_look >= INTERVAL {
+            self.last_look = now;
             self.look(time);
         }
         if self.stop.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Reports the end of the run, and takes the exception of a signal that has arrived meanwhile.
+    /// Reports the end of the run as progress. Sets `stop` to the exception of a signal that has arrived meanwhile, or
+    /// of the progress function.
     pub(crate) fn finish(&mut self, py: Python<'_>) {
         let finished = py.check_signals().and_then(|()| self.progress.show(py, 1.0));
         self.stop = finished.err().map(Stop::Raised);
     }
 
+    /// Checks signals, passes on messages and reports the progress, in the main thread or if there is a progress to
+    /// report. An exception sets `stop`.
     fn look(&mut self, time: f64) {
-        if !self.main && matches!(self.progress, Progress::None) {
+        if !self.is_main && matches!(self.progress, Progress::None) {
             return;
         }
         let (start, stop) = self.span;
         let fraction = if stop > start { ((time - start) / (stop - start)).min(1.0) } else { 0.0 };
-        let looked = Python::attach(|py| {
+        let result = Python::attach(|py| {
             py.check_signals()?;
             logging::pass_on(py)?;
             self.progress.show(py, fraction)
         });
-        if let Err(error) = looked {
+        if let Err(error) = result {
             self.stop = Some(Stop::Raised(error));
         }
     }
