@@ -1,4 +1,4 @@
-//! The bits of a frame on a CAN bus (ISO 11898-1): how long it is, and which of two wins the arbitration.
+//! The bits of a frame on a CAN bus (ISO 11898-1): their number, and those that decide the arbitration.
 
 use fmu::description::can::{Frame, FrameKind};
 
@@ -6,7 +6,7 @@ use fmu::description::can::{Frame, FrameKind};
 const TAIL: usize = 1 + 2 + 7;
 /// Bits between two frames.
 pub(crate) const INTERMISSION: usize = 3;
-/// A sender inserts a bit after so many equal ones.
+/// Number of equal bits after which a sender inserts a bit.
 const RUN: usize = 5;
 
 /// Returns the number of bits of a classical frame from its start to its end, with stuff bits and without the
@@ -28,7 +28,7 @@ pub(crate) fn arbitration(frame: &Frame) -> Vec<bool> {
     bits
 }
 
-/// Start of frame, identifier, control field.
+/// Returns the start of frame, the identifier and the control field.
 fn head(frame: &Frame) -> Vec<bool> {
     let remote = u32::from(frame.kind == FrameKind::Remote);
     let mut bits = vec![false];
@@ -61,8 +61,8 @@ fn crc(bits: &[bool]) -> u32 {
     })
 }
 
-/// Returns the number of bits that the sender inserts: after five equal ones, their opposite, which counts for the next
-/// five.
+/// Returns the number of bits that the sender inserts: after five equal bits their opposite, which counts as the first
+/// of the next five.
 fn stuff_bits(bits: &[bool]) -> usize {
     let (mut stuffed, mut last, mut run) = (0, true, 0);
     for &bit in bits {

@@ -11,13 +11,13 @@ const NODES: usize = 4;
 
 #[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
 struct CanBus {
-    /// In bit/s; 0: as the nodes state it.
+    /// The parameter, in bit/s; 0 leaves the bit rate to the nodes.
     bit_rate: f64,
-    /// The bit rate of the bus; 0 until a node has stated it.
+    /// The bit rate of the bus; 0 until the parameter or a node has stated it.
     rate: f64,
     nodes: [Node; NODES],
-    sending: Option<Sending>,
-    /// The bus is free from this time on.
+    sending: Option<Transmission>,
+    /// Time in s from which on the bus is free, unless a frame is on it.
     free: f64,
     start_time: f64,
     frames: i32,
@@ -34,39 +34,41 @@ struct Node {
     tx_data: Vec<u8>,
     rx_clock: bool,
     rx_data: Vec<u8>,
-    /// The frames that the node has still to send, in the order in which they came.
+    /// The frames that the node has not yet sent, in the order of their arrival; also the frame on the bus.
     waiting: Vec<Frame>,
 }
 
-/// The frame on the bus.
+/// The transmission of a frame.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-struct Sending {
+struct Transmission {
     node: usize,
-    /// Its index in `waiting`.
+    /// The index of the frame in `waiting`.
     index: usize,
+    /// Start and end in s, without the intermission.
     start: f64,
     end: f64,
 }
 
 impl CanBus {
-    /// Duration of a number of bits in s.
+    /// Returns the duration of a number of bits in s.
     #[expect(clippy::cast_precision_loss, reason = "a frame has few bits")]
     fn duration(&self, bits: usize) -> f64 {
         bits as f64 / self.rate
     }
 
-    /// Whether it is later than `end`, but for rounding.
-    fn has_come(&self, end: f64, time: f64) -> bool {
+    /// Whether `time` has reached `end`, up to a hundredth of a bit.
+    fn is_reached(&self, end: f64, time: f64) -> bool {
         end <= time + if self.rate > 0.0 { 0.01 * self.duration(1) } else { 0.0 }
     }
 
-    /// Whether the frame on the bus ends.
-    fn ends(&self, time: f64) -> bool {
-        self.sending.as_ref().is_some_and(|frame| self.has_come(frame.end, time))
+    /// Whether a frame is on the bus and ends at `time`.
+    fn is_complete(&self, time: f64) -> bool {
+        self.sending.as_ref().is_some_and(|frame| self.is_reached(frame.end, time))
     }
 
-    /// Takes what the nodes send. As in a mailbox of a CAN controller, a frame replaces the one with the same identifier
-    /// that its node has sent before, unless that one is on the bus.
+    /// Queues the frames that the nodes send, and adopts the bit rate that they state. As in a mailbox of a CAN
+    /// controller, a frame replaces the waiting frame with the same identifier from an earlier event, unless that one is
+    /// on the bus. A different or missing bit rate and frames of CAN FD are errors.
     fn receive(&mut self) -> Result<(), Failure> {
         let sending = self.sending.as_ref().map(|frame| (frame.node, frame.index));
         for (node, node_state) in
@@ -117,9 +119,10 @@ impl CanBus {
         Ok(())
     }
 
-    /// Ends the frame: its sender gets a confirmation, the other nodes get the frame.
+    /// Ends the frame on the bus: its sender gets a confirmation, the other nodes get the frame. Without a frame nothing
+    /// happens.
     fn finish(&mut self) {
-        let Some(Sending { node: sender, index, start, end }) = self.sending.take() else { return };
+        let Some(Transmission { node: sender, index, start, end }) = self.sending.take() else { return };
         let frame = self.nodes[sender].waiting.remove(index);
         for (node, member) in self.nodes.iter_mut().enumerate() {
             member.tx_data.clear();
@@ -137,21 +140,21 @@ impl CanBus {
         self.load = self.busy / (self.free - self.start_time);
     }
 
-    /// Starts the next frame if the bus is free. Frames that come at the instant at which one has started take part in
-    /// its arbitration.
+    /// Starts the frame that wins the arbitration, if the bus is free. If a frame has started at this instant, the
+    /// arbitration is repeated with the frames that have arrived since.
     fn start(&mut self, time: f64) {
-        let starts = self.sending.as_ref().map(|frame| frame.start.to_bits());
-        if starts.is_some_and(|start| start != time.to_bits()) || !self.has_come(self.free, time) {
+        let start = self.sending.as_ref().map(|frame| frame.start.to_bits());
+        if start.is_some_and(|start| start != time.to_bits()) || !self.is_reached(self.free, time) {
             return;
         }
-        let of = |(node, member): (usize, &Node)| {
+        let first = |(node, member): (usize, &Node)| {
             let place = |(index, frame)| (frame::arbitration(frame), node, index);
             member.waiting.iter().enumerate().map(place).min()
         };
-        let next = self.nodes.iter().enumerate().filter_map(of).min();
+        let next = self.nodes.iter().enumerate().filter_map(first).min();
         self.sending = next.map(|(_, node, index)| {
             let length = frame::length(&self.nodes[node].waiting[index]);
-            Sending { node, index, start: time, end: time + self.duration(length) }
+            Transmission { node, index, start: time, end: time + self.duration(length) }
         });
     }
 }
@@ -222,19 +225,19 @@ impl Model for CanBus {
     }
 
     fn tick(&mut self, time: f64) {
-        let ends = self.ends(time);
-        self.nodes.iter_mut().for_each(|node| node.tx_clock = ends);
+        let is_complete = self.is_complete(time);
+        self.nodes.iter_mut().for_each(|node| node.tx_clock = is_complete);
     }
 
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         self.receive()?;
-        if self.ends(time) {
+        if self.is_complete(time) {
             self.finish();
         }
         self.start(time);
-        let waits = self.nodes.iter().any(|node| !node.waiting.is_empty());
+        let is_waiting = self.nodes.iter().any(|node| !node.waiting.is_empty());
         let end = self.sending.as_ref().map(|frame| frame.end);
-        Ok(Event { next_event_time: end.or(waits.then_some(self.free)), ..Event::default() })
+        Ok(Event { next_event_time: end.or(is_waiting.then_some(self.free)), ..Event::default() })
     }
 
     fn model_exchange(&self) -> Option<ModelExchange> {

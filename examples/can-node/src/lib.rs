@@ -1,5 +1,5 @@
 //! A node of a CAN bus (FMI-LS-BUS 1.0): packs its inputs into the messages of `resources/network.dbc` that it sends, and
-//! unpacks those that it receives. The parameter `node` says which of the nodes of the file it is.
+//! unpacks the messages that it receives. The parameter `node` says which node of the file it is.
 #![forbid(unsafe_code)]
 
 mod network;
@@ -14,12 +14,13 @@ use network::{Message, Signal};
 struct CanNode {
     nodes: Vec<String>,
     messages: Vec<Message>,
-    /// One of `nodes`.
+    /// The node that this FMU is, one of `nodes`.
     node: String,
-    /// In bit/s, which the node states before its first frame.
+    /// In bit/s; the node states it before its first frame.
     bit_rate: f64,
+    /// Whether the node has stated its bit rate.
     is_configured: bool,
-    /// For each message its signals, to send and as received.
+    /// For each message the values of its signals, to send and as received.
     send: Vec<Vec<f64>>,
     received: Vec<Vec<f64>>,
     /// Number of times that each message was sent.
@@ -32,8 +33,8 @@ struct CanNode {
 }
 
 impl CanNode {
-    /// Time at which this node sends a message next, in s; infinite for those of other nodes.
-    fn next(&self, message: usize) -> f64 {
+    /// Returns the time at which this node sends a message next, in s; infinity for a message of another node.
+    fn next_time(&self, message: usize) -> f64 {
         let next_message = &self.messages[message];
         if next_message.transmitter != self.node {
             return f64::INFINITY;
@@ -43,15 +44,18 @@ impl CanNode {
             + f64::from(self.count[message]) * next_message.cycle_time
     }
 
+    /// Whether the time at which this node sends the message is reached, up to 1e-9 of its cycle time.
     fn is_due(&self, message: usize, time: f64) -> bool {
-        self.next(message) <= time + 1e-9 * self.messages[message].cycle_time
+        self.next_time(message) <= time + 1e-9 * self.messages[message].cycle_time
     }
 
-    fn sends(&self, time: f64) -> bool {
+    /// Whether this node sends at `time`: its bit rate, if it has not yet stated it, or a message that is due.
+    fn is_sending(&self, time: f64) -> bool {
         !self.is_configured || (0..self.messages.len()).any(|message| self.is_due(message, time))
     }
 
-    /// Composes the messages that are due, and first of all the configuration.
+    /// Composes the bit rate, in the first call only, and the messages that are due. A signal that is not finite is an
+    /// error.
     fn compose(&mut self, time: f64) -> Result<(), Failure> {
         self.tx_data.clear();
         if !std::mem::replace(&mut self.is_configured, true) {
@@ -83,17 +87,18 @@ impl CanNode {
         Ok(())
     }
 
-    /// Unpacks the messages that have arrived. Those of other networks, and those that are too short, are left alone.
+    /// Unpacks the messages that have arrived. Messages that the file does not list, messages of this node itself and
+    /// messages that are too short are ignored.
     fn receive(&mut self) {
         for operation in Operation::read(&self.rx_data) {
             let Operation::Transmit(frame) = operation else { continue };
-            let is_its = |message: &Message| {
+            let is_received = |message: &Message| {
                 message.identifier == frame.identifier
                     && message.extended == frame.extended
                     && message.length <= frame.data.len()
                     && message.transmitter != self.node
             };
-            let Some(index) = self.messages.iter().position(is_its) else { continue };
+            let Some(index) = self.messages.iter().position(is_received) else { continue };
             let signals = self.messages[index].signals.iter();
             for (value, signal) in self.received[index].iter_mut().zip(signals) {
                 *value = signal.unpack(&frame.data);
@@ -143,7 +148,7 @@ impl Model for CanNode {
                 .range(1e3, 1e6)
                 .parameter(),
         ];
-        // DBC files state any text as unit; FMI has those that are known.
+        // A DBC file may state any text as unit; FMI needs a unit that can be parsed.
         let with_unit = |variable: V<Self>, signal: &Signal| match Unit::parse(&signal.unit) {
             Ok(_) if !signal.unit.is_empty() => variable.unit(&signal.unit),
             _ => variable,
@@ -185,9 +190,9 @@ impl Model for CanNode {
             let (names, name) = (self.nodes.join(", "), &self.node);
             return Err(Failure::Error(format!("node: expected one of {names}, found `{name}`")));
         }
-        let never =
+        let has_no_cycle =
             |message: &&Message| message.transmitter == self.node && message.cycle_time <= 0.0;
-        self.messages.iter().find(never).map_or(Ok(()), |message| {
+        self.messages.iter().find(has_no_cycle).map_or(Ok(()), |message| {
             let (name, node) = (&message.name, &self.node);
             Err(Failure::Error(format!(
                 "network.dbc: message {name} of {node}: expected a GenMsgCycleTime above 0"
@@ -201,17 +206,17 @@ impl Model for CanNode {
     }
 
     fn tick(&mut self, time: f64) {
-        self.tx_clock = self.sends(time);
+        self.tx_clock = self.is_sending(time);
     }
 
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         if self.rx_clock {
             self.receive();
         }
-        if self.sends(time) {
+        if self.is_sending(time) {
             self.compose(time)?;
         }
-        let next = (0..self.messages.len()).map(|message| self.next(message));
+        let next = (0..self.messages.len()).map(|message| self.next_time(message));
         let next = next.fold(f64::INFINITY, f64::min);
         Ok(Event { next_event_time: next.is_finite().then_some(next), ..Event::default() })
     }

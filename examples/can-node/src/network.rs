@@ -29,7 +29,7 @@ pub(crate) struct Signal {
     factor: f64,
     offset: f64,
     raw: Raw,
-    /// The places of the bits from the most to the least significant one: byte * 8 + bit.
+    /// The places of the bits in the message from the most to the least significant one: byte * 8 + bit.
     bits: Vec<usize>,
 }
 
@@ -42,7 +42,7 @@ enum Raw {
     Float64,
 }
 
-/// Returns the nodes and the messages of a DBC file.
+/// Returns the nodes and the messages of a DBC file. Multiplexed signals and messages of more than 8 bytes are errors.
 pub(crate) fn read(text: &str) -> Result<(Vec<String>, Vec<Message>), String> {
     let file = Dbc::try_from(text).map_err(|error| error.to_string())?;
     let nodes = file.nodes.iter().map(|node| node.0.clone()).collect();
@@ -128,7 +128,8 @@ impl Signal {
         })
     }
 
-    /// Writes a value, rounded to the nearest one that the bits can state. `value` is a number.
+    /// Writes a value into the message, limited to the range of the bits and rounded to the nearest value that they can
+    /// state. `value` is not NaN.
     pub(crate) fn pack(&self, value: f64, bytes: &mut [u8]) {
         let scaled = (value - self.offset) / self.factor;
         let size = self.bits.len();
@@ -155,7 +156,7 @@ impl Signal {
         }
     }
 
-    /// Reads the value. `bytes` are those of a whole message.
+    /// Reads the value from the message, which has at least the length that the file states.
     pub(crate) fn unpack(&self, bytes: &[u8]) -> f64 {
         let bit = |place: &usize| u64::from(bytes[place / 8] >> (place % 8) & 1);
         let raw = self.bits.iter().fold(0, |raw, place| raw << 1 | bit(place));

@@ -50,11 +50,12 @@ impl DcServo {
         Motion::new(&motor, [motor.voltage(u, time), motor.voltage_rise(self.u_slope)])
     }
 
-    /// `t_fault`, `t_bias`.
+    /// Returns `t_fault` and `t_bias` in s.
     fn onsets(&self) -> [f64; 2] {
         from_fn(|k| self.parameters[ONSET + k])
     }
 
+    /// Returns the first onset after `time`; `None` after the last one.
     fn next_onset(&self, time: f64) -> Option<f64> {
         self.onsets().into_iter().filter(|onset| *onset > time).reduce(f64::min)
     }
@@ -64,7 +65,7 @@ impl DcServo {
     }
 
     /// Computes all outputs and derivatives from the state and the input `u` at this time.
-    fn show(&mut self, u: f64, time: f64) {
+    fn evaluate(&mut self, u: f64, time: f64) {
         let motor = self.motor();
         let now = motor.response(self.regime, self.state[1], motor.voltage(u, time));
         (self.acceleration, self.dry_friction) = (now.acceleration, now.friction);
@@ -127,20 +128,21 @@ impl Model for DcServo {
         while time < step.end() {
             self.begin_faults(time);
             let end = self.next_onset(time).map_or(step.end(), |onset| onset.min(step.end()));
-            let moved = self.motion(input(self, time), time).advance(state, end - time);
-            let lost = || Failure::Discard(format!("voltage or state not finite at t = {time} s"));
-            (state, time) = (moved.ok_or_else(lost)?, end);
+            let next = self.motion(input(self, time), time).advance(state, end - time);
+            let failure =
+                || Failure::Discard(format!("voltage or state not finite at t = {time} s"));
+            (state, time) = (next.ok_or_else(failure)?, end);
         }
         self.state = state;
         self.begin_faults(time);
         let u = input(self, time);
         self.regime = self.motion(u, time).regime(state[1], 0.0);
-        self.show(u, time);
+        self.evaluate(u, time);
         Ok(())
     }
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {
-        self.show(self.u, time);
+        self.evaluate(self.u, time);
         Ok(())
     }
 

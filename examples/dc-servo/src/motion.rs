@@ -20,7 +20,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// `voltage` in V and its derivative in V/s, at time zero.
+    /// Creates the motion under `voltage` in V and its derivative in V/s, at time zero.
     pub(crate) fn new(motor: &Motor<f64>, voltage: [f64; 2]) -> Self {
         let [resistance, k, inertia, viscous, coulomb, holding, ..] = motor.parameters;
         let torque = voltage.map(|part| k / resistance * part);
@@ -32,7 +32,7 @@ impl Motion {
         self.torque[0] + self.torque[1] * time
     }
 
-    /// Sliding backward (-1) or forward (1), or held (0). Without friction: 1.
+    /// Returns whether the load slides backward (-1) or forward (1), or is held (0); 1 without friction.
     pub(crate) fn regime(&self, omega: f64, time: f64) -> i32 {
         let torque = self.torque(time);
         if !self.friction || omega > 0.0 || omega == 0.0 && torque > self.holding {
@@ -42,7 +42,7 @@ impl Motion {
         }
     }
 
-    /// Angle and velocity after `duration` in s; `None` if they overflow.
+    /// Returns angle and velocity after `duration` in s; `None` if they are not finite or need more than [`PIECES`].
     pub(crate) fn advance(&self, state: [f64; 2], duration: f64) -> Option<[f64; 2]> {
         let (mut state, mut time) = (state, 0.0);
         for _ in 0..PIECES {
@@ -76,8 +76,9 @@ impl Motion {
     }
 }
 
-/// The solution of `w' = -a w + b_0 + b_1 t` for an initial value.
+/// The solution of `w' = -a w + b_0 + b_1 t`, and its integral, for initial values.
 struct Slide {
+    /// Angle and velocity at time zero.
     start: [f64; 2],
     /// `a`
     decay: f64,
@@ -86,7 +87,7 @@ struct Slide {
 }
 
 impl Slide {
-    /// Angle and velocity at a time.
+    /// Returns angle and velocity at a time.
     fn at(&self, t: f64) -> [f64; 2] {
         let ([angle, omega], [b_0, b_1]) = (self.start, self.push);
         let [phi_0, phi_1, phi_2, phi_3] = phi(-self.decay * t);
@@ -99,7 +100,7 @@ impl Slide {
         phi_0 * (self.push[0] - self.decay * self.start[1]) + t * phi_1 * self.push[1]
     }
 
-    /// The first time until `end` at which the velocity no longer has its sign.
+    /// Returns the first time up to `end` at which the velocity is opposite to `direction`; `None` if it is not.
     ///
     /// The acceleration is monotone, so the velocity has at most one extremum, and at most one zero
     /// before and one after it.
@@ -116,7 +117,7 @@ impl Slide {
     }
 }
 
-/// The functions `phi_0(z) = e^z`, `phi_(k+1)(z) = (phi_k(z) - 1/k!) / z` at `z <= 0`.
+/// Returns `phi_0` to `phi_3` at `z <= 0`: `phi_0(z) = e^z`, `phi_(k+1)(z) = (phi_k(z) - 1/k!) / z`.
 ///
 /// Near zero, the last one is computed by its power series, and the others from it.
 fn phi(z: f64) -> [f64; 4] {

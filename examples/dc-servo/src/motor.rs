@@ -6,14 +6,15 @@ use num_dual::DualNum;
 pub(crate) trait Number: DualNum<Primitive = f64> + Copy {}
 impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
 
-/// Number of parameters, and the indices of those that are used outside of these equations too.
+/// Number of parameters, and the indices of the parameters that are also used outside of these equations.
 pub(crate) const COUNT: usize = 12;
 pub(crate) const ONSET: usize = 9;
 pub(crate) const BIAS: usize = 11;
 
-/// Conditions that change at events only.
+/// The parameters, and conditions that change at events only.
 pub(crate) struct Motor<D> {
     pub(crate) parameters: [D; COUNT],
+    /// Whether the fault of the drive has started.
     pub(crate) faulty: bool,
     /// Whether there is dry friction.
     pub(crate) friction: bool,
@@ -30,13 +31,13 @@ pub(crate) struct Response<D> {
 }
 
 impl<D: Number> Motor<D> {
-    /// The voltage at the armature: `u`, of a faulty drive `(1 - E) u + f_u + r_u (t - t_fault)`.
+    /// Returns the voltage at the armature: `u`, or with a faulty drive `(1 - E) u + f_u + r_u (t - t_fault)`.
     pub(crate) fn voltage(&self, u: D, time: D) -> D {
         let [.., loss, fault, rate, onset, _, _] = self.parameters;
         if self.faulty { (D::one() - loss) * u + fault + rate * (time - onset) } else { u }
     }
 
-    /// The derivative of the voltage with respect to time, from that of `u`.
+    /// Returns the derivative of this voltage with respect to time; `u_slope` is the derivative of `u`.
     pub(crate) fn voltage_rise(&self, u_slope: D) -> D {
         let [.., loss, _, rate, _, _, _] = self.parameters;
         if self.faulty { (D::one() - loss) * u_slope + rate } else { u_slope }

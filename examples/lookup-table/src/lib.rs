@@ -1,5 +1,5 @@
-//! Linear interpolation in `resources/table.csv`: the first column is the input, the others are
-//! outputs.
+//! Linear interpolation in `resources/table.csv`: the first column is the input, the others are outputs. Outside of
+//! the table, its first or last row holds.
 #![forbid(unsafe_code)]
 
 use fmu::{About, Failure, Model, Variable as V};

@@ -51,7 +51,7 @@ impl Law {
         "no sample yet".to_owned()
     }
 
-    /// Takes a sample and returns what determined u.
+    /// Takes a sample and returns the status: the mode, and whether u is limited.
     ///
     /// Outside of the automatic mode, and with anti-windup also at a limit, the integral is set to the
     /// value for which the law gives u, so that u does not jump when the law takes over again.
@@ -67,8 +67,8 @@ impl Law {
         };
         self.u = command.clamp(-self.limit, self.limit);
         let limited = command.abs() > self.limit;
-        let follow = self.mode != 2 || limited && self.hold;
-        self.integral = if follow { self.u - rest } else { integral };
+        let is_tracking = self.mode != 2 || limited && self.hold;
+        self.integral = if is_tracking { self.u - rest } else { integral };
         self.last_measurement = self.measurement;
         if limited { format!("{mode}, limited") } else { mode.to_owned() }
     }

@@ -9,6 +9,7 @@ struct Pid {
     law: law::Law,
     samples: i32,
     status: String,
+    /// Time of the next sample in s.
     next: f64,
 }
 
@@ -46,8 +47,8 @@ impl Model for Pid {
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        let many = || Failure::Discard("expected at most 1e8 samples in a step".to_owned());
-        (step.size <= 1e8 * self.law.sample_time).then_some(()).ok_or_else(many)?;
+        let failure = || Failure::Discard("expected at most 1e8 samples in a step".to_owned());
+        (step.size <= 1e8 * self.law.sample_time).then_some(()).ok_or_else(failure)?;
         while self.next < step.end() - 1e-6 * self.law.sample_time {
             (self.status, self.samples) = (self.law.sample(), self.samples.saturating_add(1));
             self.next += self.law.sample_time;

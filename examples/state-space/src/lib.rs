@@ -4,10 +4,10 @@
 
 use fmu::{About, Failure, Model, ModelExchange, Variable as V};
 
-/// Most states, inputs and outputs.
+/// Largest number of states, of inputs and of outputs.
 const LARGEST: f64 = 100.0;
 
-/// Matrices are row by row.
+/// The model. Matrices are stored row by row.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct StateSpace {
     n: u64,
@@ -75,7 +75,7 @@ impl Model for StateSpace {
         all
     }
 
-    /// Keeps the coefficients and values that the new extents have room for; the others are zero.
+    /// Keeps the coefficients and values that fit into the new extents; the others are zero.
     fn resize(&mut self) -> Result<(), Failure> {
         let extent = |extent: u64| usize::try_from(extent).unwrap_or(usize::MAX);
         let old = [&self.x, &self.u, &self.y].map(Vec::len);
@@ -87,7 +87,7 @@ impl Model for StateSpace {
             (&mut self.d, old[1], [p, m]),
         ];
         for (matrix, columns, extents) in matrices {
-            *matrix = resized(matrix, columns, extents);
+            *matrix = with_extents(matrix, columns, extents);
         }
         for (vector, extent) in
             [(&mut self.x, n), (&mut self.rates, n), (&mut self.u, m), (&mut self.y, p)]
@@ -114,13 +114,13 @@ impl Model for StateSpace {
     }
 }
 
-/// The names of the elements of a vector.
+/// Returns the names of the elements of a vector.
 fn names(vector: &str, extent: usize) -> impl Iterator<Item = String> {
     (1..=extent).map(move |k| format!("{vector}[{k}]"))
 }
 
-/// The matrix with other extents, filled with zeros.
-fn resized(matrix: &[f64], columns: usize, [rows, new_columns]: [usize; 2]) -> Vec<f64> {
+/// Returns the matrix, which has `columns` columns, with other extents, filled with zeros.
+fn with_extents(matrix: &[f64], columns: usize, [rows, new_columns]: [usize; 2]) -> Vec<f64> {
     let mut new = vec![0.0; rows * new_columns];
     for (to, from) in new.chunks_exact_mut(new_columns).zip(matrix.chunks_exact(columns)) {
         let common = columns.min(new_columns);
@@ -129,7 +129,7 @@ fn resized(matrix: &[f64], columns: usize, [rows, new_columns]: [usize; 2]) -> V
     new
 }
 
-/// The scalar product of two vectors.
+/// Returns the scalar product of two vectors.
 fn product(one: &[f64], two: &[f64]) -> f64 {
     one.iter().zip(two).map(|(a, b)| a * b).sum()
 }

@@ -2,7 +2,7 @@
 
 use num_dual::{Dual64, DualNum};
 
-/// Number of parameters, and the indices of those that are used outside of the flows too.
+/// Number of parameters, and the indices of the parameters that are also used outside of the flows.
 pub(crate) const COUNT: usize = 18;
 pub(crate) const Q_MAX: usize = 6;
 pub(crate) const H_MAX: usize = 7;
@@ -12,7 +12,7 @@ pub(crate) const BIAS: usize = 15;
 /// `f64`, or a dual number `x + x' e` with `e^2 = 0`, which carries a derivative through the same
 /// equations.
 pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
-    /// `sign(x) sqrt(|x|)`; its derivative at zero is infinite, unless `x' = 0`.
+    /// Returns `sign(x) sqrt(|x|)`; its derivative at zero is infinite, but 0 if `x' = 0`.
     fn root(self) -> Self;
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Flows<D> {
     pub(crate) net: [D; 3],
 }
 
-/// Conditions that change at events only.
+/// Commands and parameters, and conditions that change at events only.
 pub(crate) struct Tanks<D> {
     /// `Q_1`, `Q_2` in m3/s.
     pub(crate) command: [D; 2],
@@ -50,7 +50,7 @@ pub(crate) struct Tanks<D> {
 }
 
 impl<D: Number> Tanks<D> {
-    /// The flows at the levels `h` in m.
+    /// Returns the flows at the levels `h` in m.
     ///
     /// A pipe follows Torricelli's law, `q_ij = mu_ij S_p sign(h_i - h_j) sqrt(2 g |h_i - h_j|)`; a
     /// pump delivers `Q` and, once it is faulty, `(1 - E) Q + f`, both between 0 and `Q_max`.
@@ -78,7 +78,7 @@ impl<D: Number> Tanks<D> {
         Flows { pumps: [q_1, q_2], pipes: [q_13, q_32, q_20], net }
     }
 
-    /// The derivatives of the levels in m/s; zero for a full tank.
+    /// Returns the derivatives of the levels in m/s; zero for a tank that is `full` and spills.
     pub(crate) fn slope(&self, h: &[D; 3], full: [bool; 3]) -> [D; 3] {
         let [area, ..] = self.parameters;
         let net = self.flows(h).net;

@@ -34,8 +34,7 @@ const ERROR: [f64; 7] = [
 ];
 
 impl Tanks<f64> {
-    /// Limits levels to the brim, and determines which tanks spill: those that are full and have more
-    /// inflow than outflow.
+    /// Limits the levels to the brim; returns which tanks spill: tanks that are full and have more inflow than outflow.
     pub(crate) fn settle(&self, h: &mut [f64; 3]) -> [bool; 3] {
         let brim = self.parameters[H_MAX];
         *h = h.map(|level| level.min(brim));
@@ -43,24 +42,24 @@ impl Tanks<f64> {
         from_fn(|i| h[i] >= brim && net[i] > 0.0)
     }
 
-    /// The levels after a step, and its error in m.
+    /// Returns the levels after a step of `length` in s, and its error in m.
     fn stride(&self, h: &[f64; 3], full: [bool; 3], length: f64) -> ([f64; 3], f64) {
         let mut slopes = [[0.0; 3]; 7];
-        let moved = |weights: &[f64], slopes: &[[f64; 3]; 7], i: usize| -> f64 {
+        let increment = |weights: &[f64], slopes: &[[f64; 3]; 7], i: usize| -> f64 {
             length
                 * weights.iter().zip(slopes).map(|(weight, slope)| weight * slope[i]).sum::<f64>()
         };
         slopes[0] = self.slope(h, full);
         let mut end = *h;
         for (stage, weights) in STAGES.iter().enumerate() {
-            end = from_fn(|i| h[i] + moved(weights, &slopes, i));
+            end = from_fn(|i| h[i] + increment(weights, &slopes, i));
             slopes[stage + 1] = self.slope(&end, full);
         }
-        (end, (0..3).map(|i| moved(&ERROR, &slopes, i).abs()).fold(0.0, f64::max))
+        (end, (0..3).map(|i| increment(&ERROR, &slopes, i).abs()).fold(0.0, f64::max))
     }
 
-    /// Integrates the levels over `duration` in s and returns the time advanced. `trial` is the size of
-    /// the first integration step, and is replaced by the size of the next one.
+    /// Integrates the levels over `duration` in s and returns the time advanced in s, which is less after [`STEPS`]
+    /// integration steps. `trial` is the size of the first integration step, and is replaced by the size of the next one.
     pub(crate) fn advance(&self, h: &mut [f64; 3], trial: &mut f64, duration: f64) -> f64 {
         let mut elapsed = 0.0;
         for _ in 0..STEPS {
@@ -87,7 +86,7 @@ impl Tanks<f64> {
         elapsed
     }
 
-    /// The part of a step up to which no tank becomes full or stops spilling; `None` if that is all.
+    /// Returns the length of a step that ends just after a tank becomes full or stops spilling; `None` if no tank does.
     ///
     /// If a level has its maximum inside the step and may have been above the brim, the step ends at
     /// this maximum.

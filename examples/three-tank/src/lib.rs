@@ -43,16 +43,18 @@ impl ThreeTank {
         Tanks { command: self.command, parameters: self.parameters, faulty }
     }
 
-    /// `t_fault_1`, `t_fault_2`, `t_bias`.
+    /// Returns `t_fault_1`, `t_fault_2` and `t_bias` in s.
     fn onsets(&self) -> [f64; 3] {
         from_fn(|k| self.parameters[ONSET + k])
     }
 
+    /// Returns the first onset after `time`; `None` after the last one.
     fn next_onset(&self, time: f64) -> Option<f64> {
         self.onsets().into_iter().filter(|onset| *onset > time).reduce(f64::min)
     }
 
-    /// Updates the conditions that change at events only; true if a level was above the brim.
+    /// Limits the levels to the brim and updates the conditions that change at events only; returns whether a level was
+    /// above the brim.
     fn settle(&mut self, time: f64) -> bool {
         let above = self.h.iter().any(|level| *level > self.parameters[H_MAX]);
         self.begun = self.onsets().map(|onset| time >= onset);
@@ -110,10 +112,10 @@ impl Model for ThreeTank {
         while time < step.end() {
             self.settle(time);
             let end = self.next_onset(time).map_or(step.end(), |onset| onset.min(step.end()));
-            let done = self.tanks().advance(&mut self.h, &mut self.trial, end - time);
-            if done < end - time {
+            let elapsed = self.tanks().advance(&mut self.h, &mut self.trial, end - time);
+            if elapsed < end - time {
                 let message = "too many integration steps in one communication step".to_owned();
-                return Err(Failure::Incomplete { time: time + done, message });
+                return Err(Failure::Incomplete { time: time + elapsed, message });
             }
             time = end;
         }

@@ -9,15 +9,16 @@ const GEAR: f64 = 95.0;
 const INERTIA: f64 = 390.0;
 /// Gains of the tracking filter: speed per residual; acceleration by the shaft per residual, 1/s.
 const GAINS: [f64; 2] = [0.3, 4.0];
-/// Standard deviation of the residual of a generator's sensor over that of the noise, because the shaft
-/// oscillates.
+/// Standard deviation of the residual of a generator's sensor, relative to the noise of the sensor: larger, because the
+/// shaft oscillates.
 const FILTER: f64 = 1.6;
-/// Bandwidth of the converter, 1/s, and gain of its observer.
+/// Bandwidth of the converter, 1/s.
 const CONVERTER: f64 = 50.0;
+/// Gain of the observer of the converter: torque per residual.
 const CONVERTER_GAIN: f64 = 0.002;
 
-/// A filter that tracks the speed of the generator, omega' = shaft - tau / J, by the sensors without an
-/// alarm, with the torque tau of the converter's observer; and the tests.
+/// A filter that tracks the speed of the generator, omega' = shaft - tau / J, and the tests of the speed sensors. It
+/// uses the sensors without a fault, and the torque tau of the converter's observer.
 #[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Speeds {
     speed: f64,
@@ -28,14 +29,14 @@ pub(crate) struct Speeds {
 }
 
 impl Speeds {
-    /// Takes the speeds by the two sensors of rotor and generator at a sample in rad/s, and the torque of
+    /// Takes a sample: the measurements of the two sensors of the rotor and of the generator in rad/s, and the torque of
     /// the generator in N.m.
     pub(crate) fn sample(&mut self, rotor: [f64; 2], generator: [f64; 2], torque: f64) {
         let residuals = generator.map(|speed| speed - self.speed);
         self.generator.take(residuals, [NOISE_GENERATOR, FILTER * NOISE_GENERATOR]);
-        let used = self.generator.trusted(residuals);
-        self.speed += GAINS[0] * used;
-        self.shaft += GAINS[1] * used;
+        let residual = self.generator.trusted_residual(residuals);
+        self.speed += GAINS[0] * residual;
+        self.shaft += GAINS[1] * residual;
         let residuals = rotor.map(|speed| speed - self.speed / GEAR);
         self.rotor.take(residuals, [NOISE_ROTOR, 1.05 * NOISE_ROTOR]);
         self.speed += PERIOD * (self.shaft - torque / INERTIA);

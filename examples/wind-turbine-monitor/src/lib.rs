@@ -19,7 +19,7 @@ const NOISE_ROTOR: f64 = 0.025;
 const NOISE_GENERATOR: f64 = 0.05;
 const NOISE_TORQUE: f64 = 90.0;
 
-/// Inputs: name, description, unit, and the position of the first of its channels.
+/// Inputs: name, description, unit, and number of channels.
 const INPUTS: [(&str, &str, &str, usize); 7] = [
     ("beta_ref", "Commanded pitch angle", "deg", 1),
     ("tau_ref", "Commanded torque", "N.m", 1),
@@ -29,6 +29,7 @@ const INPUTS: [(&str, &str, &str, usize); 7] = [
     ("omega_g_m", "Speed of the generator by its two sensors", "rad/s", 2),
     ("tau_g_m", "Measured torque of the generator", "N.m", 1),
 ];
+/// Number of channels of all inputs.
 const COUNT: usize = 13;
 
 /// The decisions: name and description.
@@ -55,22 +56,24 @@ struct WindTurbineMonitor {
     inputs: [f64; COUNT],
     /// In the order of [`FAULTS`].
     faults: [bool; 14],
-    /// Alarms that started, of all faults.
+    /// Number of alarms that have started, of all faults.
     alarms: i32,
     blades: [Blade; 3],
     speeds: Speeds,
     converter: Converter,
+    /// Time of the first sample in s.
     start: f64,
+    /// Number of samples so far.
     samples: u32,
 }
 
 impl WindTurbineMonitor {
-    /// The two sensors of a blade.
+    /// Returns the pitch angle of a blade by its two sensors.
     fn pitch(&self, blade: usize) -> [f64; 2] {
         [self.inputs[2 + blade], self.inputs[5 + blade]]
     }
 
-    /// The sensors of the rotor's and of the generator's speed.
+    /// Returns the speed of the rotor by its two sensors, then the speed of the generator.
     fn speeds(&self) -> [[f64; 2]; 2] {
         [[self.inputs[8], self.inputs[9]], [self.inputs[10], self.inputs[11]]]
     }

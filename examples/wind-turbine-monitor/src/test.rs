@@ -2,7 +2,7 @@
 
 use std::f64::consts::SQRT_2;
 
-/// Shift of the mean in standard deviations from which on the sums grow, and the threshold of the sums.
+/// Residual in standard deviations above which the sums grow, and the threshold of the sums.
 ///
 /// The mean number of samples between two false alarms of one side is about
 /// (exp(2 k (h + 1.166)) - 1 - 2 k (h + 1.166)) / (2 k^2) (Siegmund 1985), 1e12 for these values.
@@ -37,19 +37,20 @@ impl Cusum {
 pub(crate) struct Pair {
     sensors: [Cusum; 2],
     difference: Cusum,
-    /// The faulty sensor.
+    /// Whether each sensor is faulty; at most one of them is.
     pub(crate) faulty: [bool; 2],
 }
 
 impl Pair {
-    /// Takes the residuals of both sensors, whose noise and whose residuals have these standard deviations.
+    /// Takes the residuals of both sensors. `noise` and `deviation` are the standard deviations of the noise and of the
+    /// residual of a sensor.
     ///
-    /// Sensors that differ name the faulty one: the one with the larger residual. It stays named until the
-    /// sensors agree again.
+    /// If the sensors differ, the sensor with the larger residual is faulty as soon as its own test is above the
+    /// threshold. It remains faulty until the sensors agree again.
     pub(crate) fn take(&mut self, residuals: [f64; 2], [noise, deviation]: [f64; 2]) {
         let before = self.faulty;
-        let parted = self.difference.take((residuals[0] - residuals[1]) / (SQRT_2 * noise));
-        let differ = parted || before != [false; 2] && !self.agree();
+        let is_apart = self.difference.take((residuals[0] - residuals[1]) / (SQRT_2 * noise));
+        let differ = is_apart || before != [false; 2] && !self.agree();
         let mut tripped = [false; 2];
         for k in 0..2 {
             tripped[k] = self.sensors[k].take(residuals[k] / deviation);
@@ -59,18 +60,19 @@ impl Pair {
         self.faulty = [0, 1].map(|k| k == named && differ && (tripped[k] || before[k]));
     }
 
-    /// Whether both residuals are large, and the sensors agree.
+    /// Whether the tests of both residuals are above the threshold, and the sensors agree.
     pub(crate) fn agree_on_a_change(&self) -> bool {
         let both = self.sensors.iter().all(|sensor| sensor.is_above(THRESHOLD));
         both && self.agree()
     }
 
+    /// Whether the test of the difference is at most at half of its threshold.
     fn agree(&self) -> bool {
         !self.difference.is_above(0.5 * THRESHOLD)
     }
 
-    /// The residual of the sensor without a fault; the mean of both if none has one.
-    pub(crate) fn trusted(&self, residuals: [f64; 2]) -> f64 {
+    /// Returns the residual of the sensor without a fault, or the mean of both residuals if no sensor has a fault.
+    pub(crate) fn trusted_residual(&self, residuals: [f64; 2]) -> f64 {
         match self.faulty {
             [true, _] => residuals[1],
             [_, true] => residuals[0],

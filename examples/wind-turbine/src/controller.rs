@@ -6,8 +6,9 @@ use crate::plant::{DENSITY, EFFICIENCY, GEAR, GENERATOR_EFFICIENCY, POWER_COEFFI
 
 /// Rated power, W.
 const RATED_POWER: f64 = 4.8e6;
-/// Rated speed of the generator, and by how much less ends the operation at constant power, rad/s.
+/// Rated speed of the generator, rad/s.
 const RATED_SPEED: f64 = 162.0;
+/// Speed below the rated speed at which the operation at constant power ends, rad/s.
 const HYSTERESIS: f64 = 15.0;
 /// Gains of the pitch controller: degrees per rad/s, and per rad.
 const PROPORTIONAL: f64 = 4.0;
@@ -15,9 +16,10 @@ const INTEGRAL: f64 = 1.0;
 /// Range of the commanded pitch angle, degrees.
 const PITCH: [f64; 2] = [-2.0, 90.0];
 
-/// What the controller keeps from one sample to the next.
+/// The state of the controller from one sample to the next.
 #[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Controller {
+    /// Whether it keeps the power constant; otherwise it takes most power.
     constant_power: bool,
     /// The last deviation from the rated speed, rad/s.
     excess: f64,
@@ -27,7 +29,7 @@ pub(crate) struct Controller {
     pub(crate) tau_ref: f64,
 }
 
-/// The torque in N.m for most power, `K_opt omega_g^2`.
+/// Returns the torque in N.m that gives most power, `K_opt omega_g^2`.
 pub(crate) fn optimal_torque(omega_g: f64) -> f64 {
     let speed = omega_g / (8.0 * GEAR);
     let swept = 0.5 * DENSITY * PI * RADIUS.powi(5);

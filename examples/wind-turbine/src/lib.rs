@@ -11,7 +11,7 @@ use std::array::from_fn;
 use fmu::{Experiment, Failure, Model, Step, Variables};
 
 use controller::{Controller, optimal_torque};
-use plant::{EFFICIENCY, GENERATOR_EFFICIENCY, Held, State};
+use plant::{EFFICIENCY, GENERATOR_EFFICIENCY, HeldInputs, State};
 
 /// Sample time, s.
 const PERIOD: f64 = 0.01;
@@ -20,10 +20,10 @@ const LENGTH: f64 = 600.0;
 /// Standard deviations of the noise: wind in m/s, speeds of rotor and generator in rad/s, torque in N.m, power
 /// in W, pitch angles in degrees.
 const NOISE: [f64; 6] = [0.5, 0.025, 0.05, 90.0, 1e3, 0.2];
-/// Seconds in which fault 7 grows and shrinks.
+/// Time in s in which fault 7 grows, and in which it shrinks again.
 const RISE: f64 = 30.0;
 
-/// Fields without a comment have the description of their variable.
+/// The model. The comment of a field is the description of its variable; skipped fields are no variables.
 #[derive(Clone, Variables, serde::Serialize, serde::Deserialize)]
 struct WindTurbine {
     /// Mean speed of the wind
@@ -89,9 +89,10 @@ struct WindTurbine {
     /// Turbulence over its standard deviation.
     #[fmu(skip)]
     gust: f64,
-    /// Number of the next sample, and the start of the run.
+    /// Number of the next sample.
     #[fmu(skip)]
     sample: u32,
+    /// Start of the run in s.
     #[fmu(skip)]
     start: f64,
     #[fmu(skip)]
@@ -101,12 +102,12 @@ struct WindTurbine {
 }
 
 impl WindTurbine {
-    /// The time of a sample, s.
+    /// Returns the time of a sample in s.
     fn instant(&self, sample: u32) -> f64 {
         self.start + PERIOD * f64::from(sample)
     }
 
-    /// How far fault `number` (1 to 9) is developed at `time`: 0 to 1.
+    /// Returns the degree of fault `number` (1 to 9) at `time`: 0 without the fault, 1 with the full fault.
     fn fault(&self, number: usize, time: f64) -> f64 {
         let [from, until] = [self.fault_from[number - 1], self.fault_until[number - 1]];
         let active = time >= from - 1e-6 * PERIOD && time < until - 1e-6 * PERIOD;
@@ -117,6 +118,7 @@ impl WindTurbine {
         }
     }
 
+    /// Returns the random number of a channel for the next sample.
     fn random(&self, channel: u64) -> f64 {
         noise::normal(u64::from(self.seed.unsigned_abs()), channel, u64::from(self.sample))
     }
@@ -132,18 +134,18 @@ impl WindTurbine {
         let memory = libm::exp(-PERIOD * self.v_mean / LENGTH);
         self.gust = memory * self.gust + libm::sqrt(1.0 - memory * memory) * self.random(0);
         let [pressure, air] = [6, 7].map(|number| self.fault(number, time));
-        let held = Held {
+        let held = HeldInputs {
             wind: self.v,
             torque: self.tau_ref + 2000.0 * self.fault(8, time),
             pitch_error: from_fn(|i| self.beta_ref - 0.5 * (self.beta_m1[i] + self.beta_m2[i])),
             actuators: [[1.0, 0.0, 0.0], [1.0 - pressure, pressure, 0.0], [1.0 - air, 0.0, air]],
             efficiency: if self.fault(9, time) > 0.0 { EFFICIENCY[1] } else { EFFICIENCY[0] },
         };
-        self.state = self.state.advanced(&held, PERIOD);
+        self.state = self.state.after(&held, PERIOD);
         self.sample += 1;
     }
 
-    /// Sets what the sensors and the importer see at `time`.
+    /// Sets the variables of the plant and the measurements at `time`.
     fn measure(&mut self, time: f64) {
         let State { omega_r, omega_g, tau_g, beta, .. } = self.state;
         (self.omega_r, self.omega_g, self.tau_g, self.beta) = (omega_r, omega_g, tau_g, beta);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// A number from the standard normal distribution.
+/// Returns a number from the standard normal distribution.
 ///
 /// The bits are mixed as in `SplitMix64` (Steele, Lea and Flood 2014); the distribution follows by the method
 /// of Box and Muller (1958).
@@ -12,7 +12,7 @@ pub(crate) fn normal(seed: u64, channel: u64, sample: u64) -> f64 {
     libm::sqrt(-2.0 * libm::log(first)) * libm::cos(TAU * second)
 }
 
-/// A number above 0 and up to 1.
+/// Returns a number above 0 and up to 1, evenly distributed.
 fn uniform(number: u64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "53 bits are left")]
     let bits = ((mix(number) >> 11) + 1) as f64;

@@ -42,11 +42,11 @@ pub(crate) struct State {
     pub(crate) rate: [f64; 3],
 }
 
-/// What is held for the duration of a step.
-pub(crate) struct Held {
+/// The inputs, which are constant during a step.
+pub(crate) struct HeldInputs {
     /// Speed of the wind, m/s.
     pub(crate) wind: f64,
-    /// Torque that the converter is to deliver, N.m.
+    /// Reference of the converter's torque, N.m.
     pub(crate) torque: f64,
     /// For each blade, commanded minus measured pitch angle, degrees.
     pub(crate) pitch_error: [f64; 3],
@@ -56,7 +56,7 @@ pub(crate) struct Held {
     pub(crate) efficiency: f64,
 }
 
-/// Power coefficient at the tip-speed ratio `lambda` and the pitch angle `beta` in degrees, after S. Heier,
+/// Returns the power coefficient at the tip-speed ratio `lambda` and the pitch angle `beta` in degrees, after S. Heier,
 /// "Grid integration of wind energy conversion systems" (1998). Angles below 0 count as 0.
 pub(crate) fn power_coefficient(lambda: f64, beta: f64) -> f64 {
     let beta = beta.max(0.0);
@@ -66,7 +66,8 @@ pub(crate) fn power_coefficient(lambda: f64, beta: f64) -> f64 {
 }
 
 impl State {
-    /// The equilibrium below rated power at a wind of `wind` m/s, with pitch angles of 0.
+    /// Returns the equilibrium below rated power at a wind of `wind` m/s, with pitch angles of 0; `torque` gives the
+    /// torque for the speed of the generator.
     pub(crate) fn at_optimal_speed(wind: f64, torque: impl Fn(f64) -> f64) -> Self {
         let omega_r = 8.0 * wind / RADIUS;
         let omega_g = omega_r * GEAR;
@@ -75,8 +76,8 @@ impl State {
         Self { omega_r, omega_g, tau_g, twist: shaft / STIFFNESS, ..Self::default() }
     }
 
-    /// The derivatives, in the units of the state per second.
-    pub(crate) fn slope(&self, held: &Held) -> Self {
+    /// Returns the derivatives, in the units of the state per second.
+    pub(crate) fn slope(&self, held: &HeldInputs) -> Self {
         let Self { omega_r, omega_g, twist, tau_g, beta, rate } = *self;
         let lambda = (omega_r * RADIUS / held.wind).clamp(0.5, 25.0);
         let pressure = 0.5 * DENSITY * PI * RADIUS.powi(3) * held.wind * held.wind;
@@ -108,6 +109,7 @@ impl State {
         }
     }
 
+    /// Returns the state plus `factor` times `slope`.
     fn plus(&self, factor: f64, slope: &Self) -> Self {
         Self {
             omega_r: self.omega_r + factor * slope.omega_r,
@@ -119,8 +121,8 @@ impl State {
         }
     }
 
-    /// The state after `step` seconds, by a Runge-Kutta step of order 4.
-    pub(crate) fn advanced(&self, held: &Held, step: f64) -> Self {
+    /// Returns the state after `step` seconds, by a Runge-Kutta step of order 4.
+    pub(crate) fn after(&self, held: &HeldInputs, step: f64) -> Self {
         let first = self.slope(held);
         let second = self.plus(0.5 * step, &first).slope(held);
         let third = self.plus(0.5 * step, &second).slope(held);

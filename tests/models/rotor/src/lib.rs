@@ -7,7 +7,7 @@
 mod plant;
 
 use fmu::{Failure, Model, Variables};
-use plant::{EFFICIENCY, Held, State};
+use plant::{EFFICIENCY, HeldInputs, State};
 
 /// Fields without a comment have the description of their variable.
 #[derive(Clone, Variables, serde::Serialize, serde::Deserialize)]
@@ -45,7 +45,7 @@ struct Rotor {
 impl Model for Rotor {
     fn update(&mut self, _time: f64) -> Result<(), Failure> {
         let Self { v, tau_g, beta, omega_r, omega_g, twist, .. } = *self;
-        let held = Held {
+        let held = HeldInputs {
             wind: v,
             torque: tau_g,
             pitch_error: [0.0; 3],
