@@ -163,7 +163,7 @@ fn a_mat_file_with_a_matrix_without_a_usable_name_is_refused_for_the_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mat");
     for length in [0_u32, 256] {
-        fs::write(&path, [[0; 16].as_slice(), &length.to_le_bytes()].concat()).unwrap();
+        fs::write(&path, [[0_u8; 16].as_slice(), &length.to_le_bytes()].concat()).unwrap();
         let message = Table::open(&path).unwrap_err().to_string();
         assert!(message.contains(&format!("name has {length} bytes")), "{message}");
     }
