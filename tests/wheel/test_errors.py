@@ -5,6 +5,7 @@ import pickle
 
 import aso_ftc as af
 import pytest
+from aso_ftc import _core
 
 
 @pytest.mark.parametrize(
@@ -30,6 +31,13 @@ def test_a_wrong_argument_is_a_configuration_error_before_the_run(paper, change,
         assert error.kind == kind and isinstance(error, ValueError)
         assert {name: getattr(error, name) for name in fields} == fields
         assert "\n" not in str(error)
+
+
+def test_a_message_about_the_outermost_value_has_no_place():
+    with pytest.raises(TypeError, match="^the key 1 is not a text"):
+        _core.render_toml({1: 2})
+    with pytest.raises(TypeError, match="^a: the key 1 is not a text"):
+        _core.render_toml({"a": {1: 2}})
 
 
 def test_values_of_wrong_types_are_refused(paper):

@@ -122,7 +122,9 @@ impl CanBus {
     /// Ends the frame on the bus: its sender gets a confirmation, the other nodes get the frame. Without a frame nothing
     /// happens.
     fn finish(&mut self) {
-        let Some(Transmission { node: sender, index, start, end }) = self.sending.take() else { return };
+        let Some(Transmission { node: sender, index, start, end }) = self.sending.take() else {
+            return;
+        };
         let frame = self.nodes[sender].waiting.remove(index);
         for (node, member) in self.nodes.iter_mut().enumerate() {
             member.tx_data.clear();
