@@ -267,15 +267,21 @@ FROM_THE_FILTER += [("filter.x_hat[2]", "feedback.x_filter[2]"), ("filter.f_hat"
 FROM_THE_FILTER += [("feedback.u", "plant.u"), ("feedback.u", "filter.u")]
 
 
-@pytest.mark.parametrize("more", ["", "t_on = 0.1\nmonitor = true", '[reference]\ntrack = ["theta_m"]'], ids=["regulator", "t_on", "reference"])
-def test_a_linear_plant_moves_alike_with_the_filter_and_with_the_observer(servo, aso_ftc, examples, tmp_path, more):
+VARIANTS = {
+    "regulator": ("", ""),
+    "t_on": ("t_on = 0.1\nmonitor = true", ""),
+    "reference": ("", '[reference]\ntrack = ["theta_m"]'),
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_linear_plant_moves_alike_with_the_filter_and_with_the_observer(servo, aso_ftc, examples, tmp_path, variant):
     """With a friction, which acts like a fault, and a reference if there is one."""
-    text = SERVO.format(plant=examples["DcServo"])
-    paths = servo(f"{more}\n{text}" if more.startswith("t_on") else f"{text}\n{more}")
+    before, after = VARIANTS[variant]
+    paths = servo(before + SERVO.format(plant=examples["DcServo"]) + after)
     settings = {"plant.friction": "true", "plant.theta": 0.3}
-    angles = []
+    angles, with_reference = [], variant == "reference"
     for name in ("controller", "feedback"):
-        with_reference = "track" in more
         links = [("plant.theta_m", "controller.theta_m"), ("controller.u", "plant.u")]
         fmus = {"plant": examples["DcServo"], "controller": paths["controller"]}
         if name == "feedback":
