@@ -157,13 +157,8 @@ fn print_proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>)
 /// Formats the percentage of random cases that are stable.
 fn stable_cases(tolerance: &ToleranceResult) -> String {
     tolerance.stable.map_or("no random cases".to_owned(), |part| {
-        format!("{} % of {} random cases are stable", percentage(part), tolerance.cases)
+        format!("{} % of {} random cases are stable", number(100.0 * part), tolerance.cases)
     })
-}
-
-/// Formats a part of a whole as a percentage, which is 100 only for the whole.
-fn percentage(part: f64) -> String {
-    number(if part < 1.0 { (100.0 * part).min(99.999) } else { 100.0 * part })
 }
 
 /// Prints the controller for the loss of each actuator, and of several ones, or why there is none.
@@ -441,18 +436,5 @@ fn number(value: f64) -> String {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
         format!("{value:.4e}")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_percentage_is_100_only_if_no_case_is_missing() {
-        assert_eq!(percentage(1.0), "100");
-        assert_eq!(percentage(299_999.0 / 300_000.0), "99.999");
-        assert_eq!(percentage(0.875), "87.5");
-        assert_eq!(percentage(0.0), "0");
     }
 }

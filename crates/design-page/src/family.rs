@@ -113,8 +113,7 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
             member.margins.as_ref().map(|margins| margins.delay_margin).into()
         }),
         ("stable cases (%)", |member| {
-            let stable = tolerance(member).and_then(|test| test.stable);
-            stable.map_or(Cell::Missing, |part| Cell::Percentage(100.0 * part))
+            tolerance(member).and_then(|test| test.stable).map(|part| 100.0 * part).into()
         }),
         ("unstable from (tolerances)", |member| {
             tolerance(member).map(|test| test.first_unstable).into()

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::curves::frequency;
 use super::matrix::matrices;
-use super::number::{number, part};
+use super::number::number;
 use super::plots::Plots;
 use super::table::{Cell, Columns, table, table_of, with_unit};
 use design_report::robustness::{
@@ -248,9 +248,9 @@ fn tolerances(report: &Report, tolerances: &ToleranceResult) -> Markup {
             }
             "the controller does not. "
             @match tolerances.stable {
-                Some(stable) => {
+                Some(part) => {
                     "Of " (number(f64::from(tolerances.cases))) " random cases (seed " (number(f64::from(tolerances.seed))) ") the fraction "
-                    (part(stable, 1.0)) " is stable. "
+                    (number(part)) " is stable. "
                 }
                 None => "There are no random cases. "
             }

@@ -3,14 +3,12 @@
 use design_report::number::rounded;
 use maud::{Markup, html};
 
-use super::number::{complex, exact, rounded_part};
+use super::number::{complex, exact};
 
 /// The content of a cell; an empty text is `Missing`.
 pub(super) enum Cell {
     Text(String),
     Number(f64),
-    /// A percentage of a whole.
-    Percentage(f64),
     Complex([f64; 2]),
     /// Whether a condition holds.
     Holds(bool),
@@ -61,9 +59,6 @@ impl Cell {
             Self::Number(value) => {
                 html! { td.number title=(exact(*value)) { (rounded(*value)) } }
             }
-            Self::Percentage(value) => {
-                html! { td.number title=(exact(*value)) { (rounded_part(*value, 100.0)) } }
-            }
             Self::Complex(value) => {
                 html! { td.number title=(complex(*value, exact)) { (complex(*value, rounded)) } }
             }
@@ -78,8 +73,7 @@ impl Cell {
 /// is empty.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
-    let is_number =
-        |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Percentage(_) | Cell::Complex(_));
+    let is_number = |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Complex(_));
     let numeric = |column: usize| rows.iter().any(|row| is_number(&row[column]));
     let columns: Vec<usize> =
         (0..heads.len()).filter(|column| *column == 0 || filled(*column)).collect();

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::advice::advice;
-use super::number::{number, part};
+use super::number::number;
 use super::plane::Plane;
 use design_report::robustness::Level;
 use design_report::{Loop, Report};
@@ -102,8 +102,8 @@ fn figures(report: &Report) -> Markup {
         }))
         (key("Delay margin", &html! { (number(robustness.delay_margin)) " s" }))
         (key("Parameters within their tolerances", &html! {
-            @if let Some(stable) = tolerance.stable {
-                (part(100.0 * stable, 100.0)) " % of " (tolerance.cases) " random cases stable, "
+            @if let Some(part) = tolerance.stable {
+                (number(100.0 * part)) " % of " (tolerance.cases) " random cases stable, "
             }
             @if !tolerance.is_examined() {
                 "not examined: nothing varies"

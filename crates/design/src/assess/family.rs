@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::robustness::{Margins, Physical, by_entries, margins};
-use crate::assess::verdict::peak_reason_with;
+use crate::assess::verdict::{peak_reason_with, unstable_cases};
 use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
@@ -150,12 +150,9 @@ pub(crate) fn judge(
         .min_by(|x, y| x.1.first_unstable.total_cmp(&y.1.first_unstable));
     if let Some((name, tolerance)) = worst {
         let text = format!(
-            "parameters within their tolerances ({}) make the loop with the {kind} {name} unstable: {:.1} % \
-             of {} random cases, the worst case found from {:.3} of the tolerances on",
+            "parameters within their tolerances ({}) make the loop with the {kind} {name} unstable: {}",
             tolerance.range(),
-            100.0 * (1.0 - tolerance.stable.unwrap_or(1.0)),
-            tolerance.cases,
-            tolerance.first_unstable
+            unstable_cases(tolerance)
         );
         verdict.add(Level::Red, text);
     }

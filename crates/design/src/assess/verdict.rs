@@ -1,6 +1,7 @@
 //! Judges a design by its checks, its margins and its tolerances.
 
 use crate::report::Check;
+use crate::report::number::rounded;
 use crate::report::robustness::{
     Level, Limits, LoopPoint, Remedy, Robustness, ToleranceResult, Verdict,
 };
@@ -63,15 +64,20 @@ pub(crate) fn peak_reason_with(
 
 /// Returns the sentence about a loop that parameters within their tolerances make unstable.
 pub(crate) fn instability(test: &ToleranceResult) -> String {
-    let range = test.range();
+    let (range, unstable) = (test.range(), unstable_cases(test));
+    format!("parameters within their tolerances ({range}) make the loop unstable: {unstable}")
+}
+
+/// Returns which random cases are unstable, and from which part of the tolerances on.
+pub(crate) fn unstable_cases(test: &ToleranceResult) -> String {
     let (cases, first) = (test.cases, test.first_unstable);
     let worst = format!("the worst case found, from {first:.3} of the tolerances on");
-    let unstable = match test.stable {
+    match test.stable {
         Some(part) if part < 1.0 => {
-            format!("{:.1} % of {cases} random cases, and {worst}", 100.0 * (1.0 - part))
+            let unstable = rounded(100.0 * (1.0 - part));
+            format!("{unstable} % of {cases} random cases, and {worst}")
         }
         Some(_) => format!("none of {cases} random cases, but {worst}"),
         None => worst,
-    };
-    format!("parameters within their tolerances ({range}) make the loop unstable: {unstable}")
+    }
 }
