@@ -81,7 +81,7 @@ pub(crate) struct Options {
     kalman_fmu: Option<PathBuf>,
     /// Also make the controller for this filter
     ///
-    /// An FMU that takes the estimates of the Kalman filter in place of measurements. Made as that of --fmu is.
+    /// An FMU that takes the estimates of the Kalman filter in place of measurements. Made from the same packed FMU as --fmu (see --from).
     #[arg(
         long,
         value_name = "FMU",
@@ -207,8 +207,8 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     if let Some(path) = &options.worst_case {
         let text = design.worst_case.as_ref();
         let text = text.context(
-            "no worst case can be written: the loop is not stable, or a fault enters measurements by \
-             an input of the plant's FMU",
+            "no worst case can be written: the loop is not stable, or a fault or a disturbance enters measurements or \
+             delayed signals by an input of the plant's FMU",
         )?;
         staged.stage(path, |path| fs::write(path, text))?;
     }

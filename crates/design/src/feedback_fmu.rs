@@ -10,8 +10,8 @@ use aso_controller::{Design, Matrix, channel};
 /// A = 0,  B = 0,  F_a = 0,  A_f = 0,  C = [I; 0; 0],  L_x = [I, 0, 0],  L_f = 0,  P_f = [0, I, 0],  H = [0, 0, H]
 /// ```
 ///
-/// So `x_hat` = `x_filter` and `f_hat` = `f_filter` in each sample; commands, limits, references and switches are those
-/// of `design`.
+/// So `x_hat` = `x_filter` in each sample and, while faults are estimated, `f_hat` = `f_filter` (in the first such sample
+/// plus `f_hat_0`, which is 0 by default); commands, limits, references and switches are those of `design`.
 ///
 /// # Errors
 ///
@@ -26,7 +26,8 @@ pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> 
     }
     if design.d.is_some() {
         return Err(
-            "its measurements are those without D; measurements without direct feedthrough have one",
+            "the measurements contain commands (direct feedthrough), which only the controller with an observer subtracts; \
+             expected measurements without commands",
         );
     }
     let (q, m) = (design.faults.len(), design.actuators.len());
@@ -37,7 +38,7 @@ pub(crate) fn without_observer(design: &Design) -> Result<Design, &'static str> 
     let measured = if design.h.is_some() { &design.measurements[..] } else { &[] };
     let estimated = |signal: Option<&Signal>, name: &str, at: usize, count: usize| Measurement {
         name: channel(name, at, count),
-        unit: signal.and_then(|signal| signal.unit.clone()),
+        unit: signal.map_or_else(|| design.faults[at].unit.clone(), |signal| signal.unit.clone()),
         description: signal.map_or_else(
             || format!("Estimate of {}", design.faults[at].label().meaning),
             |signal| format!("Estimate of {}", signal.label().meaning),
