@@ -30,6 +30,9 @@ const OTHERS: &[&str] = &[
     "fmi3GetShiftDecimal",
     "fmi3ActivateModelPartition",
     // Model exchange.
+    "the integration of the model-exchange FMU",
+    "numberOfContinuousStates",
+    "numberOfEventIndicators",
     "fmi3EnterContinuousTimeMode",
     "fmi3CompletedIntegratorStep",
     "fmi3SetTime",
@@ -177,6 +180,7 @@ mod tests {
             }
         }
         assert_eq!(Function::from_word(u64::MAX), None);
+        assert!(known_name("the integration of the model-exchange FMU").is_some());
         assert_eq!(known_name("fmi2GetDerivatives"), Some("fmi2GetDerivatives"));
         assert_eq!(known_name("fmi2Nothing"), None);
     }

@@ -16,7 +16,7 @@ const RING: usize = 1 << 15;
 /// Minimum number of words for arguments and results: 64 KiB.
 const MIN_AREA: usize = 1 << 13;
 /// Words for arguments and results per variable. `advance` needs 2 + 3 n for an input with derivatives of n orders and
-/// 1 + 2 n for an output.
+/// 1 + 2 n for an output. A variable is either an input or an output, so that 16 words are enough for 4 orders.
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
 const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0002;
