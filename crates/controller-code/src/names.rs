@@ -16,7 +16,7 @@ use using virtual void volatile wchar_t where while xor xor_eq yield";
 /// Names of headers of C, of crates that come with Rust, of folders of cargo, of devices of Windows; the names that
 /// `aso_controller.h` uses.
 const RESERVED_FILES: &str = "\
-alloc aso aso_controller aux build com1 com2 com3 com4 com5 com6 com7 com8 com9 con core ctype \
+alloc aso aso_controller aso_residual aux build com1 com2 com3 com4 com5 com6 com7 com8 com9 con core ctype \
 deps examples fenv incremental inttypes iso646 limits locale lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 \
 lpt8 lpt9 math nul prn proc_macro setjmp signal stdalign stdarg stdatomic stdbool stddef stdint \
 stdio stdlib stdnoreturn std string test tgmath threads time uchar wchar wctype";
@@ -110,6 +110,7 @@ mod tests {
             ("com7", "com7_ctl"),
             // The file `aso_controller.h` takes the samples; its macros start with `ASO_`.
             ("aso-controller", "aso_controller_ctl"),
+            ("aso-residual", "aso_residual_ctl"),
             ("Aso", "Aso_ctl"),
             ("float", "float_ctl"),
             ("2024", "n2024"),
