@@ -78,7 +78,10 @@ impl Live {
         } else {
             ("live.toml".to_owned(), format!("{first}."))
         };
-        let file = results.unwrap_or_default().with_file_name(file);
+        let file = match results {
+            Some(results) => results.with_file_name(file),
+            None => folder.join(file),
+        };
         let shown = relative(&file, folder);
         let repeat = run_command("", &shown);
         let settable = settable(run.simulation.system());
