@@ -134,7 +134,7 @@ impl UnknownInput {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad matrices; [`Error::OutOfRange`] for a bad
 /// period; [`Error::NotPositiveDefinite`] for V; [`Error::NotPositiveSemidefinite`] for W;
 /// [`Error::Unweighted`] if a mode on the stability limit gets no process noise; [`Error::NotDetectable`] if
-/// `unknown` is empty; the numerical errors of [`kalman`].
+/// (A, C) is not detectable and `unknown` is empty; the numerical errors of [`kalman`].
 pub fn detection_filter(
     plant: &NoisyPlant,
     unknown: &[UnknownInput],
@@ -245,8 +245,9 @@ impl DetectionFilter {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for columns of the wrong length.
+    /// [`Error::Shape`] for columns of the wrong length; same as [`ResidualGenerator::check`] for a bad generator.
     pub fn effect(&self, input: &UnknownInput) -> Result<StateSpace, Error> {
+        self.generator.check()?;
         check::length("e", input.on_states.as_slice(), self.start.ncols())?;
         let generator = &self.generator;
         check::length("e_s", input.on_measurements.as_slice(), generator.d_y.ncols())?;

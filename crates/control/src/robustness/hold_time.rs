@@ -79,6 +79,12 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
 /// sampled.
 pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let period = period_of(controller)?;
+    check::that(
+        plant.domain == Domain::Continuous,
+        "the domain",
+        f64::NAN,
+        "that of a continuous plant",
+    )?;
     let value = |h: f64| {
         let sampled = StateSpace { domain: controller.domain, ..held_plant(plant, h)? };
         let closed = Loop::new(sampled, controller.clone())?;
