@@ -39,7 +39,8 @@ impl PythonSlave {
     ///
     /// # Errors
     ///
-    /// `TypeError` if the object has no function `step` or a start value is no number; an exception of the object.
+    /// `TypeError` if the object has no function `step` or a start value is no number; `ValueError` if one is an array of
+    /// several elements; an exception of the object.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;

@@ -22,7 +22,7 @@ pub(super) struct Vocabulary {
     pub(super) outside: String,
     pub(super) lost: String,
     pub(super) real: &'static str,
-    /// The options with which the compiler keeps the order of operations, or that it does.
+    /// How the order of operations is kept: the options of a C compiler, or the statement that rustc keeps it.
     pub(super) compiler: &'static str,
 }
 

@@ -27,8 +27,8 @@ pub struct Element {
     pub at: Position,
 }
 
-/// Reads the root element of a file. The file is in the encoding that it declares or, with a byte order mark, in
-/// UTF-16 or UTF-8; otherwise in UTF-8.
+/// Reads the root element of a file in UTF-16 or UTF-8, recognised by a byte order mark or, for UTF-16, by the first
+/// character `<`; otherwise in the encoding that the file declares; UTF-8 if it declares none.
 ///
 /// # Errors
 ///

@@ -126,8 +126,8 @@ impl<M: Model> Interface<M> {
         }
     }
 
-    /// Assigns slot, value reference and type to each variable. An alias has no slot, and the value reference and
-    /// type of its variable.
+    /// Assigns slot, value reference and type to each variable. An alias gets no slot; it gets the value
+    /// reference and the type of its variable.
     fn assign_references(
         &mut self,
         model: &mut M,
@@ -305,8 +305,8 @@ fn is_of_3(variable: &ScalarVariable) -> bool {
 /// # Errors
 ///
 /// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration that cannot be
-/// described, and for an array whose extents are not the values of its structural parameters; the failure of
-/// [`Model::new`].
+/// described, for an array whose extents are not the values of its structural parameters, and for a name in the clocks of
+/// a variable that is not the name of a clock; the failure of [`Model::new`].
 pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
     Ok(interface.convert(&description, InterfaceType::CoSimulation)?.1)

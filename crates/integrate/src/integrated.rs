@@ -56,7 +56,7 @@ struct Point {
     event: bool,
     /// Whether inputs may have changed since the event indicators were read.
     input_changed: bool,
-    /// The memory of the integrator, in a saved point only.
+    /// The memory of the integrator at the time of saving; not used in the present point.
     memory: Memory,
 }
 

@@ -42,9 +42,9 @@ pub(crate) struct Memory {
     error: f64,
     /// Whether the stiff method is in use.
     is_stiff: bool,
-    /// Number of steps of the explicit method beyond [`BORDER`].
+    /// Number of steps of the explicit method beyond [`BORDER`] since the count was last reset.
     suspicious: u32,
-    /// Number of steps within [`BORDER`] since the last one beyond it.
+    /// Number of steps within [`BORDER`] since the last one beyond it or the last reset, below [`OTHER_STEPS`].
     others: u32,
     /// Number of steps of the stiff method within [`STABLE`], in a row.
     stable: u32,

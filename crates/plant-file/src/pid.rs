@@ -47,8 +47,8 @@ pub struct Pair {
 }
 
 impl Pid {
-    /// Reads `structure` and `pairs` of `[loop]`; `None` if neither is stated. Without `pairs`, which needs as many
-    /// actuators as measurements, each actuator has the measurement at its position. `corner`: w of the filters, in
+    /// Reads `structure` and `pairs` of `[loop]`; `None` if neither is stated. Without `pairs` each actuator has the
+    /// measurement at its position; there must be as many actuators as measurements. `corner`: w of the filters, in
     /// rad/s.
     pub(crate) fn read(
         file: &Table<'_>,

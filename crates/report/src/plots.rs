@@ -183,8 +183,8 @@ impl Plots {
         curves.collect()
     }
 
-    /// Adds the plots of the times between the frames of each message; the first of them is not folded if at most
-    /// [`SHOWN`] plots are before it.
+    /// Adds the plots of the times between the frames of each message. A plot with at most [`SHOWN`] plots before it is
+    /// not folded.
     pub(crate) fn add_frames(&mut self, messages: &[Message]) {
         let share = VALUES / messages.len().max(1);
         for group in messages.chunks(CURVES) {

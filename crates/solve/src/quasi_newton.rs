@@ -17,8 +17,8 @@ const MAX_DIFFERENCES: usize = 100;
 /// `u_next = G(u) + W c`.
 ///
 /// c is the least squares solution of `V c = -r`, r the residual `G(u) - u`; the columns of V and W are
-/// differences of residuals and of values of G in this and in earlier solutions. A step without
-/// differences, the first of all or after [`Solver::forget`], is relaxed, `u_next = u + 0.1 r`.
+/// differences of residuals and of values of G in this and in earlier solutions. A step for which
+/// no differences are stored is relaxed, `u_next = u + 0.1 r`.
 ///
 /// Degroote, Bathe and Vierendeels 2009, "Performance of a new partitioned procedure versus a
 /// monolithic procedure in fluid-structure interaction", section 4. Differences of earlier solutions are

@@ -8,7 +8,7 @@ use crate::plant::{DENSITY, EFFICIENCY, GEAR, GENERATOR_EFFICIENCY, POWER_COEFFI
 const RATED_POWER: f64 = 4.8e6;
 /// Rated speed of the generator, rad/s.
 const RATED_SPEED: f64 = 162.0;
-/// Speed below the rated speed at which the operation at constant power ends, rad/s.
+/// Difference between the rated speed and the speed at which the operation at constant power ends, rad/s.
 const HYSTERESIS: f64 = 15.0;
 /// Gains of the pitch controller: degrees per rad/s, and per rad.
 const PROPORTIONAL: f64 = 4.0;

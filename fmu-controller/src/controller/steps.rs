@@ -46,7 +46,8 @@ impl AsoController {
         restarted
     }
 
-    /// Sets u_t if `mode` has another law than the last commands, and returns whether it has; see [`Values::transfer`].
+    /// Sets u_t if `mode` has another law than the last commands, and returns whether u_t was set; see
+    /// [`Values::transfer`].
     pub(super) fn transfer(&mut self, mode: Mode) -> bool {
         let Self { design, current, values, operating_point, deviations, .. } = self;
         let design = current.as_deref().unwrap_or(design);

@@ -151,7 +151,8 @@ impl Windows {
         let columns: Vec<_> = (1..factor.ncols()).filter(is_input).collect();
         let sequences = factor.rows(1, factor.nrows() - 1).select_columns(&columns);
         let svd = Svd::new(&sequences)?;
-        // An input that varies has a singular value of at least the square root; without one, all are rounding.
+        // An input that varies has a singular value of at least sqrt(count), as its unit is its deviation; if none
+        // varies, all singular values are rounding.
         let largest = svd.values[0].max(as_number(self.count).sqrt());
         Ok(svd.rank_above(tolerance * largest))
     }

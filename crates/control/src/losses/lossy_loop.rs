@@ -112,8 +112,8 @@ impl LossyLoop {
     /// `largest`: one number for each input, from zero to one, above zero for at least one; `most`: the
     /// largest t. On each ray from no loss to a point on a far face of the box, the corners among them, 50
     /// losses are tested, and the first loss of stability is located by bisection. For one input the result is
-    /// the limit itself, unless an unstable interval lies between two tested losses; for several inputs it is
-    /// an upper bound of the limit: there are unstable losses in every larger box.
+    /// the limit itself, unless an unstable interval lies between two tested losses; for several inputs a
+    /// result below `most` is an upper bound of the limit: there are unstable losses in every larger box.
     ///
     /// # Errors
     ///

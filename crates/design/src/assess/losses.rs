@@ -212,7 +212,8 @@ impl Examination<'_> {
         })
     }
 
-    /// Returns the constant losses, proportional to `largest`, from which on the loop is unstable, up to a loss of 1.
+    /// Returns the first constant losses with which the loop becomes unstable, on rays within the multiples of the box
+    /// `largest` up to a loss of 1; if none does, the tested losses nearest to instability.
     fn constant(&self, largest: &[f64]) -> Result<ConstantLoss, Error> {
         let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
         let limit = self.lossy.constant_limit(largest, most)?;

@@ -66,11 +66,12 @@ impl Unpacked {
     ///
     /// [`PackageError`] if the file is no ZIP archive, has paths that lead out of the folder, have control
     /// characters, more than 1024 bytes or more than 64 levels, links, names that are equal only without
-    /// backslashes and parts `.`, a file and a folder of one name, overlapping or encrypted entries, another
-    /// compression than deflate, or no readable `modelDescription.xml` at its root. Also, unless
+    /// backslashes and parts `.`, a file and a folder of one name, overlapping or encrypted entries, needed
+    /// entries with a compression other than deflate, or no readable `modelDescription.xml` at its root. Also, unless
     /// [`crate::limits`] are lifted, if it has more than 100,000 entries, more than 32 MiB in its list of
-    /// entries, or more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Defects in the
-    /// list of entries are found before anything is written.
+    /// entries, or more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Names, kinds,
+    /// stated sizes and positions of entries are checked before anything is written; the compression of an entry is
+    /// checked before that entry is written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, is_needed)
     }

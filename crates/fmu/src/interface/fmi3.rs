@@ -172,7 +172,7 @@ impl Table {
     }
 
     /// Returns the dependencies of a variable, or of its initial value if `initial`. There are none for a variable that
-    /// is no unknown. An output or a derivative also depends on all parameters, except a state.
+    /// is no unknown. An output or a derivative that is neither a state nor an alias of one also depends on all parameters.
     ///
     /// # Errors
     ///

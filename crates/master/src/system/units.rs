@@ -22,9 +22,9 @@ impl System {
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
 
-    /// Returns factor and offset of the conversion between the units of two variables; `None` if values
-    /// are equal in both units, or if a variable has no unit that its description defines. An error if
-    /// the units cannot be converted.
+    /// Returns factor and offset of the conversion between the units of two variables; `None` if the units have the same
+    /// name (their definitions are not compared), if values are equal in both, or if a variable has no unit that its
+    /// description defines. An error if the units cannot be converted.
     pub(super) fn conversion(
         &self,
         from: Port,

@@ -77,9 +77,9 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Sets the inputs to their values at the end of the step, `elapsed` s after its start, and clears their
-    /// derivatives. These are the recorded values if the step `is_whole`, otherwise those of the polynomials. Does
-    /// nothing if the importer was not asked for inputs.
+    /// Sets the inputs to their values at the end of the step, `elapsed` s after its start: to the recorded values if
+    /// the step `is_whole`, otherwise to those of the polynomials. Then clears their derivatives. Does nothing if the
+    /// importer was not asked for inputs.
     pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
         let Self { core, interface, session, .. } = self;
         let Some(intermediate) = intermediate(session) else { return };
