@@ -86,7 +86,8 @@ pub(super) fn marks(scenario: &Scenario, planned: PlannedEntries, start: f64) ->
 
 /// Returns the inputs on which a fault of the scenario acts.
 pub(super) fn disturbed(scenario: &Scenario) -> Vec<String> {
-    let input = |connection: &str| connection.rsplit('=').next().unwrap_or_default().to_owned();
+    let input =
+        |connection: &str| connection.rsplit('=').next().unwrap_or_default().trim().to_owned();
     scenario.fault.iter().map(|fault| input(fault.get_ref().connection.get_ref())).collect()
 }
 
