@@ -336,7 +336,7 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints a value, which an error calls `what`, as JSON.
+/// Prints `value` as JSON; an error names it `what`.
 fn print_json(value: &impl Serialize, what: &str) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(value);
     println!("{}", text.with_context(|| format!("cannot print {what}"))?);

@@ -14,7 +14,8 @@ use crate::guard::guarded;
 /// Largest number of elements of an array whose start values are listed; a larger array has `None`.
 const ELEMENTS: usize = 1_000_000;
 
-/// Reads the model description of an FMU, an archive or a folder.
+/// Returns the model description of the FMU at `path` (an archive or a folder) as a dict; `warnings` lists the
+/// warnings about both.
 #[pyfunction]
 pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let unpacked = guarded(py, || {

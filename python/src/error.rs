@@ -209,7 +209,7 @@ fn with_call(error: Exception, call: &CallError) -> Exception {
     error
 }
 
-/// Returns the exception of a design.
+/// Returns the Python exception for an error of a controller design.
 pub(crate) fn design(error: &design::Error) -> Exception {
     let sentence = files::sentence(error);
     match error {
@@ -224,7 +224,7 @@ pub(crate) fn design(error: &design::Error) -> Exception {
     }
 }
 
-/// Returns the exception of a result file.
+/// Returns the Python exception for an error of a results file.
 pub(crate) fn results(error: &results::ResultsError) -> Exception {
     Exception::new(RESULTS, "Results", files::sentence(error))
 }

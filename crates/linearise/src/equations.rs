@@ -91,6 +91,8 @@ impl PlantEquations {
         Self::of(component, &parts, &states, has_directional_derivatives, can_restore)
     }
 
+    /// Creates the equations from an initialised FMU: reads its start values, selects the typical sizes of states and
+    /// inputs, and separates the rows whose variable is itself a state or an input.
     fn of(
         mut component: Box<dyn ModelExchange>,
         parts: &Parts<'_>,
@@ -107,6 +109,7 @@ impl PlantEquations {
         let mut start = vec![0.0; states.len()];
         component.get_continuous_states(&mut start)?;
         let nominals = nominals(&mut *component, states.len());
+        // A nominal value of 1 is the default of FMI, so it does not state the size of a state.
         let of_states = states.iter().zip(&nominals).zip(&start);
         let of_states = of_states.map(|((state, nominal), x)| match state.part.typical {
             None if *nominal > 0.0 && nominal.to_bits() != 1.0_f64.to_bits() => *nominal,

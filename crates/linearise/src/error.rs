@@ -20,7 +20,8 @@ pub enum LineariseError {
         /// Variables of a similar name, as part of a sentence.
         nearest: String,
     },
-    /// The variable cannot play the requested role (state, input or output).
+    /// The variable does not fit its role in the request: a state, an input, an output or a setting of the operating
+    /// point.
     #[error("{name} is {actual}, expected {expected}")]
     Role {
         /// The variable.

@@ -111,7 +111,8 @@ impl OutputFile {
     /// are those after the last write.
     ///
     /// Opens the file again if only the descriptor is lost. Cuts off what others have appended and resets the
-    /// position, so that later writes succeed; the interference is an error once.
+    /// position, so that later writes succeed; this interference is an error once. A file that others have shortened
+    /// remains an error. Length and position of a pipe or a device are not checked.
     pub(super) fn verify(&mut self) -> Result<(), ResultsError> {
         if process::id() != self.process {
             return Err(ResultsError::Forked { path: self.path.clone() });

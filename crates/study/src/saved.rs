@@ -114,7 +114,8 @@ impl SavedRun {
     }
 }
 
-/// Returns the sentence for a file that is not a checkpoint of this version: another file, or another format.
+/// Returns the sentence for a file that is not a checkpoint of this version: another file, another format, or a file
+/// that ends within its first 20 bytes.
 fn unreadable(path: &Path, bytes: &[u8]) -> String {
     let shown = path.display();
     let version = bytes.strip_prefix(KIND).filter(|_| !bytes.starts_with(MAGIC));

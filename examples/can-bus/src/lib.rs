@@ -61,7 +61,7 @@ impl CanBus {
         end <= time + if self.rate > 0.0 { 0.01 * self.duration(1) } else { 0.0 }
     }
 
-    /// Whether a frame is on the bus and ends at `time`.
+    /// Whether the frame on the bus has ended by `time`; false without a frame.
     fn is_complete(&self, time: f64) -> bool {
         self.sending.as_ref().is_some_and(|frame| self.is_reached(frame.end, time))
     }

@@ -2,7 +2,8 @@
 
 use crate::motor::Motor;
 
-/// Maximum number of pieces between events in one interval; four are possible.
+/// Maximum number of pieces of motion (sliding or held) in one interval. The torque is linear in time, so that an
+/// interval has at most four.
 const PIECES: u32 = 16;
 /// Number of bisection steps that locate an event.
 const HALVINGS: u32 = 100;

@@ -42,7 +42,8 @@ impl Tanks<f64> {
         from_fn(|i| h[i] >= brim && net[i] > 0.0)
     }
 
-    /// Returns the levels after a step of `length` in s, and its error in m.
+    /// Returns the levels after one Dormand-Prince step of `length` in s, and its estimated error in m. A tank that is
+    /// `full` spills: its level is constant.
     fn stride(&self, h: &[f64; 3], full: [bool; 3], length: f64) -> ([f64; 3], f64) {
         let mut slopes = [[0.0; 3]; 7];
         let increment = |weights: &[f64], slopes: &[[f64; 3]; 7], i: usize| -> f64 {

@@ -29,7 +29,8 @@ pub(crate) struct Controller {
     pub(crate) tau_ref: f64,
 }
 
-/// Returns the torque in N.m that gives most power, `K_opt omega_g^2`.
+/// Returns the torque in N.m that gives most power at the generator speed `omega_g` in rad/s, `K_opt omega_g^2`. The
+/// optimal tip-speed ratio is 8.
 pub(crate) fn optimal_torque(omega_g: f64) -> f64 {
     let speed = omega_g / (8.0 * GEAR);
     let swept = 0.5 * DENSITY * PI * RADIUS.powi(5);

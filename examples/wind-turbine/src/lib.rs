@@ -186,6 +186,7 @@ impl WindTurbine {
 impl Model for WindTurbine {
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         (self.start, self.sample, self.gust) = (experiment.start_time, 0, 0.0);
+        // At 11.5 m/s the turbine is still below its rated power and speed.
         self.state = State::at_optimal_speed(self.v_mean.min(11.5), optimal_torque);
         self.controller = Controller::default();
         self.take_sample();
