@@ -65,7 +65,9 @@ impl Limits {
 
     /// Says why `value` is not allowed; `None` if it is allowed.
     fn refuse(&self, value: f64) -> Option<String> {
-        let rounding = |limit: f64| self.tolerance.max(ROUNDING * limit.abs());
+        // Integers, whose tolerance is 0, have no rounding errors.
+        let relative = if self.tolerance > 0.0 { ROUNDING } else { 0.0 };
+        let rounding = |limit: f64| self.tolerance.max(relative * limit.abs());
         let is_item =
             |(_, number): &(String, i64)| slave::to_real(*number).total_cmp(&value).is_eq();
         if !self.items.is_empty() && !self.items.iter().any(is_item) {
