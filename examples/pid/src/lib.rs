@@ -9,8 +9,7 @@ struct Pid {
     law: law::Law,
     samples: i32,
     status: String,
-    /// Time of the next sample in s.
-    next: f64,
+    next: f64, // time of the next sample in s
 }
 
 impl Model for Pid {
