@@ -324,8 +324,9 @@ impl Model for AsoController {
         Some(&mut self.log)
     }
 
-    /// `None` for a continuous controller with a detection, because the states of its filter are integrated with those
-    /// of the observer, and for one that checks its measurements, which it does at communication points.
+    /// `None`, no model exchange, for a continuous controller with a detection, whose residual filter is computed only
+    /// in steps of co-simulation, together with the observer; and for one that checks its measurements, which it does
+    /// at communication points only.
     fn model_exchange(&self) -> Option<ModelExchange> {
         let is_stepped = self.detector.is_some() || self.measurement_check.is_some();
         if is_stepped && self.sampler.is_none() {

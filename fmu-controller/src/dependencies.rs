@@ -219,7 +219,7 @@ fn whole<'a>(name: &'a str, matrix: &'a Matrix) -> impl Iterator<Item = String> 
     (0..matrix.values.len()).map(move |k| matrix.element(name, k))
 }
 
-/// What decides whether the fault is compensated at the start.
+/// The names of the variables that decide whether the estimated faults are compensated at the start.
 fn switches() -> Vec<String> {
     ["time", "compensate", "t_on"].map(str::to_owned).to_vec()
 }

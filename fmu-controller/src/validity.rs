@@ -97,8 +97,8 @@ impl MeasurementCheck {
         }
     }
 
-    /// Checks the measurements of a step of a continuous controller of `size` s from `start`, and sets those of
-    /// `values`.
+    /// Checks the measurements of a continuous controller for the communication step from `start`, in s, with the size
+    /// `size`, in s; sets the measurements of `values` to those that are used.
     pub(crate) fn take_step(&mut self, values: &mut Values, start: f64, size: f64) {
         for k in 0..self.y.len() {
             let (mut y, mut slope) = (self.y[k], self.y_slopes[k]);

@@ -71,7 +71,8 @@ impl Parameters {
     /// Checks every rule.
     ///
     /// The rules make the mass matrix positive definite in every position
-    /// (`(M + m) J > (m l)²`) and the friction law positive and falling from `F_s` to `F_c`.
+    /// (`(M + m) J > (m l)²`) and the friction law not negative and, from `F_s` to `F_c`, not
+    /// increasing with speed.
     ///
     /// # Errors
     /// The name, value and rule of the first parameter out of range.

@@ -480,7 +480,9 @@ impl<N: Number> Signals<'_, N> {
     }
 }
 
-/// `E_hat` = -u `f_hat` / (u^2 + `u_e`^2), limited to the finite numbers.
+/// Returns the estimated loss of effectiveness of an actuator, `E_hat` = -u `f_hat` / (u^2 + `u_e`^2), with the command
+/// u, the estimate `f_hat` of its fault and `squared_least_command` = `u_e`^2. Infinity becomes the largest finite
+/// number; NaN stays.
 pub fn lost_effectiveness<N: Number>(u: &N, f_hat: &N, squared_least_command: &N) -> N {
     let scale = N::whole(1) / (u.clone() * u.clone() + squared_least_command.clone());
     let loss = -(u.clone() * scale) * f_hat.clone();

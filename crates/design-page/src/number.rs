@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use design_report::number::rounded;
 
-/// Returns the shortest text that parses to the same finite number in TOML, numpy and MATLAB.
+/// Returns a text with the fewest significant digits that parse to the same finite number in TOML, numpy and MATLAB.
 pub(super) fn exact(value: f64) -> String {
     format!("{value:?}")
 }

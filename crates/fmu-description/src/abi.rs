@@ -137,8 +137,8 @@ pub struct fmi2CallbackFunctions {
 /// Callback that receives text from `fmuDescribe`: context, bytes (not terminated), length.
 pub type DescribeSink = unsafe extern "C" fn(*mut c_void, *const c_char, usize);
 
-/// Name of the function of a library that renders its model description in FMI 2.0. Only this function
-/// and [`DESCRIBE_3`] are not functions of the standard.
+/// Name of the function of a library that renders its model description in FMI 2.0. Neither this function nor
+/// [`DESCRIBE_3`] is part of the standard.
 ///
 /// `int fmuDescribe(const char *resources, void *context, void (*sink)(void *context, const char
 /// *text, size_t length))` passes the XML to `sink` and returns 0, or passes an error message and

@@ -143,8 +143,9 @@ impl Instance {
         &self.view.description
     }
 
-    /// Sets structural parameters in Configuration Mode; arrays whose dimensions they are change their sizes. The FMU
-    /// is not called if the new sizes are impossible.
+    /// Sets structural parameters in Configuration Mode, which resizes the arrays whose dimensions refer to them.
+    /// `description` is the description of the FMU, with whole arrays. Does not call the FMU if the new sizes are
+    /// impossible.
     pub(crate) fn configure(
         &mut self,
         description: &ModelDescription,
@@ -154,6 +155,7 @@ impl Instance {
         const NAME: &str = "fmi3EnterConfigurationMode";
         let mut sizes = self.sizes.clone();
         for (reference, value) in references.iter().zip(values) {
+            // A negative number is no size; `write` refuses it for an unsigned type.
             if let Ok(value) = u64::try_from(*value) {
                 sizes.insert(*reference, value);
             }

@@ -43,7 +43,7 @@ pub(crate) struct Core<M: Model> {
     time: f64,
     /// Whether a value was set since the model last computed its outputs.
     stale: bool,
-    /// Whether a parameter was set since [`Model::check`] last passed.
+    /// Whether [`Model::check`] has not passed yet, or a parameter was set since it last passed.
     unchecked: bool,
     /// Whether an input derivative is set for the next step.
     sloped: bool,
@@ -110,7 +110,7 @@ impl<M: Model> Core<M> {
         }
     }
 
-    /// Calls [`Model::check`] if a parameter was set since its last success.
+    /// Calls [`Model::check`] if it has not passed yet, or if a parameter was set since it last passed.
     #[inline]
     fn check(&mut self) -> Result<(), Failure> {
         if self.unchecked { self.check_model() } else { Ok(()) }

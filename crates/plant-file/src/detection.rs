@@ -163,7 +163,7 @@ fn method(table: &Table<'_>) -> Result<Method, PlaceError> {
     Ok(Method::Cusum)
 }
 
-/// Reads the mean time between false alarms in s, or their number per hour.
+/// Returns the mean time between false alarms in s, stated as such or as a number per hour.
 fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
     match (table.get("false_alarm_interval"), table.get("false_alarms_per_hour")) {
         (Some(entry), None) => entry.positive(),

@@ -35,7 +35,7 @@ pub enum Requirement {
         bound: Option<f64>,
         /// The region of the eigenvalues; that of all stable ones if none is stated.
         region: Region,
-        /// The weights of inputs and outputs.
+        /// The weights of the outputs of the norm and of the measurement noise.
         channel: Channel,
     },
 }

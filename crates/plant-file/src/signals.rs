@@ -13,7 +13,7 @@ pub struct Signal {
     pub name: String,
     /// Its unit, as FMI writes it.
     pub unit: Option<String>,
-    /// What it is, for a reader.
+    /// The meaning of the signal, for a reader.
     pub description: String,
     /// The value at the operating point, if stated.
     pub operating: Option<f64>,

@@ -17,7 +17,7 @@ pub trait Number:
     /// The largest finite number.
     fn largest() -> Self;
 
-    /// A whole number.
+    /// `count` as a number of this type.
     fn whole(count: u32) -> Self;
 
     /// Whether it is neither infinite nor NaN.

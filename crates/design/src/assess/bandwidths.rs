@@ -147,7 +147,8 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
 /// Returns the speed of the plant in rad/s, to which the bandwidths are relative: a stated bandwidth of the feedback,
 /// or the median of the moduli of the eigenvalues, those stated for the feedback or else those of the plant.
 ///
-/// A median is at least twice the largest real part, and at most what sample time and delays allow.
+/// Eigenvalues that are 0 up to rounding errors do not count; if no other ones exist, the median is replaced by
+/// [`WITHOUT_SPEED`]. The result is raised to twice the largest real part, then limited by sample time and delays.
 fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, file.sampling) {
         (Requirement::Eigenvalues(all), _) => all.clone(),

@@ -11,7 +11,8 @@ use plant_file::robustness::RobustnessLimits;
 /// The peaks of S of a stable loop, and its stability within the tolerances.
 pub(crate) struct Judged {
     pub(crate) points: Vec<LoopPoint>,
-    /// Whether a plant within the tolerances is unstable; false if the tolerances were not examined.
+    /// Whether an unstable loop was found for entries of the plant within their tolerances; false if these were not
+    /// examined. Tolerances of FMU parameters do not count.
     pub(crate) is_unstable: bool,
 }
 

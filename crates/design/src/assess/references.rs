@@ -166,7 +166,8 @@ impl<'a> ReferenceLoop<'a> {
         })
     }
 
-    /// Returns the curve of a row of the system, for a step of this size.
+    /// Returns the response to a step of `size` from `trace`, the response to a step of 1. `row`: a row of `system`, an
+    /// output (of a sampled loop also between samples) or a command. `output`: its name and unit.
     fn curve(&self, trace: &TimeResponse, row: usize, size: f64, output: &Output) -> Curve {
         let points = if row < self.outputs.len() {
             self.points(trace, row)

@@ -175,12 +175,12 @@ impl Physical {
         Self::with(designed, &designed.linear)
     }
 
-    /// Another plant with the same controller.
+    /// Returns the plant `linear` and the controller of `designed`.
     pub(crate) fn with(designed: &Solution, linear: &LinearPlant) -> Result<Self, Error> {
         Self::of_gains(designed, linear, &designed.gains)
     }
 
-    /// Another plant and other gains in the same controller.
+    /// Returns the plant `linear` and the controller of `designed` with `gains` in place of its own gains.
     pub(crate) fn of_gains(
         designed: &Solution,
         linear: &LinearPlant,

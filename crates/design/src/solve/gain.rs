@@ -40,7 +40,7 @@ pub(crate) struct Noise {
     pub(crate) is_relative: bool,
 }
 
-/// The results of an eigenvalue assignment among which the loop decides.
+/// The gains that assign the same eigenvalues; the one whose closed loop has the lowest peaks of S is used.
 #[derive(Clone)]
 pub(crate) struct GainChoice {
     /// See [`control::placement::Alternatives::candidates`].
@@ -137,7 +137,7 @@ impl GainResult {
         Self { gain: map(&self.gain), ..self }
     }
 
-    /// Returns the results among which the loop decides; without a choice this result alone.
+    /// Returns the candidates among which the peaks of S select; without a choice, this result as the only candidate.
     pub(crate) fn into_choice(mut self) -> GainChoice {
         if let Some(choice) = self.choice.take() {
             return *choice;

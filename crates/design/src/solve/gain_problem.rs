@@ -104,8 +104,11 @@ impl GainProblem<'_> {
         ))
     }
 
-    /// Returns the gains of feedback and observer that are best together, with a warning if they do not give the loop
-    /// its shape. `gains`: computes those of the controller from both.
+    /// Returns the gains of feedback and observer: tuned to the loop shape of the plant file, with a warning if they do
+    /// not reach it; without a loop shape, the pair with the lowest peaks of S, or of a schedule the first pair.
+    ///
+    /// `common`: the feedback of a family, not used with a loop shape. `filter`: the coefficients of the measurement
+    /// filter. `gains`: computes the gains of the controller from those of feedback and observer.
     pub(crate) fn chosen(
         &self,
         common: Option<GainResult>,

@@ -131,8 +131,8 @@ pub(crate) fn check_member(
     Err(file.error_at(&variant.place, message))
 }
 
-/// Returns A and B of the feedback: those of the plant, with integral action followed by the integrals. `plant`: A, B
-/// and C.
+/// Returns A and B of the system that the state feedback controls: those of the plant; if the references have integral
+/// action, extended by the integrals as last states. `plant`: A, B and C.
 pub(crate) fn feedback_pair(
     references: Option<&References>,
     plant: [&DMatrix<f64>; 3],

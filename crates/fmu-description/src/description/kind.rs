@@ -201,7 +201,7 @@ impl Kind {
         }
     }
 
-    /// Whether the type has a `start`: of a scalar, or one for all elements of an array.
+    /// Whether the type has a `start`: of a scalar, or one for all elements of an array. False for a list of starts.
     #[must_use]
     pub fn has_start(&self) -> bool {
         match self {

@@ -23,7 +23,8 @@ pub(super) enum ElementValue {
     Bytes(Vec<u8>),
 }
 
-/// Remembered values, by the position of the element among those that may change in Event Mode only.
+/// Values of clocked elements at their last tick, or to be set at their next one. The key is the position of the
+/// element among all elements that may change in Event Mode only.
 pub(super) type Memory = BTreeMap<usize, ElementValue>;
 
 /// A value of type String or Binary.

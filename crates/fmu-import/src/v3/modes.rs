@@ -90,7 +90,8 @@ impl Instance {
         self.leave_event_mode()
     }
 
-    /// Hands the events over to the master; returns whether the FMU has Event Mode.
+    /// Hands the events over to the master: a step ends at an event at its end or, with `stop`, at the first event.
+    /// Returns whether the FMU was instantiated with `eventModeUsed`; always false in model exchange.
     pub(crate) fn hand_over_events(&mut self, stop: bool) -> bool {
         (self.hands_over_events, self.stops_at_events) = (true, stop);
         self.event_mode

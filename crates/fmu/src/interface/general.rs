@@ -32,7 +32,8 @@ pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
     description(M::IDENTIFIER, model.about(), indicators, M::PROVIDES_DIRECTIONAL_DERIVATIVE)
 }
 
-/// Returns the general part for a model with this number of event indicators, `None` without model exchange.
+/// Returns the general part of a model description. `indicators` is the number of event indicators; `None` if the
+/// model has no model exchange.
 fn description(
     identifier: &str,
     about: About,

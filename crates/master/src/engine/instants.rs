@@ -89,8 +89,8 @@ impl Instants {
         next.reduce(f64::min).filter(|next| *next < end - rounding)
     }
 
-    /// Whether an instant is due at `time`: a slave has an event, a variable of it is driven and jumps, or one of
-    /// its discrete inputs has a new value.
+    /// Whether an instant is due at `time`: a slave has an event, one of its driven variables has a break
+    /// ([`Self::has_break`]), or one of its discrete inputs has a new value.
     pub(crate) fn is_due(&self, parts: &mut Parts<'_>, time: f64) -> bool {
         self.pending.iter().any(|pending| *pending <= time)
             || self.has_break(parts.drives, time)
@@ -100,7 +100,8 @@ impl Instants {
             })
     }
 
-    /// Whether a driven variable of a slave with events jumps at `time`.
+    /// Whether a driven variable of a slave with events has a break at `time`: its drive starts, or its signal or a
+    /// fault on it jumps or has a kink.
     fn has_break(&self, drives: &Drives, time: f64) -> bool {
         !drives.is_empty()
             && drives
@@ -108,7 +109,7 @@ impl Instants {
                 .any(|drive| self.members.contains(&drive.port().slave) && drive.breaks_at(time))
     }
 
-    /// Iterates the instant at `time`: slaves with a pending event or a driven variable that jumps enter event mode;
+    /// Iterates the instant at `time`: slaves with a pending event or a break of a driven variable enter event mode;
     /// then values are exchanged and discrete states updated until nothing changes. If a slave requests the end of the
     /// simulation, returns at once, with slaves in event mode.
     pub(crate) fn iterate(
@@ -146,7 +147,7 @@ impl Instants {
         Ok(())
     }
 
-    /// Enters event mode of slaves with a driven variable that jumps; sets the driven variables and clocks of all
+    /// Enters event mode of slaves with a break of a driven variable; sets the driven variables and clocks of all
     /// slaves in event mode.
     fn drive(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<(), SystemError> {
         if parts.drives.is_empty() {
@@ -154,9 +155,9 @@ impl Instants {
         }
         for position in 0..self.members.len() {
             let slave = self.members[position];
-            let jumps =
+            let breaks =
                 |drive: &crate::drive::Drive| drive.port().slave == slave && drive.breaks_at(time);
-            if !self.in_event[slave] && parts.drives.iter().any(jumps) {
+            if !self.in_event[slave] && parts.drives.iter().any(breaks) {
                 self.enter(parts.system, slave, time)?;
             }
         }

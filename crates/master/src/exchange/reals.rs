@@ -166,21 +166,24 @@ impl Reals {
         }
     }
 
-    /// Computes value and derivatives of the input at index `k`, which is number `position` of the
-    /// slave.
+    /// Computes the value of one input of `slave` for a step from `time` over `size`, both in s, and its derivatives at
+    /// `time` up to the order that the slave takes. `k` is the index of the input among those of all slaves, `position`
+    /// among those of `slave`. Without derivatives, the value is the mean of a linear or quadratic polynomial over the
+    /// step, or, for `Limited` with a known end, the value at its end.
     fn gather_input(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, port_map) = (&self.layout, &self.layout.port_maps[slave]);
         let source = layout.sources[k] as usize;
-        let known = self.is_known(slave, source, time + size);
+        let end_known = self.is_known(slave, source, time + size);
         let source_time = self.source_time(slave, layout.owners[source] as usize, time, size);
-        let ahead = self.multirate && known && self.extrapolation == Extrapolation::Hold;
-        let extrapolation = if layout.held[k] || ahead {
+        // With Hold, a source that has stepped further gives its value at `source_time`, not at the end of its own step.
+        let may_be_ahead = self.multirate && end_known && self.extrapolation == Extrapolation::Hold;
+        let extrapolation = if layout.held[k] || may_be_ahead {
             Polynomial::held(self.value_at(source, source_time))
         } else {
             self.polynomial(slave, source, time, size)
         };
         let value = match (port_map.input_order, self.extrapolation) {
-            (0, Extrapolation::Limited) if known => extrapolation.end(size),
+            (0, Extrapolation::Limited) if end_known => extrapolation.end(size),
             (0, Extrapolation::Linear | Extrapolation::Quadratic) => extrapolation.mean(size),
             _ => extrapolation.value,
         };
@@ -197,7 +200,7 @@ impl Reals {
                     fault.apply_derivatives(time, [value, input.slope, input.curvature]);
                 Polynomial { value, slope, curvature }
             } else {
-                let at_end = known
+                let at_end = end_known
                     && matches!(self.extrapolation, Extrapolation::Hold | Extrapolation::Limited);
                 Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
             };
@@ -338,8 +341,9 @@ impl Reals {
         )
     }
 
-    /// Returns an input of the slave that is not finite after transformation and fault, with its value;
-    /// `None` without such an input, and if all inputs are copies of outputs, which are checked themselves.
+    /// Returns an input of the slave that is not finite after transformation and fault, with its value; `None` if all
+    /// are finite. Also returns `None`, without a check, if no connection to the slave has a transformation and no
+    /// connected Real has a fault: outputs are checked themselves. This misses an extrapolation that overflows.
     #[inline]
     pub(crate) fn input_not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         if self.layout.plain[slave] && self.faults.is_empty() {
