@@ -22,8 +22,9 @@ pub struct FastAdaptive {
 /// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = f_hat_i + Gamma F e,  f_hat_i' = sigma Gamma F e
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and `L_x` has A - `L_x` C = [-sigma I, \*; 0, ..], so that the error
-/// eps = `f_hat` - f obeys eps' = -Gamma eps + Gamma \* w - f': each estimate is the fault after a first-order lag of
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and in the coordinates of that form `L_x` has
+/// A - `L_x` C = [-sigma I, J; 0, ..]. The error eps = `f_hat` - f then obeys
+/// eps' = -Gamma eps + Gamma J w - f': each estimate is the fault after a first-order lag of
 /// rate gamma, disturbed only by w, the error of the states that no fault enters, which no fault excites. In
 /// sampled time (current estimator) the eigenvalues are e^(-sigma T) and e^(-gamma T).
 /// `gains`: for `K_x`, `K_f` and the estimator; `rate`: the rate of the other errors, in 1/s, see
@@ -56,6 +57,7 @@ pub fn fast_adaptive(
     let q = plant.f_a.ncols();
     check::column("gamma", &law.gamma, q)?;
     check::positive("sigma", law.sigma)?;
+    check::positive("rate", rate)?;
     law.gamma.iter().try_for_each(|&gamma| check::positive("gamma", gamma))?;
     let pole = eigenvalue(law.sigma, domain);
     let gamma = law.gamma.iter().map(|&gamma| domain.constant() - eigenvalue(gamma, domain));
