@@ -9,7 +9,7 @@
 //! closed loop:
 //!
 //! 1. A long autoregressive model predicts `y[k]` from s earlier samples `z = [u; y]`, and `u[k]` if there is D: least squares.
-//! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their Hankel matrix times the s
+//! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their block Toeplitz matrix times the s
 //!    earlier samples is the extended observability matrix times `x[k]`, if (A - K C)^s is negligible.
 //! 3. The singular value decomposition of this product gives `x[k]` = T z, in the order of what the states explain.
 //! 4. `y[k]` on `x[k]`, `u[k]` gives C, D, d and `e[k]`; `x[k+1]` on `x[k]`, `u[k]`, `e[k]` gives A, B, K, b: least squares.

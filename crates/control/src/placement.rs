@@ -133,7 +133,7 @@ pub fn place(
     PlacementProblem { a, b, poles, sampled: false }.place(&Coordinates::Given)
 }
 
-/// Like [`place`], but eigenvectors that are well conditioned in balanced coordinates come first.
+/// Like [`place`], but prefers eigenvectors that are well conditioned in balanced coordinates.
 ///
 /// In step 2 the states are scaled by powers of two such that A + B K for the eigenvectors of least
 /// condition number is balanced (Parlett and Reinsch 1969), and the condition number is minimised
@@ -188,7 +188,7 @@ pub fn place_discrete(
 
 /// The coordinates in which the eigenvectors of the candidate of least condition number are chosen.
 pub(crate) enum Coordinates<'a> {
-    /// Those of A.
+    /// The coordinates of A.
     Given,
     /// Those that balance A + B K of the candidate in the coordinates of A.
     Balanced,

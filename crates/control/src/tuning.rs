@@ -112,7 +112,7 @@ impl Tuning<'_> {
         Ok(largest)
     }
 
-    /// Returns the dynamics of the states of plant and controller together.
+    /// Returns A of the closed loop at `parameters`: the states of the plant, then those of the controller.
     ///
     /// # Errors
     ///

@@ -62,6 +62,9 @@ fn flight_actuators(missed: &mut u32) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Compares the errors of fault estimates with the published ones, for the aircraft at all masses: with the exact
+/// static generator of each mass, that of the nominal mass, the mean of all, and the best constant one. An error is
+/// the H-infinity norm from commands, winds and faults to the estimates less the faults.
 fn air_data_sensors(missed: &mut u32) -> Result<(), Box<dyn Error>> {
     println!("\nCS2_1: faults of air data sensors{:<34} {:>14} {:>14}", "", "published", "here");
     let plants: Vec<_> = (0..sensors::MODELS).map(sensors::plant).collect::<Result<_, _>>()?;

@@ -241,7 +241,8 @@ impl DetectionFilter {
     /// e' = A e + (T e_d - B_y e_s) d,  r = -C e + D_y e_s d
     /// ```
     ///
-    /// with A, `B_y`, C, `D_y` of the generator. Commands have no effect on e and r.
+    /// with T = `start`, A, `B_y`, C, `D_y` of the generator, and the columns `e_d` = `input.on_states` and
+    /// `e_s` = `input.on_measurements`. Commands have no effect on e and r.
     ///
     /// # Errors
     ///

@@ -127,7 +127,8 @@ impl Subspace {
     }
 }
 
-/// The Hankel matrix of the predictor's coefficients, s p x s (m + p): block row j has the coefficients of `z[k-s]` to
+/// The upper triangular block Toeplitz matrix of the predictor's coefficients, s p x s (m + p): times the s earlier
+/// samples it is the extended observability matrix times `x[k]`. Block row j has the coefficients of `z[k-s]` to
 /// `z[k-1]` for `y[k+j]`, zero for samples that are more than s before it.
 fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
     let (past, signals, outputs) = (windows.past, windows.signals(), windows.outputs);

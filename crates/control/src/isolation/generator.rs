@@ -14,7 +14,8 @@ const ACCURACIES: f64 = 10.0;
 /// A decoupling error up to this comes from rounding of the data; a larger one comes from a coupling that
 /// counted as zero, so that smaller tolerances are tried.
 const DECOUPLED: f64 = 1e-6;
-/// A tolerance above this is reduced once more.
+/// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100; so the last one is above
+/// 1e-14.
 const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// The largest decoupling error that is accepted.
 const ALLOWED: f64 = 1e-3;

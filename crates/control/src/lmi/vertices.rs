@@ -127,7 +127,8 @@ pub fn certify_common(
 }
 
 /// The certificate of [`certify_common`], searched in the coordinates of the mean of the vertices and of the first one
-/// only; None if there is none, without a search for the contradiction. There must be a vertex.
+/// only, without a search for a contradiction. None if a vertex has an eigenvalue outside of the region, or if neither
+/// search succeeds, although a P may exist. There must be a vertex.
 ///
 /// # Errors
 ///

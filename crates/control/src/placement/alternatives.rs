@@ -18,7 +18,7 @@ const NEAR: f64 = 1.09;
 pub struct Alternatives {
     /// The one that the placement chooses.
     pub chosen: Placement,
-    /// Others, the lowest peak of S first, at most 21, above 24 states at most 2. Condition number
+    /// The other placements, the lowest peak of S first, at most 20, above 24 states at most 2. Condition number
     /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
     pub others: Vec<Placement>,
     /// The results of two standard methods, up to 24 states, None if there is none: of method 0 of Kautsky, Nichols

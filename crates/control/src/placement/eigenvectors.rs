@@ -109,8 +109,12 @@ fn enlarge_volume(
     Ok(directions)
 }
 
-/// The w, of any length, whose eigenvectors span the largest volume with the others; the columns of `normals` span
-/// the complement of the others.
+/// The w, of any length, whose eigenvectors span the largest volume with the others.
+///
+/// `normals`: n x 1 for a real eigenvalue, n x 2 for a pair, its columns normal to the other eigenvectors.
+/// `space.states` maps w to v, or to [v1; v2] of a pair, whose volume is in proportion to |w' `form` w|. `shift` makes
+/// `form` and -`form` positive semidefinite, so that their first singular vectors are the eigenvectors of the highest
+/// and of the lowest eigenvalue of `form`.
 fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> {
     let n = normals.nrows();
     if space.poles.count() == 1 {

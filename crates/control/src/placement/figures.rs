@@ -69,7 +69,7 @@ impl<'a> FeedbackLoop<'a> {
         self.problem.spaces.iter().map(|space| space.poles)
     }
 
-    /// None where the eigenvectors are dependent.
+    /// The eigenstructure of these directions; None if the eigenvectors are dependent.
     fn eigenstructure(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
         let v = self.problem.eigenvectors(directions);
         let inverse = self.problem.inverse(directions)?;

@@ -28,7 +28,7 @@ pub struct KalmanFilter {
 ///
 /// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the
 /// process noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, the
-/// intensity of the measurement noise. Solves the equation of [`lqr`] for A', C', W, V:
+/// intensity of the measurement noise (in sampled time its covariance). Solves the equation of [`lqr`] for A', C', W, V:
 ///
 /// ```text
 /// A P + P A' - P C' V^-1 C P + W = 0              L = P C' V^-1

@@ -28,7 +28,8 @@ pub struct DiskMargin {
 }
 
 impl DiskMargin {
-    /// The real factors of the disk: lowest and highest gain.
+    /// The real factors of the disk: lowest and highest gain. From `alpha` = 2 on 0 and infinity, although a disk above
+    /// 2 also contains negative factors.
     #[must_use]
     pub fn gains(&self) -> [f64; 2] {
         let half = 0.5 * self.alpha;

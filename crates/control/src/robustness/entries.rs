@@ -50,7 +50,8 @@ pub struct SensitivityPeak {
 /// exists if the largest singular value is simple. For a sampled loop the derivatives with respect to A and B follow
 /// from those of the sampled plant by the adjoint of the derivative of the matrix exponential, L(M', G) for the
 /// gradient G. Cost: about that of three solutions of a complex system of the order of the loop. An infinite
-/// frequency gives the value 1 and zeros: there S = I.
+/// frequency gives the value 1, as S = I there, and zeros, also for D, although S depends on D there if the controller
+/// has a direct term.
 ///
 /// Source: derivative of a simple singular value, G. W. Stewart and J. Sun, Matrix perturbation
 /// theory (1990), section IV.2; Fréchet derivative of the exponential by a block matrix, N. J.

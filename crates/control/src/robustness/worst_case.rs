@@ -61,7 +61,7 @@ pub(super) fn climb<F: PlantFamily>(
 }
 
 /// The derivatives, with respect to the deviations, of [`Domain::excess`] of the `count` eigenvalues nearest to
-/// instability; eigenvalues without eigenvectors are left out.
+/// instability; eigenvalues for which [`eigenvectors`] returns None are left out.
 fn gradients<F: PlantFamily>(
     loops: &Loops<'_, F>,
     deviations: &[f64],
@@ -135,8 +135,9 @@ fn gradients<F: PlantFamily>(
     Ok(slopes)
 }
 
-/// Left and right eigenvector (row and column) with the product one, by inverse iteration; None if
-/// the eigenvalue is defective or the iteration fails.
+/// Left and right eigenvector (row and column) with the product one, by inverse iteration; None if the iteration fails
+/// or the product of the two at length one is exactly zero. For a defective eigenvalue that product is about `SHIFT`,
+/// and the left vector is large.
 fn eigenvectors(m: &DMatrix<f64>, mode: Complex<f64>) -> Option<(Vector, Vector)> {
     let n = m.nrows();
     let shift = mode + Complex::new(SHIFT, SHIFT) * mode.norm().max(m.amax() * f64::EPSILON);
