@@ -192,14 +192,11 @@ impl<'a> Node<'a> {
     ) -> Result<Option<i128>> {
         let expected = || format!("an integer from {} to {}", range.start(), range.end());
         let Some((text, trimmed)) = self.content(name, expected_if_empty) else { return Ok(None) };
-        let inside = |value: &i128| range.contains(value);
-        if let Some(value) = trimmed.parse().ok().filter(inside) {
-            return Ok(Some(value));
-        }
-        let real = trimmed.parse::<f64>().ok().filter(|real| real.fract() == 0.0);
-        let value = real.and_then(|real| format!("{real:.0}").parse().ok()).filter(inside);
+        let value = integer(trimmed).filter(|value| range.contains(value));
         let value = value.ok_or_else(|| self.wrong(name, &expected(), text))?;
-        self.warn(name, &expected(), text, &format!("read as {value}"));
+        if trimmed.parse::<i128>().is_err() {
+            self.warn(name, &expected(), text, &format!("read as {value}"));
+        }
         Ok(Some(value))
     }
 
@@ -326,6 +323,15 @@ impl<'a> Node<'a> {
         let list = self.optional_child(name)?;
         list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
     }
+}
+
+/// Parses an integer, also one with a point (`1.0`); such a one is rounded to an `f64`.
+pub(super) fn integer(text: &str) -> Option<i128> {
+    let whole = || {
+        let real = text.parse::<f64>().ok().filter(|real| real.fract() == 0.0)?;
+        format!("{real:.0}").parse().ok()
+    };
+    text.parse().ok().or_else(whole)
 }
 
 /// Whether the text is a spelling of infinity or NaN in XML Schema, C, C#, Java or Windows.

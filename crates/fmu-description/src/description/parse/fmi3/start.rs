@@ -1,9 +1,7 @@
 //! Reads the start values of variables and arrays of FMI 3.0.
 
-use std::ops::RangeInclusive;
-
 use super::kinds::Precision;
-use crate::description::parse::attributes::{Node, Result};
+use crate::description::parse::attributes::{Node, Result, integer};
 use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
 
@@ -14,7 +12,7 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
     if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
         let values = list(
             element,
-            |text| integer(text, &range),
+            |text| integer(text).filter(|value| range.contains(value)),
             || format!("integers from {} to {}", range.start(), range.end()),
         )?;
         return Ok(single(values, |value| integer_type.start = Some(value)).map(Elements::Integer));
@@ -69,16 +67,6 @@ fn list<T>(
         element.warn("start", &expected(), text, "read as if it were not there");
     }
     Ok(values)
-}
-
-/// Parses an integer in `range`, also one with a point (`1.0`).
-fn integer(text: &str, range: &RangeInclusive<i128>) -> Option<i128> {
-    let plain = text.parse().ok();
-    let whole = || {
-        let real = text.parse::<f64>().ok().filter(|real| real.fract() == 0.0)?;
-        format!("{real:.0}").parse().ok()
-    };
-    plain.or_else(whole).filter(|value| range.contains(value))
 }
 
 fn boolean(text: &str) -> Option<bool> {

@@ -43,7 +43,7 @@ fn refused(variables: &str, structure: &str) -> String {
 }
 
 #[test]
-fn each_type_has_its_own_range_of_start_values() {
+fn each_type_has_its_own_range_of_start_values_and_limits() {
     for (element, low, high) in [
         ("Int8", i128::from(i8::MIN), i128::from(i8::MAX)),
         ("UInt8", 0, u8::MAX.into()),
@@ -72,6 +72,13 @@ fn each_type_has_its_own_range_of_start_values() {
             );
             let expected = format!("expected integers from {low} to {high}, found \"{wrong}\"");
             assert!(error.contains(&expected), "{error}");
+            // Rounded to an `f64`, the integer below those of an `Int64` is the smallest `Int64`.
+            for limit in ["min", "max"] {
+                let text = format!(r#"<{element} name="i" valueReference="1" {limit}="{wrong}"/>"#);
+                let error = refused(&text, "");
+                let expected = format!("expected an integer from {low} to {high}, found");
+                assert!(error.contains(&expected), "{error}");
+            }
         }
     }
 }
