@@ -25,7 +25,7 @@ const HEADERS: [(&str, &str); 6] = [
 /// The parts of an FMU that a built one has, apart from its model description.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
 /// The version of the way in which libraries are built here. Change it with this way: built FMUs are cached by it.
-const RECIPE: u32 = 1;
+const RECIPE: u32 = 2;
 /// Largest number of characters of the output of a compiler that an error quotes.
 const OUTPUT: usize = 4000;
 
@@ -227,7 +227,7 @@ impl<'a> Build<'a> {
         let configurations = configurations
             .map_err(|reason| CompileError::Description { path: path.to_owned(), reason })?;
         let mut sets = configurations.iter().flat_map(|configuration| &configuration.sets);
-        let has_cpp = sets.any(SourceFileSet::is_cpp);
+        let has_cpp = sets.any(SourceFileSet::has_cpp);
         Ok(Self {
             path,
             sources: unpacked.folder().join("sources"),
@@ -280,7 +280,7 @@ impl<'a> Build<'a> {
             }
         }
         let linker =
-            self.cpp.as_ref().filter(|_| configuration.sets.iter().any(SourceFileSet::is_cpp));
+            self.cpp.as_ref().filter(|_| configuration.sets.iter().any(SourceFileSet::has_cpp));
         let library = folder.path().join(format!("library{}", std::env::consts::DLL_SUFFIX));
         let mut command = linker.unwrap_or(&self.c).command();
         command.arg("-shared").arg("-o").arg(&library).args(&objects);
@@ -297,7 +297,7 @@ impl<'a> Build<'a> {
         headers: &Path,
         object: &Path,
     ) -> Result<(), CompileError> {
-        let compiler = self.cpp.as_ref().filter(|_| set.is_cpp()).unwrap_or(&self.c);
+        let compiler = self.cpp.as_ref().filter(|_| set.is_cpp(file)).unwrap_or(&self.c);
         let mut command = compiler.command();
         command.current_dir(&self.sources).args(["-c", "-fPIC", "-O2", "-w"]);
         command.args(set.standard().map(|standard| format!("-std={standard}")));

@@ -28,16 +28,18 @@ pub(super) struct SourceFileSet {
 }
 
 impl SourceFileSet {
-    /// Returns whether the files are C++: by the stated language, otherwise if the extension of any file says so.
-    pub(super) fn is_cpp(&self) -> bool {
-        let is_cpp = |file: &String| {
-            let extension = Path::new(file).extension().unwrap_or_default();
-            ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known))
-        };
+    /// Returns whether a file of the set is C++: by the stated language, otherwise by the extension of the file.
+    pub(super) fn is_cpp(&self, file: &str) -> bool {
+        let extension = Path::new(file).extension().unwrap_or_default();
         match &self.language {
             Some(language) => language.starts_with("C++"),
-            None => self.files.iter().any(is_cpp),
+            None => ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known)),
         }
+    }
+
+    /// Returns whether any file of the set is C++.
+    pub(super) fn has_cpp(&self) -> bool {
+        self.files.iter().any(|file| self.is_cpp(file))
     }
 
     /// Returns the value of the compiler's option `-std`; `None` if the language states no year. `C99` becomes `gnu99`,
@@ -149,4 +151,32 @@ fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
         sets: vec![set],
         libraries: Vec::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_stated_language_each_file_has_that_of_its_extension() {
+        let element = xml::read(
+            br#"<CoSimulation modelIdentifier="m"><SourceFiles>
+            <File name="solver.c"/><File name="model.CPP"/><File name="model.hpp"/>
+            </SourceFiles></CoSimulation>"#,
+        );
+        let configuration = source_files(&element.unwrap()).unwrap();
+        let set = &configuration.sets[0];
+        let files = set.files.iter().map(|file| (file.as_str(), set.is_cpp(file)));
+        assert_eq!(files.collect::<Vec<_>>(), [("solver.c", false), ("model.CPP", true)]);
+        assert!(set.has_cpp());
+    }
+
+    #[test]
+    fn a_stated_language_is_that_of_every_file() {
+        for (language, is_cpp) in [("C99", false), ("C++11", true)] {
+            let language = Some(language.to_owned());
+            let set = SourceFileSet { language, ..SourceFileSet::default() };
+            assert_eq!(["solver.c", "model.cpp"].map(|file| set.is_cpp(file)), [is_cpp; 2]);
+        }
+    }
 }
