@@ -33,7 +33,7 @@ pub(crate) use elements::ElementView;
 use mode::Mode;
 use modes::State;
 use plan::Plans;
-use refusal::refused;
+use refusal::{keeps_mode, refused};
 use slave::CallError;
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
@@ -145,7 +145,7 @@ impl Instance {
 
     /// Sets structural parameters in Configuration Mode, which resizes the arrays whose dimensions refer to them.
     /// `description` is the description of the FMU, with whole arrays. Does not call the FMU if the new sizes are
-    /// impossible.
+    /// impossible. The FMU keeps its sizes if a value is refused.
     pub(crate) fn configure(
         &mut self,
         description: &ModelDescription,
@@ -164,7 +164,9 @@ impl Instance {
             .map_err(|reason| refused(NAME, format!("was not called: {reason}")))?;
         self.component.enter_configuration_mode()?;
         let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
-        set.and_then(|()| self.component.exit_configuration_mode())?;
+        let configures = set.as_ref().err().is_none_or(keeps_mode);
+        let exited = if configures { self.component.exit_configuration_mode() } else { Ok(()) };
+        set.and(exited)?;
         // The elements have new positions.
         self.state.held = vec![None; view.shadows];
         self.state.memory.clear();
