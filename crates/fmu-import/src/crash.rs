@@ -24,6 +24,8 @@ use fmu_description::number::seconds;
 
 pub(crate) use limit::Limit;
 pub use place::Name;
+#[cfg(target_os = "linux")]
+pub(crate) use place::observe;
 pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
 #[cfg(target_os = "linux")]
 pub(crate) use signals::{ENDING_SIGNALS, handle, ignores_hangup};

@@ -5,10 +5,10 @@ use std::cell::Cell;
 use std::fmt;
 use std::ops::Deref;
 use std::ptr;
-use std::sync::Arc;
 use std::sync::atomic::{
     AtomicBool, AtomicI32, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize, Ordering,
 };
+use std::sync::{Arc, OnceLock};
 
 use fmu_description::abi::Status;
 use slave::{CallError, Failure};
@@ -51,6 +51,17 @@ impl Record {
     fn used(&self) -> &[Slot] {
         &self.slots[..self.used.load(Ordering::Acquire).min(SLOT_COUNT)]
     }
+}
+
+/// Receives the name of each function that an instance enters, and an empty one when the instance leaves it. Only
+/// workers of isolation have it.
+static OBSERVER: OnceLock<Box<dyn Fn(&str) + Send + Sync>> = OnceLock::new();
+
+/// Passes the functions of all instances of this process to `observer`: their names, and an empty name when an instance
+/// leaves its function. Only the first call of `observe` has an effect.
+#[cfg(target_os = "linux")]
+pub(crate) fn observe(observer: impl Fn(&str) + Send + Sync + 'static) {
+    let _ = OBSERVER.set(Box::new(observer));
 }
 
 thread_local! {
@@ -167,12 +178,18 @@ impl Slot {
     pub(crate) fn enter(&self, function: &'static &'static str) {
         self.function.store(ptr::from_ref(function).cast_mut(), Ordering::Relaxed);
         LAST.set(ptr::from_ref(self).addr());
+        if let Some(observer) = OBSERVER.get() {
+            observer(function);
+        }
     }
 
     /// Records that the call has returned.
     #[inline]
     pub(crate) fn leave(&self) {
         self.function.store(ptr::null_mut(), Ordering::Relaxed);
+        if let Some(observer) = OBSERVER.get() {
+            observer("");
+        }
     }
 
     /// Sets the time of the instance, in s.
@@ -248,6 +265,9 @@ pub(super) fn calls(address: usize) -> impl Iterator<Item = Call> {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(target_os = "linux")]
+    use std::sync::Mutex;
+
     use super::*;
 
     #[test]
@@ -266,5 +286,19 @@ mod tests {
         one.enter(&"fmi2GetReal");
         drop(one);
         assert!(calls(1).all(|call| &*call.instance != "one"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_observer_receives_the_name_of_each_function_and_its_return() {
+        static NAMES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        observe(|name| NAMES.lock().unwrap().push(name.to_owned()));
+        let place = Place::new("observed");
+        place.enter(&"fmi2GetDerivatives");
+        place.leave();
+        // Other tests run at the same time.
+        let names = NAMES.lock().unwrap();
+        let call = names.iter().position(|name| name == "fmi2GetDerivatives").unwrap();
+        assert!(names[call..].iter().any(String::is_empty), "{names:?}");
     }
 }

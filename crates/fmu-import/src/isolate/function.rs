@@ -1,12 +1,16 @@
-//! The functions that a worker executes. The number of a function is the command of the master, and
-//! names the function that crashed.
+//! The functions that a worker executes. The number of a function is the command of the master; its name is that of a
+//! crash between the calls of the FMU.
 
 use fmu_description::Version;
 use serde::{Deserialize, Serialize};
 
-/// C functions that errors can name besides those of the table of [`Function`]: a worker calls them on its own for a
-/// [`Function`].
+/// C functions, and the end of a library, that errors can name besides those of the table of [`Function`]: a worker
+/// calls them on its own for a [`Function`].
 const OTHERS: &[&str] = &[
+    crate::crash::UNLOADING,
+    "fmi2CancelStep",
+    "fmi2FreeFMUstate",
+    "fmi3FreeFMUState",
     "fmi3ExitConfigurationMode",
     "fmi3GetFloat32",
     "fmi3SetFloat32",
@@ -28,11 +32,14 @@ const OTHERS: &[&str] = &[
     "fmi3SetClock",
     "fmi3GetIntervalDecimal",
     "fmi3GetShiftDecimal",
+    "fmi3InstantiateScheduledExecution",
     "fmi3ActivateModelPartition",
+    "fmiCancelStep",
     // Model exchange.
     "the integration of the model-exchange FMU",
     "numberOfContinuousStates",
     "numberOfEventIndicators",
+    "fmi3InstantiateModelExchange",
     "fmi3EnterContinuousTimeMode",
     "fmi3CompletedIntegratorStep",
     "fmi3SetTime",
@@ -50,8 +57,10 @@ const OTHERS: &[&str] = &[
     "fmi2GetDerivatives",
     "fmi2GetEventIndicators",
     "fmi2GetNominalsOfContinuousStates",
+    "fmiInstantiateModel",
     "fmiInitialize",
     "fmiTerminate",
+    "fmiFreeModelInstance",
     "fmiEventUpdate",
     "fmiCompletedIntegratorStep",
     "fmiSetTime",

@@ -311,8 +311,8 @@ impl Isolated {
         }
     }
 
-    /// Kills the worker after a failure. Returns the error of the C function that the worker executed, or of `function`
-    /// if that is unknown.
+    /// Kills the worker after a failure. Returns the error of the C function that the worker called, or if it called
+    /// none, of its command.
     #[cold]
     pub(super) fn abandon(&mut self, function: Function, failure: Failure) -> CallError {
         self.process.kill();
@@ -320,7 +320,8 @@ impl Isolated {
         let shared = &self.channel.shared;
         self.inbox.drain(shared);
         let place = Function::from_word(shared.place().load(Ordering::Relaxed));
-        let function = place.unwrap_or(function).name(self.version);
+        let command = place.unwrap_or(function).name(self.version);
+        let function = shared.function().unwrap_or(command);
         let failure = match self.memory_limit {
             Some(limit) if shared.no_memory().load(Ordering::Relaxed) != 0 => {
                 Failure::OutOfMemory(limit)

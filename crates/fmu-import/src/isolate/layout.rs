@@ -4,11 +4,15 @@ use std::fs::File;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::function::known_name;
 use super::region::Region;
+use super::words::{Reader, Writer};
 
 /// Distance in words between fields that different processes write: one or two cache lines.
 const SPACING: usize = 16;
 const MAGIC: usize = 7 * SPACING;
+/// The name of the C function that the worker calls: the number of its bytes, then the bytes.
+const NAME: usize = MAGIC + 3;
 const AREA: usize = 8 * SPACING;
 
 /// Words of the ring of messages: 256 KiB.
@@ -19,7 +23,7 @@ const MIN_AREA: usize = 1 << 13;
 /// 1 + 2 n for an output. A variable is either an input or an output, so that 16 words are enough for 4 orders.
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
-const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0002;
+const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0003;
 
 /// Defines a method for each field, a word at a position.
 macro_rules! fields {
@@ -43,7 +47,7 @@ fields! {
     worker_sleeps = 2 * SPACING;
     /// The command for the worker.
     command = 3 * SPACING;
-    /// The number of the function that the worker executes.
+    /// The number of the command that the worker executes, or of the part of it that it executes now.
     place = 4 * SPACING;
     /// Number of words written to the message ring.
     log_head = 5 * SPACING;
@@ -89,6 +93,18 @@ impl Shared {
         &self.region.words()[position]
     }
 
+    /// Stores the name of the C function that the worker calls; empty between two calls.
+    pub(super) fn set_function(&self, name: &str) {
+        Writer::new(&self.region.words()[NAME..AREA]).put_part(name.as_bytes());
+    }
+
+    /// Returns the name of the C function that the worker calls; `None` between two calls, and for unknown bytes.
+    pub(super) fn function(&self) -> Option<&'static str> {
+        let mut name = Vec::new();
+        Reader::new(&self.region.words()[NAME..AREA]).take_bytes(&mut name)?;
+        known_name(str::from_utf8(&name).ok()?)
+    }
+
     /// The area for the arguments of a command, then for its results.
     #[inline]
     pub(super) fn area(&self) -> &[AtomicU64] {
@@ -101,5 +117,24 @@ impl Shared {
     pub(super) fn ring(&self) -> &[AtomicU64] {
         let words = self.region.words();
         &words[words.len() - RING..]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_function_that_the_worker_calls_has_its_name_until_it_returns() {
+        let (shared, _) = Shared::create(1).unwrap();
+        assert_eq!(shared.function(), None);
+        for name in ["fmi2GetDerivatives", "fmi3GetEventIndicators", "unloading the library"] {
+            shared.set_function(name);
+            assert_eq!(shared.function(), Some(name));
+        }
+        shared.set_function("");
+        assert_eq!(shared.function(), None);
+        shared.word(NAME).store(u64::MAX, Ordering::Relaxed);
+        assert_eq!(shared.function(), None, "a number of bytes beyond the memory");
     }
 }

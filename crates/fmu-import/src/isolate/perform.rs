@@ -1,14 +1,11 @@
 //! Executes the commands of the master: calls the FMU with the arguments in shared memory, and writes
 //! the results.
 
-use std::sync::atomic::Ordering;
-
 use fmu_description::Version;
 use serde::Serialize;
 
 use super::Integrator;
 use super::function::Function;
-use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
 use crate::{Fmu, FmuError};
@@ -106,7 +103,6 @@ impl Executor {
     pub(super) fn exchange(
         &mut self,
         function: Function,
-        shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
@@ -117,7 +113,7 @@ impl Executor {
             };
         }
         match function {
-            Function::DoStep => step.advance(instance.as_mut(), shared, reader, writer),
+            Function::DoStep => step.advance(instance.as_mut(), reader, writer),
             Function::GetReal => values!(get, reals, get_real),
             Function::GetInteger => values!(get, integers, get_integer),
             Function::GetBoolean => values!(get, booleans, get_boolean),
@@ -221,12 +217,11 @@ impl Step {
     fn advance(
         &mut self,
         instance: &mut dyn Slave,
-        shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
         self.read(reader)?;
-        Some(self.run(instance, shared).map(|done| {
+        Some(self.run(instance).map(|done| {
             let (end, reached) = match done {
                 StepResult::Whole => (WHOLE, 0.0),
                 StepResult::Event { reached } => (EVENT, reached),
@@ -258,27 +253,20 @@ impl Step {
         Some(())
     }
 
-    /// Makes the calls of [`Slave::advance`]. Stores each function in shared memory, so that the
-    /// master can name the function that crashed.
-    fn run(&mut self, instance: &mut dyn Slave, shared: &Shared) -> Result<StepResult, CallError> {
-        let at = |function: Function| shared.place().store(function.to_word(), Ordering::Relaxed);
+    /// Makes the calls of [`Slave::advance`].
+    fn run(&mut self, instance: &mut dyn Slave) -> Result<StepResult, CallError> {
         if !self.inputs.is_empty() {
-            at(Function::SetReal);
             instance.set_real(&self.inputs, &self.input_values)?;
         }
         if !self.derived_inputs.is_empty() {
-            at(Function::SetInputDerivatives);
             let (references, orders) = (&self.derived_inputs, &self.input_orders);
             instance.set_input_derivatives(references, orders, &self.input_derivatives)?;
         }
-        at(Function::DoStep);
         let done = instance.do_step(self.time, self.size, self.never_back)?;
         if !self.outputs.is_empty() {
-            at(Function::GetReal);
             instance.get_real(&self.outputs, &mut self.output_values)?;
         }
         if !self.derived_outputs.is_empty() {
-            at(Function::GetOutputDerivatives);
             let (references, orders) = (&self.derived_outputs, &self.output_orders);
             instance.get_output_derivatives(references, orders, &mut self.output_derivatives)?;
         }

@@ -27,6 +27,7 @@ use super::perform::{
 use super::words::{Reader, Writer};
 use super::{Integrator, IsolateError, STARTED_BY, WorkerError, memory};
 use crate::Fmu;
+use crate::crash::observe;
 use crate::library::Surroundings;
 use slave::CallError;
 
@@ -75,6 +76,8 @@ fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
     end_with_master(&socket).map_err(alone("no thread to watch the connection"))?;
     // Fails only if the program has set a subscriber, which then receives the messages.
     let _ = tracing::subscriber::set_global_default(Forward::new(shared.clone()));
+    let observed = shared.clone();
+    observe(move |name| observed.set_function(name));
     shared.attached().store(1, Ordering::Relaxed);
     serve(&mut Channel::new(shared, socket, Side::Worker), integrator)
 }
@@ -169,7 +172,7 @@ impl Worker {
             }),
             (Function::Download, _) => download(&self.answer, &mut reader, &mut writer),
             (function, Some(executor)) if function.is_exchange() => {
-                executor.exchange(function, &self.shared, &mut reader, &mut writer)
+                executor.exchange(function, &mut reader, &mut writer)
             }
             _ => return self.answer_request(function),
         };
@@ -253,7 +256,7 @@ impl Worker {
         })
     }
 
-    /// Stores the function that runs now, so that the master can name the one that crashed.
+    /// Stores the part of a command that runs now, so that the master can name it after a crash between two calls.
     fn record(&self, function: Function) {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
     }
