@@ -33,6 +33,8 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     let stated = element.one_of("variability", &VARIABILITIES);
     let continuous = kind.as_real().is_some();
     let (causality, variability) = match (element.one_of("causality", &CAUSALITIES), stated) {
+        // Its value does not change after the initialization, and it may be connected.
+        (Some("output"), Some("parameter")) => (Causality::Output, Variability::Discrete),
         (_, Some("parameter")) if kind.has_start() => (Causality::Parameter, Variability::Fixed),
         (_, Some("parameter")) => (Causality::CalculatedParameter, Variability::Fixed),
         (causality, variability) => {

@@ -61,6 +61,19 @@ fn roles_of_variables_become_those_of_later_versions() {
 }
 
 #[test]
+fn an_output_that_is_constant_after_the_initialization_stays_an_output() {
+    let xml = COUPLING.replace(
+        r#"name="tau1" valueReference="3""#,
+        r#"name="tau1" valueReference="3" variability="parameter""#,
+    );
+    let description = read(&xml);
+    let variable = description.variable("tau1").unwrap();
+    let role = (variable.causality, variable.variability, variable.initial);
+    assert_eq!(role, (Causality::Output, Variability::Discrete, Some(Initial::Approx)));
+    assert_eq!(description.structure.outputs[0].dependencies.as_deref(), Some(&[3, 4][..]));
+}
+
+#[test]
 fn an_alias_names_its_variable_and_whether_the_sign_differs() {
     let description = read(COUPLING);
     let alias = |name: &str| {
