@@ -31,7 +31,7 @@ pub(crate) struct Session {
     intermediate: Option<Box<Intermediate>>,
     /// Places of the variables of the present call.
     places: Vec<u32>,
-    /// Orders of the output derivatives, or values of enumerations, of the present call.
+    /// Orders of the output derivatives of the present call.
     integers: Vec<i32>,
     /// The event indicators.
     indicators: Vec<f64>,

@@ -68,7 +68,7 @@ fn check_real<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
 }
 
 /// Checks that `value` is in the range of the Integer or an item of the Enumeration.
-fn check_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
+pub(super) fn check_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
     let (min, max) = slot.range;
     let name = &slot.name;
     if f64::from(value) < min || f64::from(value) > max {

@@ -2,6 +2,7 @@
 //! [`INT64`].
 
 use super::super::Instance;
+use super::super::values::check_integer;
 use crate::interface::fmi3::{INDICATOR, INT64};
 use crate::interface::{Native, Slot};
 use crate::model::{Failure, Model};
@@ -159,13 +160,17 @@ impl<M: Model> Instance<M> {
 
     /// Sets enumerations: sets all values or, after a failure, none.
     fn set_enumerations(&mut self, places: &[u32], values: &[i64]) -> Result<(), Failure> {
-        let mut narrow = std::mem::take(&mut self.session_mut()?.integers);
-        narrow.clear();
-        // A value beyond 32 bits is no item of any enumeration; neither is the one that replaces it.
-        narrow.extend(values.iter().map(|&value| i32::try_from(value).unwrap_or(i32::MIN)));
-        let result = self.set_integer(places, &narrow);
-        self.session_mut()?.integers = narrow;
-        result
+        // A value beyond 32 bits is no item of any enumeration.
+        let accept = |slot: &Slot<M, i32>, value: &i64| match i32::try_from(*value) {
+            Ok(value) => check_integer(slot, value),
+            Err(_) => {
+                let (name, items) = (&slot.name, &slot.items);
+                Err(Failure::Discard(format!("{name} = {value}, expected one of {items:?}")))
+            }
+        };
+        let assign =
+            |field: &mut i32, value: &i64| *field = i32::try_from(*value).unwrap_or(*field);
+        self.core.set(&self.interface.integers, places, values, assign, accept, "Enumeration")
     }
 
     /// `fmi3SetBoolean`: sets all values or, after a failure, none.

@@ -68,6 +68,17 @@ fn a_calculated_variable_is_not_set_although_the_variable_with_its_value_is() {
 }
 
 #[test]
+fn a_value_beyond_32_bits_is_refused_as_no_item_of_an_enumeration() {
+    let mut instance = instantiate::<Pendulum>(InterfaceType::CoSimulation, false, false).unwrap();
+    let side = [reference::<Pendulum>("side")];
+    let refused = instance.set_located(NativeType::Int64, &side, 1, |inner, places| {
+        inner.set_int64(places, &[5_000_000_000])
+    });
+    let reason = "side = 5000000000, expected one of [1, 2]".to_owned();
+    assert_eq!(refused, Err(Failure::Discard(reason)));
+}
+
+#[test]
 fn a_state_is_set_in_event_mode_of_model_exchange_only() {
     for (kind, expected) in
         [(InterfaceType::ModelExchange, Status::OK), (InterfaceType::CoSimulation, Status::Error)]
