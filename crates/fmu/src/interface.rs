@@ -20,7 +20,7 @@ use fmu_description::{
     Causality, Guid, Initial, IntegerType, Kind, LogCategory, ModelDescription, Problem, RealType,
     ScalarVariable, Unknown,
 };
-use typed::Slots;
+use typed::{Slots, integer};
 
 pub(crate) use general::WARNING;
 pub(crate) use slot::Slot;
@@ -182,7 +182,10 @@ impl<M: Model> Interface<M> {
                         start,
                         ..IntegerType::default()
                     }),
-                    None => Kind::Integer(IntegerType { start, ..integer(number)? }),
+                    None => {
+                        let limits = integer(number, &(i32::MIN.into()..=i32::MAX.into()))?;
+                        Kind::Integer(IntegerType { start, ..limits })
+                    }
                 };
                 (kind, builder.build(&mut self.integers, field))
             }
@@ -222,19 +225,6 @@ pub(crate) fn real(number: Number) -> RealType {
         nominal: number.nominal,
         ..RealType::default()
     }
-}
-
-fn integer(number: Number) -> Result<IntegerType, String> {
-    let bound = |value: Option<f64>| match value {
-        None => Ok(None),
-        #[expect(clippy::cast_possible_truncation, reason = "tested before")]
-        Some(value) if value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX) => {
-            Ok(Some(i128::from(value as i32)))
-        }
-        Some(value) => Err(format!("limit {value}, expected a 32-bit integer")),
-    };
-    let (min, max) = (bound(number.min)?, bound(number.max)?);
-    Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
 }
 
 /// Returns the continuous state at position `state` of the variables, with the derivative at position `derivative`; an

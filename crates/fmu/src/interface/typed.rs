@@ -169,8 +169,12 @@ integers! {
     u64, UInt64, uint64;
 }
 
-/// Returns the attributes of an integer whose values are in the range `within`.
-fn integer(number: Number, within: &RangeInclusive<i128>) -> Result<IntegerType, String> {
+/// Returns the attributes of an integer whose values are in the range `within`; a message for a limit that is no such
+/// value.
+pub(super) fn integer(
+    number: Number,
+    within: &RangeInclusive<i128>,
+) -> Result<IntegerType, String> {
     let bound = |value: Option<f64>| match value {
         None => Ok(None),
         Some(value) => {
@@ -188,4 +192,22 @@ fn integer(number: Number, within: &RangeInclusive<i128>) -> Result<IntegerType,
     };
     let (min, max) = (bound(number.min)?, bound(number.max)?);
     Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_integer_of_32_bits_may_be_a_limit_and_no_other_number() {
+        let limit = |min| {
+            let number = Number { min: Some(min), ..Number::default() };
+            integer(number, &(i32::MIN.into()..=i32::MAX.into())).ok()?.min
+        };
+        assert_eq!(limit(-2_147_483_648.0), Some(-2_147_483_648));
+        assert_eq!(limit(2_147_483_647.0), Some(2_147_483_647));
+        for wrong in [-2_147_483_649.0, 2_147_483_648.0, 0.5, f64::NAN, f64::INFINITY] {
+            assert_eq!(limit(wrong), None, "{wrong}");
+        }
+    }
 }
