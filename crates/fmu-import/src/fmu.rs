@@ -207,8 +207,9 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`LoadError::Unsupported`] if the arrays have too many elements, if the size of an array is not known, or if an
-    /// element has the name of another variable.
+    /// [`LoadError::Unsupported`] if the arrays have too many elements, if the size of an array is not known, if an
+    /// element has the name of another variable, or if an array has the value reference of a scalar or of an array with
+    /// another number of elements.
     pub fn elements(&self) -> Result<ModelDescription, FmuError> {
         let description = self.description();
         let view = match description.version() {

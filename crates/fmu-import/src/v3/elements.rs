@@ -107,7 +107,7 @@ impl ElementView {
             let resized = variable.dimensions.iter().any(
                 |dimension| matches!(dimension, Dimension::Variable(by) if sizes.contains_key(by)),
             );
-            builder.add(description, position, variable, &extents[position], resized);
+            builder.add(description, position, variable, &extents[position], resized)?;
         }
         builder.finish(description)
     }
@@ -220,7 +220,8 @@ struct Builder {
 }
 
 impl Builder {
-    /// Adds the elements of a variable.
+    /// Adds the elements of a variable. On failure returns the reason: an array with the value reference of a scalar, or
+    /// of an array with another number of elements.
     fn add(
         &mut self,
         description: &ModelDescription,
@@ -228,7 +229,7 @@ impl Builder {
         variable: &ScalarVariable,
         extents: &[u64],
         resized: bool,
-    ) {
+    ) -> Result<(), String> {
         let size = count(extents);
         self.add_native(description, variable, size);
         let start = self.view.description.variables.len();
@@ -236,9 +237,17 @@ impl Builder {
         debug_assert_eq!(self.ranges.len(), position + 1);
         if variable.dimensions.is_empty() {
             self.view.description.variables.push(variable.clone());
-            return;
+            return Ok(());
         }
-        let first = self.first_cell[&variable.value_reference];
+        let ScalarVariable { name, value_reference, .. } = variable;
+        let native = &self.view.variables[self.view.by_reference[value_reference]];
+        let first = self.first_cell.get(value_reference).filter(|_| native.size == size);
+        let first = *first.ok_or_else(|| {
+            format!(
+                "the array {name} has {size} elements and the value reference {value_reference} of a \
+                 variable that is no array of as many"
+            )
+        })?;
         let starts = if resized { None } else { variable.start_values(description, MOST_ELEMENTS) };
         for element in 0..size {
             let indices = indices(element, extents);
@@ -253,6 +262,7 @@ impl Builder {
                 ..variable.clone()
             });
         }
+        Ok(())
     }
 
     /// Adds a variable of the FMU unless it is an alias of a known one.
@@ -374,7 +384,7 @@ impl Builder {
             let (mut dependencies, mut kinds) = (row.dependencies.clone(), row.kinds.clone());
             if let Some(list) = &row.dependencies {
                 let ranges = list.iter().filter_map(|index| self.range(*index));
-                let total = ranges.map(|(_, count)| count).sum::<usize>() * size;
+                let total = ranges.map(|(_, count)| count).sum::<usize>().saturating_mul(size);
                 if total > left {
                     (dependencies, kinds) = (None, None);
                 } else {
@@ -430,6 +440,33 @@ mod tests {
         let view = view();
         let shadows: Vec<usize> = view.variables[2..4].iter().map(|input| input.shadow).collect();
         assert_eq!(shadows, [2, 3]);
+    }
+
+    #[test]
+    fn an_array_with_the_value_reference_of_another_variable_has_as_many_elements() {
+        let of_view = |extent: &str, number: &str| {
+            let variables = format!(
+                r#"<Float64 name="w" valueReference="{number}" causality="output">
+<Dimension start="{extent}"/></Float64></ModelVariables>"#
+            );
+            let text = DESCRIPTION.replace("</ModelVariables>", &variables);
+            let (description, _) = ModelDescription::read(text).unwrap();
+            ElementView::new(&description, &HashMap::new()).map(|view| view.description)
+        };
+        let reference = |description: &ModelDescription, name: &str| {
+            description.variable(name).unwrap().value_reference
+        };
+        let same = of_view("2", "4").unwrap();
+        assert_eq!(reference(&same, "w[2]"), reference(&same, "v[2]"));
+        // The second one is of a scalar.
+        for (extent, number) in [("3", "4"), ("1", "2")] {
+            let reason = of_view(extent, number).unwrap_err();
+            assert!(
+                reason.contains(&format!("the array w has {extent}"))
+                    && reason.contains(&format!("reference {number} ")),
+                "{reason}"
+            );
+        }
     }
 
     #[test]
