@@ -25,7 +25,7 @@ const HEADERS: [(&str, &str); 6] = [
 /// The parts of an FMU that a built one has, apart from its model description.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
 /// The version of the way in which libraries are built here. Change it with this way: built FMUs are cached by it.
-const RECIPE: u32 = 2;
+const RECIPE: u32 = 3;
 /// Largest number of characters of the output of a compiler that an error quotes.
 const OUTPUT: usize = 4000;
 

@@ -121,7 +121,9 @@ fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
                 attribute(definition, "value").filter(|value| !value.is_empty()),
             ))
         };
-        let is_used = |child: &&Element| attribute(child, "optional").as_deref() != Some("true");
+        let is_used = |child: &&Element| {
+            !matches!(attribute(child, "optional").as_deref(), Some("true" | "1"))
+        };
         Ok(SourceFileSet {
             language: attribute(set, "language").filter(|language| !language.is_empty()),
             files: sources(children(set, "SourceFile"))?,
@@ -169,6 +171,23 @@ mod tests {
         let files = set.files.iter().map(|file| (file.as_str(), set.is_cpp(file)));
         assert_eq!(files.collect::<Vec<_>>(), [("solver.c", false), ("model.CPP", true)]);
         assert!(set.has_cpp());
+    }
+
+    #[test]
+    fn a_definition_is_optional_by_each_spelling_of_true() {
+        let element = xml::read(
+            br#"<BuildConfiguration modelIdentifier="m"><SourceFileSet>
+            <PreprocessorDefinition name="A" value="2"/><PreprocessorDefinition name="B"/>
+            <PreprocessorDefinition name="C" optional="true"/>
+            <PreprocessorDefinition name="D" optional="1"/>
+            <PreprocessorDefinition name="E" optional="0"/>
+            </SourceFileSet></BuildConfiguration>"#,
+        );
+        let configuration = configuration(&element.unwrap()).unwrap();
+        let definitions = configuration.sets[0].definitions.iter();
+        let definitions = definitions.map(|(name, value)| (name.as_str(), value.as_deref()));
+        let expected = [("A", Some("2")), ("B", None), ("E", None)];
+        assert_eq!(definitions.collect::<Vec<_>>(), expected);
     }
 
     #[test]
