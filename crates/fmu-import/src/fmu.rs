@@ -100,7 +100,7 @@ pub(crate) struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
     pub(crate) library: Option<CoSimulation>,
     pub(crate) unpacked: Unpacked,
-    /// The name of its file, for messages about its library.
+    /// The name of its file or folder, for messages.
     name: String,
     binding: Binding,
     /// Whether an FMU that allows one instance only has that instance.
@@ -224,6 +224,12 @@ impl Fmu {
         Ok(view.map_err(unsupported)?.description)
     }
 
+    /// Returns the error of an FMU without the requested interface, with the name of its file: its folder may be
+    /// temporary.
+    pub(crate) fn no_interface(&self) -> FmuError {
+        FmuError::NoInterface { path: PathBuf::from(&self.content.name) }
+    }
+
     /// Reserves an FMU that allows one instance only for the instance `name`; [`FmuError::OnlyOnce`] if it has one.
     pub(crate) fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
         if self.content.instantiated.swap(true, Ordering::Relaxed) {
@@ -282,7 +288,7 @@ impl Fmu {
                 let library = Library::open(&self.loading(&library), interface);
                 Arc::new(library.map_err(|error| with_tool_hint(description, error))?)
             }
-            _ => return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
+            _ => return Err(self.no_interface()),
         };
         let resources = file_uri(&unpacked.resources())?;
         let names = self.names();

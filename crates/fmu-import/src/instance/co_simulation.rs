@@ -47,14 +47,15 @@ impl Fmu {
                 let component = self.component(Interface::CoSimulation, name)?;
                 Ok(Inner::V2(crate::v2::Instance::new(component)))
             }
-            None => Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
+            None => Err(self.no_interface()),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use fmu_description::package::TemporaryFolder;
+    use fmu_description::Version;
+    use fmu_description::package::{Package, TemporaryFolder};
 
     use super::*;
 
@@ -66,9 +67,12 @@ mod tests {
 <ModelExchange modelIdentifier="M"/>
 <ModelVariables><Float64 name="time" valueReference="0" causality="independent"/></ModelVariables>
 <ModelStructure/></fmiModelDescription>"#;
-        std::fs::write(folder.path().join("modelDescription.xml"), description).unwrap();
-        let fmu = Fmu::open_quietly(folder.path()).unwrap();
-        let error = fmu.instantiate("m").err().unwrap();
+        let mut package = Package::new(description.to_owned()).for_version(Version::V3);
+        package.add("binaries/x86_64-linux/M.so", "");
+        let file = folder.path().join("M.fmu");
+        package.write(&file).unwrap();
+        let error = Fmu::open_quietly(&file).unwrap().instantiate("m").err().unwrap();
         assert!(matches!(error, FmuError::NoInterface { .. }), "{error}");
+        assert!(error.to_string().starts_with("M.fmu: "), "{error}");
     }
 }

@@ -220,8 +220,8 @@ struct Builder {
 }
 
 impl Builder {
-    /// Adds the elements of a variable. On failure returns the reason: an array with the value reference of a scalar, or
-    /// of an array with another number of elements.
+    /// Adds the elements of a variable. On failure returns the reason: an array has the value reference of a scalar or of
+    /// an array with another number of elements.
     fn add(
         &mut self,
         description: &ModelDescription,
