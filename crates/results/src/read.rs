@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::{Column, Envelope, ResultsError, Selection};
 
 /// A result file, written by a [`super::Sink`] or by another program. The time must be in the column
-/// `time` or in the first column.
+/// `time` or `t`, or in the first column.
 ///
 /// The formats are CSV with commas, semicolons or tabs between the values, decimal commas, UTF-8 or UTF-16, and
 /// optionally the units in the second line; Parquet without nested columns; and MAT files of version 4 with results
@@ -70,7 +70,8 @@ impl Table {
         &self.columns
     }
 
-    /// Returns the position of the time column: the column `time`, in this or another case, or else the first.
+    /// Returns the position of the time column: the column `time`, in this or another case, or else `t`, each also with
+    /// `[s]` behind it, or else the first.
     #[must_use]
     pub fn time(&self) -> usize {
         self.time
@@ -146,12 +147,16 @@ impl Table {
     }
 }
 
-/// Returns the position of the time: the column `time`, otherwise that name in another case, otherwise the first.
+/// Returns the position of the time: the column `time`, otherwise that name in another case, otherwise `t`, otherwise
+/// the first. The names may have `[s]` behind them.
 fn time_position(columns: &[Column]) -> usize {
-    let exact = columns.iter().position(|column| column.name == super::TIME);
+    fn plain(column: &Column) -> &str {
+        column.name.strip_suffix("[s]").map_or(column.name.as_str(), str::trim_end)
+    }
+    let exact = |name: &str| columns.iter().position(|column| plain(column) == name);
     let similar =
-        || columns.iter().position(|column| column.name.eq_ignore_ascii_case(super::TIME));
-    exact.or_else(similar).unwrap_or(0)
+        || columns.iter().position(|column| plain(column).eq_ignore_ascii_case(super::TIME));
+    exact(super::TIME).or_else(similar).or_else(|| exact("t")).unwrap_or(0)
 }
 
 fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {

@@ -74,6 +74,8 @@ fn layouts_of_other_programs_are_read() {
         ("closed.csv", "\"time\",\"x\",\n0,1.5,\n1,-2e3,\n"),
         ("units.csv", "time,x\ns,[m]\n0,1.5\n1,-2e3\n"),
         ("capital.csv", "x,Time\n1.5,0\n-2e3,1"),
+        ("letter.csv", "x,t\n1.5,0\n-2e3,1\n"),
+        ("seconds.csv", "x,time [s]\n1.5,0\n-2e3,1\n"),
     ] {
         let table = written(folder.path(), name, text);
         let place = table.columns().iter().position(|column| column.name == "x").unwrap();

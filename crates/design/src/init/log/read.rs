@@ -1,6 +1,5 @@
 //! Reads logs, and decides which columns are commands and measurements.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use control::identification::Record;
@@ -25,24 +24,18 @@ pub(super) struct Log {
 }
 
 /// Whether the file is a table of signals over time, by its `ending`: Parquet, a MAT file with results of Dymola or
-/// OpenModelica, or CSV with a column `time` or `t`.
+/// OpenModelica, or CSV whose column of the time is called `time` or `t`.
 pub(in crate::init) fn is_log(path: &Path, ending: &str) -> bool {
+    let is_named = |table: Table| {
+        let name = named(&table.columns()[table.time()].name).name;
+        ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
+    };
     match ending {
         "parquet" => true,
         "mat" => Table::open(path).is_ok(),
-        "csv" => {
-            let text = fs::read(path).unwrap_or_default();
-            let text = String::from_utf8_lossy(&text);
-            let header = text.lines().next().unwrap_or_default();
-            header.trim_start_matches('\u{feff}').split([',', ';', '\t']).any(is_time)
-        }
+        "csv" => Table::open(path).is_ok_and(is_named),
         _ => false,
     }
-}
-
-fn is_time(cell: &str) -> bool {
-    let name = named(cell.trim().trim_matches('"')).name;
-    ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
 }
 
 /// Reads all logs; an error if one has other columns or another sample time than the first.
