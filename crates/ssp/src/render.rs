@@ -228,7 +228,10 @@ fn parameter(parameter: &Parameter) -> Tag {
             of_kind("ssv:Enumeration", item).maybe("name", name.as_deref())
         }
         ParameterValue::Binary(digits) => of_kind("ssv:Binary", digits),
-        ParameterValue::Long(value) => of_kind("ssv:Int64", &value.to_string()).newer(true),
+        ParameterValue::Long(value) => {
+            let kind = if i64::try_from(*value).is_ok() { "ssv:Int64" } else { "ssv:UInt64" };
+            of_kind(kind, &value.to_string()).newer(true)
+        }
         ParameterValue::Array(kind, values) => array(kind, values),
     };
     Tag::new("ssv:Parameter").with("name", &parameter.name).add(value)

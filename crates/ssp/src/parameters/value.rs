@@ -1,6 +1,6 @@
 //! Conversion of a parameter value to the unit and type of a variable.
 
-use fmu_description::Kind;
+use fmu_description::{Kind, Version};
 
 use crate::conversion::{ConversionChain, Measure};
 use crate::structure::{
@@ -19,13 +19,13 @@ pub(super) struct Value {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Number {
     Real(f64),
-    Integer(i32),
+    Integer(i128),
     Boolean(bool),
     Text(String),
     /// An item of an enumeration, with its number if the file defines it.
     Item(String, Option<i32>),
     Binary,
-    /// The description of an array or of an integer beyond 32 bits; no variable can be set to it.
+    /// The description of an array; no variable can be set to it.
     Unsupported(String),
 }
 
@@ -43,16 +43,14 @@ impl Value {
         };
         let number = match &parameter.value {
             ParameterValue::Real(value, _) => Number::Real(*value),
-            ParameterValue::Integer(value) => Number::Integer(*value),
+            ParameterValue::Integer(value) => Number::Integer((*value).into()),
+            ParameterValue::Long(value) => Number::Integer(*value),
             ParameterValue::Boolean(value) => Number::Boolean(*value),
             ParameterValue::String(text) => Number::Text(text.clone()),
             ParameterValue::Enumeration(item, _) => {
                 Number::Item(item.clone(), number_of(item, measure.items.as_deref()))
             }
             ParameterValue::Binary(_) => Number::Binary,
-            ParameterValue::Long(value) => {
-                Number::Unsupported(format!("{value}, of more than 32 bits"))
-            }
             ParameterValue::Array(_, values) => {
                 Number::Unsupported(format!("an array of {} elements", values.len()))
             }
@@ -94,15 +92,16 @@ impl Number {
             (Transformation::Linear { factor, offset }, Number::Real(value)) => {
                 Number::Real(factor * value + offset)
             }
+            #[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
             (Transformation::Linear { factor, offset }, Number::Integer(value)) => {
-                Number::Real(factor * f64::from(*value) + offset)
+                Number::Real(factor * (*value as f64) + offset)
             }
-            (
-                Transformation::Integer(pairs),
-                Number::Integer(value) | Number::Item(_, Some(value)),
-            ) => {
-                let target = pairs.iter().find(|(source, _)| source == value);
-                Number::Integer(target.map_or(*value, |(_, target)| *target))
+            (Transformation::Integer(pairs), Number::Integer(value)) => {
+                let target = pairs.iter().find(|(source, _)| i128::from(*source) == *value);
+                Number::Integer(target.map_or(*value, |(_, target)| (*target).into()))
+            }
+            (Transformation::Integer(_), Number::Item(_, Some(value))) => {
+                Number::Integer((*value).into()).transformed(transformation)?
             }
             (Transformation::Boolean { from_false, from_true }, Number::Boolean(value)) => {
                 Number::Boolean(if *value { *from_true } else { *from_false })
@@ -133,13 +132,14 @@ impl Number {
         kind: &Kind,
         items: Option<&[(String, i32)]>,
     ) -> Result<String, String> {
-        let (is_real, is_integer) = (kind.as_real().is_some(), kind.as_integer().is_some());
+        let (is_real, range) = (kind.as_real().is_some(), kind.integer_range(Version::V3));
+        let fits = |value: i128| range.as_ref().is_some_and(|range| range.contains(&value));
         match (kind, self) {
             (Kind::Boolean(_), Number::Boolean(_)) | (Kind::String(_), Number::Text(_)) => {
                 Ok(self.to_text())
             }
             (_, Number::Real(_) | Number::Integer(_)) if is_real => Ok(self.to_text()),
-            (_, Number::Integer(_)) if is_integer => Ok(self.to_text()),
+            (_, Number::Integer(value)) if fits(*value) => Ok(self.to_text()),
             (Kind::Enumeration(_), Number::Item(item, value)) => {
                 let number = number_of(item, items).or(if items.is_none() { *value } else { None });
                 number.map(|number| number.to_string()).ok_or_else(|| {
@@ -148,12 +148,12 @@ impl Number {
                     format!("expected an item of {}, found {item:?}", names.join(", "))
                 })
             }
-            (_, Number::Item(_, Some(value))) if is_integer => Ok(value.to_string()),
+            (_, Number::Item(_, Some(value))) if fits((*value).into()) => Ok(value.to_string()),
+            #[expect(clippy::cast_possible_truncation, reason = "saturates beyond every range")]
             (kind, Number::Real(value))
-                if is_integer
-                    && !matches!(kind, Kind::Enumeration(_))
+                if !matches!(kind, Kind::Enumeration(_))
                     && value.fract() == 0.0
-                    && value.abs() < 2e9 =>
+                    && fits(*value as i128) =>
             {
                 Ok(format!("{value:.0}"))
             }
@@ -193,10 +193,16 @@ mod tests {
             (Number::Integer(3), &wide, "3"),
             (Number::Real(4.0), &wide, "4"),
             (Number::Item("low".to_owned(), Some(1)), &wide, "1"),
+            (Number::Integer(u64::MAX.into()), &wide, "18446744073709551615"),
+            // 2^63
+            (Number::Real(9_223_372_036_854_775_808.0), &wide, "9223372036854775808"),
         ] {
             assert_eq!(number.text(kind, None).as_deref(), Ok(expected));
         }
         let sentence = Number::Real(2.5).text(&wide, None).unwrap_err();
         assert_eq!(sentence, "expected a value of type UInt64, found 2.5");
+        let small = Kind::UInt32(IntegerType::default());
+        let sentence = Number::Integer(4_294_967_296).text(&small, None).unwrap_err();
+        assert_eq!(sentence, "expected a value of type UInt32, found 4294967296");
     }
 }

@@ -77,17 +77,15 @@ fn what_fmi_2_does_not_have_is_named_and_refused_where_it_is_connected() {
     let text = bench.refusal(&root(&elements, &part), "");
     let expected = "expected a connection of scalars, as FMI 2.0 has no arrays, found the attribute startIndices";
     assert!(text.ends_with(expected), "{text}");
-    for (value, words) in [
-        (r#"<ssv:Real value="1 2 3"/>"#, "an array of 3 elements"),
-        (
-            r#"<ssv:UInt64 value="18446744073709551615"/>"#,
-            "18446744073709551615, of more than 32 bits",
-        ),
+    for (name, value, words) in [
+        ("p", r#"<ssv:Real value="1 2 3"/>"#, "Real, found an array of 3 elements"),
+        ("q", r#"<ssv:UInt64 value="2147483648"/>"#, "Integer, found 2147483648"),
     ] {
-        bench.file("p.ssv", ssv(&format!(r#"<ssv:Parameter name="p">{value}</ssv:Parameter>"#)));
+        let parameter = format!(r#"<ssv:Parameter name="{name}">{value}</ssv:Parameter>"#);
+        bench.file("p.ssv", ssv(&parameter));
         let bindings = r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
         let text = bench.refusal(&root(&component("a", "a.fmu", "", bindings), ""), "");
-        assert!(text.ends_with(&format!("expected a value of type Real, found {words}")), "{text}");
+        assert!(text.ends_with(&format!("expected a value of type {words}")), "{text}");
     }
 }
 
@@ -122,6 +120,20 @@ fn numbers_of_every_width_of_fmi_3_have_units_and_transformations() {
 }
 
 #[test]
+fn integers_of_64_bits_are_set_to_the_last_digit() {
+    let bench = Bench::new();
+    let variable = r#"<Int64 name="n" valueReference="1" causality="parameter" variability="fixed" start="0"/>"#;
+    fmu_of_fmi_3(&bench, "a", variable, "");
+    // -2^63
+    let value = r#"<ssv:Parameter name="n"><ssv:Int64 value="-9223372036854775808"/></ssv:Parameter>"#;
+    bench.file("p.ssv", newer(&ssv(value)));
+    let bindings =
+        r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
+    let opened = bench.open(&root(&component("a", "a.fmu", "", bindings), ""), "").unwrap();
+    assert_eq!(settings(&opened.assembly), ["a.n = -9223372036854775808"]);
+}
+
+#[test]
 fn a_component_without_a_source_is_its_connectors_only() {
     let bench = Bench::new();
     fmus(&bench);
@@ -153,13 +165,15 @@ fn what_is_of_ssp_2_is_written_as_ssp_2_and_reads_back() {
     assert_eq!(read_ssd(written.as_bytes()).unwrap(), structure);
     let values = r#"<ssv:Parameter name="a"><ssv:Boolean value="true false"/></ssv:Parameter>
 <ssv:Parameter name="b"><ssv:String><ssv:Value value="x y"/><ssv:Value value="z"/></ssv:String></ssv:Parameter>
-<ssv:Parameter name="c"><ssv:Int64 value="-9000000000"/></ssv:Parameter>"#;
+<ssv:Parameter name="c"><ssv:Int64 value="-9000000000"/></ssv:Parameter>
+<ssv:Parameter name="d"><ssv:UInt64 value="18446744073709551615"/></ssv:Parameter>"#;
     let set = read_ssv(ssv(values).as_bytes()).unwrap();
     assert_eq!(set.parameters[2].value, ParameterValue::Long(-9_000_000_000));
     let words = ["x y".to_owned(), "z".to_owned()];
     assert_eq!(set.parameters[1].value, ParameterValue::Array("String".to_owned(), words.into()));
     let written = render_ssv(&set);
     assert!(written.contains("version=\"2.0\""), "{written}");
+    assert!(written.contains("<ssv:UInt64 value=\"18446744073709551615\"/>"), "{written}");
     assert_eq!(read_ssv(written.as_bytes()).unwrap(), set);
 }
 
