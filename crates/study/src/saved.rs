@@ -13,6 +13,10 @@ use crate::config::{self, Config, Every};
 const MAGIC: &[u8; 16] = b"aso-ftc-state-5\n";
 /// Magic bytes common to all versions of the format.
 const KIND: &[u8] = b"aso-ftc-state-";
+/// Number of bytes of the magic bytes and the checksum.
+const HEADER: usize = MAGIC.len() + 4;
+/// Advice for a checkpoint that cannot be used.
+const ADVICE: &str = "resume another one, or repeat the run from its start with --checkpoint";
 
 /// A saved run.
 #[derive(Serialize, Deserialize)]
@@ -57,7 +61,7 @@ impl SavedRun {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is damaged, or has another version.
+    /// Returns an error if the file cannot be read, is damaged or cut short, or has another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let shown = path.display();
         let bytes = std::fs::read(path).map_err(Error::file("read", path))?;
@@ -68,7 +72,7 @@ impl SavedRun {
         };
         if crc32fast::hash(content) != u32::from_le_bytes(*sum) {
             return Err(Error::Invalid(format!(
-                "{shown}: the checkpoint is damaged: its checksum does not fit"
+                "{shown}: the checkpoint is damaged or cut short: its checksum does not fit; {ADVICE}"
             )));
         }
         postcard::from_bytes(content).map_err(|error| {
@@ -115,11 +119,16 @@ impl SavedRun {
 }
 
 /// Returns the sentence for a file that is not a checkpoint of this version: another file, another format, or a file
-/// that ends within its first 20 bytes.
+/// that ends within its [`HEADER`].
 fn unreadable(path: &Path, bytes: &[u8]) -> String {
     let shown = path.display();
-    let version = bytes.strip_prefix(KIND).filter(|_| !bytes.starts_with(MAGIC));
-    let Some(version) = version.and_then(|rest| rest.first()) else {
+    if MAGIC.starts_with(bytes) || bytes.starts_with(MAGIC) {
+        let length = bytes.len();
+        return format!(
+            "{shown}: the checkpoint is cut short: it has {length} bytes, expected at least {HEADER}; {ADVICE}"
+        );
+    }
+    let Some(version) = bytes.strip_prefix(KIND).and_then(|rest| rest.first()) else {
         return format!("{shown}: expected a checkpoint of this version of aso-ftc");
     };
     format!(
@@ -128,4 +137,22 @@ fn unreadable(path: &Path, bytes: &[u8]) -> String {
         char::from(*version),
         char::from(MAGIC[KIND.len()])
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_checkpoint_that_ends_within_its_header_is_refused_as_cut_short() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("state");
+        let header = [&MAGIC[..], &[0; 4]].concat();
+        for length in 0..header.len() {
+            std::fs::write(&path, &header[..length]).unwrap();
+            let message = SavedRun::read(&path).err().unwrap().to_string();
+            let cause = format!("cut short: it has {length} bytes, expected at least 20");
+            assert!(message.contains(&cause), "{message}");
+        }
+    }
 }
