@@ -5,7 +5,7 @@ use crate::coupling::Coupler;
 use crate::engine::{Engine, SavedState, Swept};
 use crate::error::SystemError;
 use crate::grid::size_between;
-use crate::step_control::{PlannedStep, SizeControl, StepOutcome};
+use crate::step_control::{PlannedStep, SizeControl, StepOutcome, step_to_ending};
 use crate::system::Port;
 use solve::Bracket;
 
@@ -56,20 +56,17 @@ impl Events {
         let next = self.next_event(engine, time, planned.end)?;
         let limit = next.unwrap_or(planned.end);
         self.read_crossings(engine, time)?;
-        let mut step = control.step(engine, coupler, PlannedStep::between(time, limit))?;
+        let step = control.step(engine, coupler, PlannedStep::between(time, limit))?;
         if step.ending.is_some() {
             return Ok(step);
         }
         let crossing = self.locate(engine, coupler, time, step.end)?;
         let happened = crossing.is_some() || (next.is_some() && step.end >= limit);
-        if let Some((end, swept)) = crossing {
-            step = StepOutcome::new(end, swept);
-        }
         if happened {
             engine.exchange.reals.clear_history();
             control.clear_history();
         }
-        Ok(step)
+        Ok(crossing.unwrap_or(step))
     }
 
     /// Returns the time of the first announced event from `time` to `end`, or `end` itself if the event
@@ -104,34 +101,58 @@ impl Events {
         engine.save(time, &mut self.start)
     }
 
-    /// Repeats the step from `time` to `end` up to the first zero crossing within it; returns the end
-    /// and the result of the repeated step. `None` without a crossing: the step remains as it is.
+    /// Repeats the step from `time` to `end` up to the first zero crossing within it, or up to an earlier time at which
+    /// slaves end a repeated step; returns this step. `None` without a crossing: the step remains as it is.
     fn locate(
-        &mut self,
+        &self,
         engine: &mut Engine,
         coupler: &mut Coupler,
         time: f64,
-        end: f64,
-    ) -> Result<Option<(f64, Swept)>, SystemError> {
-        let mut crossing: Option<(f64, Swept)> = None;
-        let (mut end, width) = (end, WIDTH * (end - time));
+        mut end: f64,
+    ) -> Result<Option<StepOutcome>, SystemError> {
+        let (mut repeated, width) = (None, WIDTH * (end - time));
         for (&port, &before) in self.crossings.iter().zip(&self.before) {
-            let after = engine.system.read_real(port, end)?;
-            let Some(mut bracket) = Bracket::new((time, before), (end, after), width) else {
-                continue;
+            let bracket_to = |engine: &mut Engine, end: f64| {
+                let after = engine.system.read_real(port, end);
+                after.map(|after| Bracket::new((time, before), (end, after), width))
             };
-            let mut repeat_until = |engine: &mut Engine, end: f64| {
-                engine.restore(&self.start)?;
-                coupler.step(engine, time, size_between(time, end))
-            };
-            while let Some(asked) = bracket.ask() {
-                repeat_until(engine, asked)?;
-                let value = engine.system.read_real(port, asked)?;
-                bracket.tell(asked, value);
+            let mut bracket = bracket_to(engine, end)?;
+            while let Some(search) = &mut bracket {
+                let asked = search.ask();
+                let target = asked.unwrap_or(search.after());
+                let step = self.repeat(engine, coupler, time, target)?;
+                end = step.end;
+                if repeated.insert(step).ending.is_some() {
+                    return Ok(repeated);
+                }
+                match asked {
+                    // The crossing is before the early end, or in a later step.
+                    _ if end < target => bracket = bracket_to(engine, end)?,
+                    Some(asked) => search.tell(asked, engine.system.read_real(port, asked)?),
+                    None => break,
+                }
             }
-            end = bracket.after();
-            crossing = Some((end, repeat_until(engine, end)?));
         }
-        Ok(crossing)
+        Ok(repeated)
+    }
+
+    /// Repeats the step from `time` to `end`, or to an earlier time at which slaves end it.
+    fn repeat(
+        &self,
+        engine: &mut Engine,
+        coupler: &mut Coupler,
+        time: f64,
+        mut end: f64,
+    ) -> Result<StepOutcome, SystemError> {
+        loop {
+            engine.restore(&self.start)?;
+            match coupler.step(engine, time, size_between(time, end))? {
+                Swept::Whole => return Ok(StepOutcome { end, ending: None }),
+                Swept::Part(reached) => end = reached,
+                Swept::Ended(ending) => {
+                    return step_to_ending(engine, coupler, &self.start, time, ending);
+                }
+            }
+        }
     }
 }

@@ -199,11 +199,7 @@ impl SizeControl {
             };
             end = match swept {
                 Swept::Ended(ending) => {
-                    engine.restore(&self.start)?;
-                    if ending.time > time {
-                        coupler.step(engine, time, size_between(time, ending.time))?;
-                    }
-                    return Ok(StepOutcome::new(ending.time, swept));
+                    return step_to_ending(engine, coupler, &self.start, time, ending);
                 }
                 // A partial step has no error estimate.
                 Swept::Part(reached) => reached,
@@ -348,6 +344,21 @@ impl SizeControl {
             Controller::Energy(control) => control.forget(),
         }
     }
+}
+
+/// Repeats the step from `time` in s and the state `start` up to the end of the run that a slave has requested in it.
+pub(crate) fn step_to_ending(
+    engine: &mut Engine,
+    coupler: &mut Coupler,
+    start: &SavedState,
+    time: f64,
+    ending: Ending,
+) -> Result<StepOutcome, SystemError> {
+    engine.restore(start)?;
+    if ending.time > time {
+        coupler.step(engine, time, size_between(time, ending.time))?;
+    }
+    Ok(StepOutcome { end: ending.time, ending: Some(ending) })
 }
 
 /// Whether a signal or a fault on a connection changes at `time`, in s.

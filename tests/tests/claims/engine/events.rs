@@ -1,10 +1,12 @@
 //! Steps that end at events.
 
 use master::algorithm::EventSource;
-use master::{Algorithm, Extrapolation, Method, Simulation, StepControl};
+use master::{
+    Algorithm, Extrapolation, Method, Readout, Simulation, StepControl, StepResult, System,
+};
 use tests::linear::OUTPUTS;
 
-use crate::engine::puppet::{system, whole};
+use crate::engine::puppet::{add_clock, system, whole};
 use crate::engine::typed::ring;
 use crate::engine::until;
 
@@ -104,6 +106,45 @@ fn between_events_fixed_steps_stay_on_the_grid() {
         assert!(times.contains(&(f64::from(k) * 0.15)), "{k}: {times:?}");
     }
     assert_eq!(times.len(), 9);
+}
+
+/// The result of a step to a time between 0.25 and 0.45 s, which ends at 0.25 s; other steps are whole.
+fn early(begin: f64, end: f64, terminated: bool) -> StepResult {
+    if begin < 0.25 && end > 0.25 && end < 0.45 {
+        return StepResult::Part { reached: 0.25, terminated };
+    }
+    StepResult::Whole
+}
+
+/// A simulation to 0.5 s in one step, but for the crossing at 0.4321 s.
+fn crossing_in_a_step(system: System) -> Simulation {
+    let event = EventSource::Crossing(system.port("p.z").unwrap());
+    let algorithm = Algorithm { events: vec![event], ..Algorithm::new(0.5) };
+    Simulation::new(system, &algorithm, &until(0.5)).unwrap()
+}
+
+/// The whole step does not end early; the first repeated one, to a time before the crossing, does.
+#[test]
+fn a_step_that_ends_early_while_a_crossing_is_located_is_the_step() {
+    let (system, _) = system([f64::sin, crosses], |begin, end| early(begin, end, false));
+    let times = times(&mut crossing_in_a_step(system));
+    assert_eq!(times.len(), 3, "{times:?}");
+    for (time, expected) in times.iter().zip([0.25, 0.4321, 0.5]) {
+        assert!((time - expected).abs() <= 0.5e-9, "{times:?}");
+    }
+}
+
+#[test]
+fn a_slave_that_requests_the_end_while_a_crossing_is_located_ends_the_run_of_all_there() {
+    let (mut system, _) = system([f64::sin, crosses], |begin, end| early(begin, end, true));
+    add_clock(&mut system, "q");
+    let mut simulation = crossing_in_a_step(system);
+    simulation.step().unwrap();
+    assert_eq!((simulation.ended_by(), simulation.ended_at()), (Some("p"), Some(0.25)));
+    let ports = [simulation.system().port("q.y").unwrap()];
+    let mut readout = Readout::new(simulation.system(), &ports);
+    readout.read(simulation.system(), 0.25).unwrap();
+    assert_eq!((simulation.time(), readout.reals), (0.25, vec![0.25]));
 }
 
 /// The lag after a jump to 1 at 0.5 s is `1 - exp(-(t - 0.5))`, whether 0.5 s is a grid point or
