@@ -3,7 +3,7 @@
 mod document;
 mod groups;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use fmu_description::{Causality, ModelDescription, Position};
@@ -74,8 +74,13 @@ impl Loader {
         for simulator in &document.simulators {
             self.simulator(simulator, document.step)?;
         }
+        let mut names = HashSet::new();
         for function in &document.functions {
             let name = function.name.clone();
+            if !names.insert(&function.name) {
+                let sentence = format!("two functions are called {name}");
+                return Err(semantic_error(function.at, sentence));
+            }
             match function.kind.clone() {
                 Kind::Sum(sum) => self.assembly.functions.push((name, sum)),
                 Kind::Linear { factor, offset } => {

@@ -40,6 +40,7 @@ pub(super) struct Simulator {
 pub(super) struct Function {
     pub(super) name: String,
     pub(super) kind: Kind,
+    pub(super) at: Position,
 }
 
 /// The kind of a function.
@@ -163,7 +164,7 @@ fn function(element: &Element) -> Result<Function, SspError> {
             return Err(wrong(element, expected, format!("the function {other}")));
         }
     };
-    Ok(Function { name: required(element, "name")?.to_owned(), kind })
+    Ok(Function { name: required(element, "name")?.to_owned(), kind, at: element.at })
 }
 
 fn connection(element: &Element) -> Result<Connection, SspError> {

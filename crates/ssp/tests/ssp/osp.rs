@@ -148,6 +148,11 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
             "line 8, column 12: <Sum>: expected a whole number from 1 to 100000 in the attribute inputCount, found \"0\"",
         ),
         (
+            "<Sum name=\"s\" inputCount=\"1\"/>\n<LinearTransformation name=\"s\"/>",
+            String::new(),
+            "line 9, column 1: two functions are called s",
+        ),
+        (
             "<Product name=\"s\"/>",
             String::new(),
             "line 8, column 12: <Product>: expected LinearTransformation, Sum or VectorSum, found the function Product",
