@@ -14,7 +14,7 @@ use super::load::files::Files;
 use super::source::{Base, Target};
 use super::structure::{DefaultExperiment, Implementation};
 use super::{Folders, Opened};
-use crate::assembly::{Assembly, Element, Link, Terminal};
+use crate::assembly::{Assembly, Element, Link, Setting, Terminal};
 use document::{Connection, Document, End, Kind, Simulator};
 use groups::Group;
 use slave::Transformation;
@@ -104,6 +104,14 @@ impl Loader {
         let target = self.base.resolve(&simulator.source).map_err(here)?;
         if let Some(warning) = &target.warning {
             self.files.warnings.push(format!("{at}: {name}: {warning}"));
+        }
+        let mut values = HashMap::new();
+        for Setting { variable, value } in &simulator.settings {
+            if values.insert(variable, value).is_some_and(|earlier| earlier != value) {
+                self.files.warnings.push(format!(
+                    "{at}: {name} has different initial values for {variable}: the last one counts"
+                ));
+            }
         }
         let index = self.files.fmu(&target)?;
         let fmu = &self.files.fmus[index];

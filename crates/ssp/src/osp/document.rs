@@ -13,6 +13,16 @@ use crate::function::Function as Sum;
 const STEP: f64 = 0.1;
 /// Maximum number of inputs and of components of a sum.
 const COUNT: usize = 100_000;
+/// The elements that may occur once.
+const ONCE: [&str; 7] = [
+    "StartTime",
+    "EndTime",
+    "BaseStepSize",
+    "Algorithm",
+    "Simulators",
+    "Functions",
+    "Connections",
+];
 
 /// The content of the file.
 #[derive(Debug, Default)]
@@ -83,6 +93,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
     if local(&root) != "OspSystemStructure" {
         let actual = format!("<{}>", root.name);
         return Err(wrong(&root, "the root element OspSystemStructure", actual));
+    }
+    for name in ONCE {
+        if let Some(second) = root.children.iter().filter(|child| local(child) == name).nth(1) {
+            return Err(wrong(second, format!("one element {name}"), "another one"));
+        }
     }
     let mut warnings = Vec::new();
     let mut document = Document { step: STEP, ..Document::default() };

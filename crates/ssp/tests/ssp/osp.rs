@@ -70,6 +70,17 @@ fn simulators_initial_values_and_times_are_read_and_connections_run_from_outputs
 }
 
 #[test]
+fn two_initial_values_of_one_variable_are_named_and_the_last_one_counts() {
+    let bench = bench();
+    let second = r#"<InitialValue variable="p"><Real value="3.5"/></InitialValue></InitialValues>"#;
+    let pair = PAIR.replace("</InitialValues>", second);
+    let path = bench.file("System.xml", osp(&pair, "", ""));
+    let warnings = open(&path).unwrap().warnings.join("\n");
+    let expected = "a has different initial values for p: the last one counts";
+    assert!(warnings.contains(expected), "{warnings}");
+}
+
+#[test]
 fn functions_are_linear_connections_and_sums() {
     let functions = r#"<LinearTransformation name="f" factor="0.1" offset="2"/>
 <Sum name="s" inputCount="2"/>"#;
@@ -151,6 +162,11 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
             "<Sum name=\"s\" inputCount=\"1\"/>\n<LinearTransformation name=\"s\"/>",
             String::new(),
             "line 9, column 1: two functions are called s",
+        ),
+        (
+            "",
+            "</Connections>\n<Connections>".to_owned(),
+            "line 10, column 1: <Connections>: expected one element Connections, found another one",
         ),
         (
             "<Product name=\"s\"/>",
