@@ -292,7 +292,8 @@ impl System {
 
     /// Returns the variable that holds the value of `port`: the variable of which it is an alias, otherwise itself. A
     /// negated alias counts as a variable of its own.
-    pub(crate) fn holder(&self, port: Port) -> Port {
+    #[must_use]
+    pub fn holder(&self, port: Port) -> Port {
         let variable = self.variable(port);
         let holder = variable.alias_of.as_ref().filter(|_| !variable.negated);
         let holder = holder.and_then(|name| self.variables[port.slave].get(name));

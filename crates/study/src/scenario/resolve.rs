@@ -91,7 +91,9 @@ pub(super) struct Resolver<'a> {
 
 /// A variable with its description.
 pub(super) struct Target<'a> {
+    /// The port of the variable; of aliases, the one that is connected, or else the one that holds the value.
     pub(super) port: Port,
+    /// The name of the variable, as stated.
     pub(super) name: String,
     pub(super) variable: &'a ScalarVariable,
     pub(super) description: &'a ModelDescription,
@@ -120,8 +122,10 @@ impl<'a> Resolver<'a> {
     /// Returns the variable called `name`; an error if it does not exist.
     pub(super) fn target(&self, name: &str) -> Result<Target<'a>, Reason> {
         let system = self.system;
-        let port = system.port(name)?;
-        let (name, variable) = (system.name(port), system.variable(port));
+        let stated = system.port(name)?;
+        let (name, variable) = (system.name(stated), system.variable(stated));
+        let source = system.source(stated);
+        let port = source.map_or_else(|| system.holder(stated), |connection| connection.to);
         let description = system.slaves[port.slave].1.description();
         Ok(Target { port, name, variable, description })
     }

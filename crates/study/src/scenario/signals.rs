@@ -101,8 +101,8 @@ impl<'a> Resolver<'a> {
     }
 
     /// Resolves an entry of `[[scenario.table]]`. Skips columns of variables that entries of `set` or `signal`
-    /// drive: their drives precede the position `first_table_drive`. Returns an error if no column has the name
-    /// of a variable that can be driven.
+    /// drive: their drives precede the position `first_table_drive`; also columns of further aliases of a variable.
+    /// Returns an error if no column has the name of a variable that can be driven.
     pub(super) fn table(
         &mut self,
         entry: &TableEntry,
@@ -119,8 +119,12 @@ impl<'a> Resolver<'a> {
             match self.drivable(&name) {
                 Ok(target) => {
                     used = true;
-                    let stated = &self.drives[..first_table_drive];
-                    if stated.iter().all(|(drive, _)| drive.port() != target.port) {
+                    let mut drives = self.drives.iter().enumerate();
+                    let is_driven = drives.any(|(position, (drive, origin))| {
+                        drive.port() == target.port
+                            && (position < first_table_drive || origin == path)
+                    });
+                    if !is_driven {
                         let signal = column_signal(&file, &table, column, &target, false)?;
                         let texts = Vec::new();
                         let source = DriveSource { signal, start: f64::NEG_INFINITY, texts };

@@ -234,6 +234,32 @@ fn the_unit_of_a_value_is_converted_to_that_of_a_float32() {
 }
 
 #[test]
+fn a_variable_and_its_alias_are_driven_as_one() {
+    let (mut system, calls) = of_fmi_3();
+    let text = r#"
+        scenario.set = [
+            { variable = "fmu.single", at = 0, value = 1 },
+            { variable = "fmu.also single", at = 1, value = 2 },
+        ]"#;
+    let mut prepared = scenario(text).resolve(&system, &setup(here())).unwrap();
+    for (time, call) in [(0.0, "real [4] [1.0]"), (1.0, "real [4] [2.0]")] {
+        prepared.scenario.drives.write(&mut system, time).unwrap();
+        assert_eq!(take(&calls), [call]);
+    }
+    let signal = "\nscenario.signal = [{ variable = \"fmu.also single\", constant = 3 }]";
+    let twice = scenario(&(text.to_owned() + signal)).resolve(&system, &setup(here()));
+    let expected = "scenario.signal[1]: fmu.also single is driven twice, also by scenario.set[1]";
+    assert_eq!(twice.unwrap_err().to_string(), expected);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("in.csv"), "time,single,also single\n0,4,5\n").unwrap();
+    let table = scenario("scenario.table = [{ csv = \"in.csv\", element = \"fmu\" }]");
+    let mut prepared = table.resolve(&system, &setup(folder.path())).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.0).unwrap();
+    assert_eq!(take(&calls), ["real [4] [4.0]"]);
+    assert_eq!(prepared.unused[0].1, "also single");
+}
+
+#[test]
 fn a_repeated_step_sets_its_values_again() {
     let (mut system, plant, _) = system();
     let text = r#"scenario.set = [{ variable = "plant.F_c", at = 1, value = 7 }]"#;

@@ -137,7 +137,8 @@ fn of_fmi_3() -> (System, Calls) {
         <Int8 name="small" valueReference="1" causality="input" start="0"/>
         <UInt32 name="large" valueReference="2" causality="input" start="0"/>
         <Int64 name="wide" valueReference="3" causality="input" start="0"/>
-        <Float32 name="single" valueReference="4" causality="input" unit="m" start="0"/>
+        <Float32 name="single" valueReference="4" causality="input" unit="m" start="0">
+        <Alias name="also single"/></Float32>
         </ModelVariables><ModelStructure/></fmiModelDescription>"#;
     let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
     let mut system = System::default();
