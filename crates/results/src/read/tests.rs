@@ -171,6 +171,30 @@ fn a_mat_file_with_a_matrix_without_a_usable_name_is_refused_for_the_name() {
     }
 }
 
+/// The bytes of a matrix in a MAT file of version 4; `kind` is 0 for doubles, 20 for `i32`, 51 for texts.
+fn matrix(name: &str, kind: u32, [rows, columns]: [u32; 2], content: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(name.len()).unwrap() + 1;
+    let header = [kind, rows, columns, 0, length].map(u32::to_le_bytes).concat();
+    [&header[..], name.as_bytes(), &[0], content].concat()
+}
+
+#[test]
+fn a_mat_file_with_four_billion_rows_and_no_column_has_no_value() {
+    let class = ["Atrajectory", "           ", "           ", "binTrans   "].map(str::as_bytes);
+    let class: Vec<u8> = (0..11).flat_map(|at| class.map(|row| row[at])).collect();
+    let information = [0_i32, 1, 0, 0].map(i32::to_le_bytes).concat();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    let matrices = [
+        matrix("Aclass", 51, [4, 11], &class),
+        matrix("name", 51, [4, 1], b"time"),
+        matrix("dataInfo", 20, [4, 1], &information),
+        matrix("data_2", 0, [u32::MAX, 0], &[]),
+    ];
+    fs::write(&path, matrices.concat()).unwrap();
+    assert!(Table::open(&path).unwrap().column(0).unwrap().is_empty());
+}
+
 #[test]
 fn a_damaged_parquet_file_is_an_error_and_no_panic() {
     let folder = tempfile::tempdir().unwrap();

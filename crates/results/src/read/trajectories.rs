@@ -263,6 +263,10 @@ pub(super) fn visit(
     visitor: &mut Visitor<'_>,
 ) -> Result<(), ResultsError> {
     let Layout { varying, places } = layout;
+    if varying.size() == Some(0) {
+        // No byte of the file then limits the stated number of rows or columns.
+        return Ok(());
+    }
     let mut source = Source::open(path)?;
     source.seek(varying.offset)?;
     let size = varying.precision.size();
