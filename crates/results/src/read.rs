@@ -97,7 +97,7 @@ impl Table {
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
     /// [`ResultsError::Order`] if a time is earlier than the one before, [`ResultsError::Read`] if the file cannot be
-    /// read or a time is no number. The function was then called for some rows before the error.
+    /// read or a time is no finite number. The function was then called for some rows before the error.
     ///
     /// # Panics
     ///
@@ -163,7 +163,7 @@ fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
     ResultsError::Read { path: path.to_owned(), reason: reason.to_string() }
 }
 
-/// Checks that the times of the rows are numbers and do not decrease.
+/// Checks that the times of the rows are finite and do not decrease.
 struct Clock<'a> {
     path: &'a Path,
     /// The column of the time.
@@ -178,8 +178,9 @@ impl<'a> Clock<'a> {
 
     /// Checks the next time; `place` returns its line or row for the error.
     fn check(&mut self, time: f64, place: impl Fn() -> String) -> Result<(), ResultsError> {
-        if time.is_nan() {
-            let reason = format!("{}: {} is no number, expected a time in s", place(), self.name);
+        if !time.is_finite() {
+            let actual = if time.is_nan() { "no number" } else { "infinite" };
+            let reason = format!("{}: {} is {actual}, expected a time in s", place(), self.name);
             return Err(unreadable(self.path, &reason));
         }
         if time >= self.before {

@@ -108,6 +108,9 @@ fn times_that_decrease_are_an_error_with_their_place() {
     let table = written(folder.path(), "b.csv", "time,x\n0,1\n,2\n");
     let refused = table.column(1).unwrap_err().to_string();
     assert!(refused.contains("line 3: time is no number"), "{refused}");
+    let table = written(folder.path(), "c.csv", "time,x\n0,1\ninf,2\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.contains("line 3: time is infinite, expected a time in s"), "{refused}");
 }
 
 #[test]
