@@ -25,6 +25,7 @@ mod xml;
 use std::collections::HashSet;
 use std::path::Path;
 
+use fmu_description::Kind;
 use fmu_description::package::{TemporaryFolder, Unpacked};
 
 pub use assembly::{Assembly, Element, Link, Setting, Terminal};
@@ -167,7 +168,14 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
                 .extend(contradiction(&stated, &declared).map(|text| format!("{name}: {text}")));
             let stated = connector.kind_of_value.as_ref().and_then(element);
             let declared = variable.kind.element();
-            if let Some(stated) = stated.filter(|stated| *stated != declared) {
+            // Numbers of every width are one type of SSP here.
+            let of_ssp = match &variable.kind {
+                Kind::Float32(_) => "Real",
+                Kind::Enumeration(_) => "Enumeration",
+                kind if kind.as_integer().is_some() => "Integer",
+                _ => declared,
+            };
+            if let Some(stated) = stated.filter(|stated| *stated != of_ssp) {
                 warnings.push(format!(
                     "{name} is of type {stated} in the system structure and {declared} in the FMU"
                 ));

@@ -110,13 +110,14 @@ fn numbers_of_every_width_of_fmi_3_have_units_and_transformations() {
     let inputs = r#"<Float32 name="u" valueReference="1" causality="input" unit="m" start="0"/>
 <UInt16 name="n" valueReference="2" causality="input" start="0"/>"#;
     fmu_of_fmi_3(&bench, "b", inputs, "");
-    let elements = component("a", "a.fmu", "y output\nn output", "")
-        + &component("b", "b.fmu", "u input\nn input", "");
+    let elements = component("a", "a.fmu", "y output <ssc:Float32/>\nn output <ssc:Int8/>", "")
+        + &component("b", "b.fmu", "u input\nn input <ssc:UInt16/>", "");
     let mapping = r#"<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>"#;
     let connections = connection("a.y", "b.u", "", "") + &connection("a.n", "b.n", mapping, "");
     let opened = bench.open(&root(&elements, &connections), "").unwrap();
     let expected = ["a.y -> b.u * 0.001 + 0.0", "a.n -> b.n [(1, 2)]"];
     assert_eq!(links(&opened.assembly), expected);
+    assert!(!opened.warnings.join("\n").contains("of type"), "{:?}", opened.warnings);
 }
 
 #[test]
