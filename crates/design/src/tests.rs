@@ -6,6 +6,7 @@ use std::time::Duration;
 use nalgebra::Complex;
 
 use crate::assess::checks::checks;
+use crate::assess::detection::detection;
 use crate::assess::reporting::{Assessment, report};
 use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
@@ -472,6 +473,28 @@ fn a_continuous_schedule_has_no_ranges() {
     assert!(message.starts_with(expected), "{message}");
     let sampled = format!("sample_time = 0.1\n{text}");
     read(&sampled, |_| ()).unwrap();
+}
+
+/// As in `[robustness]`: a number is that of all signals.
+#[test]
+fn a_list_of_noise_has_one_number_for_each_signal() {
+    let text = |noise: &str| {
+        let two = MASS.replace("C = [[1, 0]]", "C = [[1, 0], [0, 1]]");
+        let detection =
+            "[detection]\nmethod = \"cusum\"\nfalse_alarm_interval = 1e4\nsizes = { f_u1 = 1 }";
+        format!("{two}{detection}\n{noise}\n")
+    };
+    let noise = |stated: &str| read(&text(stated), |file| file.detection.clone().unwrap().noise);
+    assert_eq!(noise("noise = 2").unwrap(), [2.0, 2.0]);
+    assert_eq!(noise("noise = [2, 3]").unwrap(), [2.0, 3.0]);
+    let refused = noise("noise = [2]").unwrap_err();
+    let expected = "detection.noise: expected 2 numbers, one per measurement, found 1";
+    assert!(refused.contains(expected), "{refused}");
+    let refused = read(&text("noise = 2\nprocess_noise = [0.1]"), |file| {
+        let error = detection(file, &design(file).unwrap(), None).err().unwrap();
+        error.to_string()
+    });
+    assert!(refused.unwrap().contains("expected 2 numbers, one per state, found 1"));
 }
 
 #[test]

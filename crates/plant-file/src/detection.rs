@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Model;
 use crate::faults::Fault;
-use crate::read::{is_first, positive, refuse, within};
+use crate::read::{each, is_first, positive, refuse, within};
 use crate::signals::{Signal, name, position};
 
 /// The requirements on the detection of faults.
@@ -64,6 +64,8 @@ pub struct ModelError {
 pub struct ProcessNoise {
     /// One number for all states, or one for each.
     pub values: Vec<f64>,
+    /// Whether the file states a list, which has one number for each state.
+    pub is_list: bool,
     /// Where the file states it.
     pub place: Place,
 }
@@ -137,7 +139,7 @@ impl DetectionRequest {
                 .get("process_noise")
                 .map(|entry| {
                     let values = not_negative(&entry)?;
-                    Ok(ProcessNoise { values, place: entry.place })
+                    Ok(ProcessNoise { values, is_list: entry.is_list(), place: entry.place })
                 })
                 .transpose()?,
             sizes: sizes(&entry, faults)?,
@@ -188,19 +190,9 @@ fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec
         Some(entry) => entry,
         None => table.require("noise", meaning)?,
     };
-    let levels = not_negative(&entry)?;
-    if levels.iter().any(|noise| *noise <= 0.0) {
-        return Err(entry.error("thresholds follow from the noise: expected numbers above 0"));
-    }
-    match levels.len() {
-        1 => Ok(vec![levels[0]; measurements]),
-        count if count == measurements => Ok(levels),
-        count => {
-            let message =
-                format!("expected {measurements} numbers, one per measurement, found {count}");
-            Err(entry.error(message))
-        }
-    }
+    let rule = "thresholds follow from the noise: expected numbers above 0";
+    let level = |entry: &Entry<'_>| within(entry, f64::MIN_POSITIVE.., rule);
+    each(&entry, measurements, "numbers, one per measurement", level)
 }
 
 /// Reads one number or a list of numbers, none below 0.

@@ -107,10 +107,11 @@ impl Problem {
     ) -> Result<(), crate::Error> {
         let n = self.plant.a.nrows();
         if let Some(stated) = &request.process_noise {
-            let values = match stated.values.len() {
-                1 => vec![stated.values[0]; n],
-                count if count == n => stated.values.clone(),
-                count => {
+            let values = match stated.values.as_slice() {
+                [one] if !stated.is_list => vec![*one; n],
+                values if values.len() == n => values.to_vec(),
+                values => {
+                    let count = values.len();
                     let message = format!("expected {n} numbers, one per state, found {count}");
                     return Err(file.error_at(&stated.place, message).into());
                 }
