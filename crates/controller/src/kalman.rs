@@ -83,8 +83,8 @@ impl KalmanDesign {
     ///
     /// # Errors
     ///
-    /// A sentence with `path`: the text is no such file, a number is out of its range, a shape does not fit, or a fault
-    /// names a command, a measurement or a rate that does not exist.
+    /// A sentence with `path`: the text is no such file, a number is out of its range, a shape does not fit, a fault
+    /// names a command, a measurement or a rate that does not exist, or two faults name the same one.
     pub fn parse(text: &str, path: &str) -> Result<Self, String> {
         let design: Self = toml::from_str(text).map_err(|error| format!("{path}: {error}"))?;
         design.check().map_err(|text| format!("{path}: {text}"))?;
@@ -118,7 +118,7 @@ impl KalmanDesign {
         let check_position = |what: &str, at: usize, count: usize| {
             (at < count).then_some(()).ok_or(format!("a fault names {what} {at} of {count}"))
         };
-        for fault in &self.faults {
+        for (position, fault) in self.faults.iter().enumerate() {
             match fault.enters {
                 Entry::Actuator(at) => check_position("command", at, m)?,
                 Entry::Sensor(at) => check_position("measurement", at, p)?,
@@ -127,6 +127,16 @@ impl KalmanDesign {
             if let Some(rate) = fault.rate {
                 check_position("rate", rate, q)?;
                 (rate >= faults).then_some(()).ok_or("the rate of a fault is a fault")?;
+            }
+            for other in &self.faults[..position] {
+                let shared = if other.enters == fault.enters {
+                    "enter at the same signal; expected one fault in place of both"
+                } else if fault.rate.is_some() && other.rate == fault.rate {
+                    "have the same rate; expected a position for each"
+                } else {
+                    continue;
+                };
+                return Err(format!("the faults `{}` and `{}` {shared}", other.name, fault.name));
             }
         }
         Ok(())
@@ -139,5 +149,55 @@ impl KalmanDesign {
     /// The error of the serializer for an entry that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks a filter of one state, for two ramps that add to these commands and whose rates are at these positions.
+    fn check(commands: [usize; 2], rates: [usize; 2]) -> Result<(), String> {
+        let signal = |name: &str| Signal {
+            name: name.to_owned(),
+            unit: None,
+            description: String::new(),
+            operating: None,
+        };
+        let ramp = |(name, command, rate): (&str, usize, usize)| CarriedFault {
+            name: name.to_owned(),
+            unit: None,
+            description: String::new(),
+            enters: Entry::Actuator(command),
+            rate: Some(rate),
+        };
+        let ones = |size| Matrix { rows: size, columns: size, values: vec![1.0; size * size] };
+        let faults = [("f", commands[0], rates[0]), ("g", commands[1], rates[1])];
+        let design = KalmanDesign {
+            description: String::new(),
+            sample_time: 1.0,
+            integration_steps: 1,
+            stop_time: 10.0,
+            w: ones(5),
+            v: ones(1),
+            p: ones(5),
+            settings: BTreeMap::new(),
+            commands: ["u", "v"].map(signal).into(),
+            measurements: vec![signal("y")],
+            states: vec![signal("x")],
+            faults: faults.map(ramp).into(),
+        };
+        design.check()
+    }
+
+    /// Two ramps have four states, which two faults of one rate would not fill.
+    #[test]
+    fn each_fault_has_a_signal_and_a_rate_of_its_own() {
+        assert_eq!(check([0, 1], [2, 3]), Ok(()));
+        let refused = |text: &str| Err::<(), _>(format!("the faults `f` and `g` {text}"));
+        let expected = "enter at the same signal; expected one fault in place of both";
+        assert_eq!(check([1, 1], [2, 3]), refused(expected));
+        let expected = "have the same rate; expected a position for each";
+        assert_eq!(check([0, 1], [3, 3]), refused(expected));
     }
 }
