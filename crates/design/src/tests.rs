@@ -29,7 +29,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 62] = [
+const REFUSALS: [(&str, &str, &str); 63] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -55,6 +55,11 @@ const REFUSALS: [(&str, &str, &str); 62] = [
         "feedback.eigenvalues = [-1, -2]",
         "feedback.Q = [1, 1]",
         "`feedback.R` is missing: the weight of",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.bandwidth = 1\nfeedback.R = [1]",
+        "6:14: feedback.R: it belongs to `Q`",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",

@@ -136,6 +136,9 @@ pub(crate) fn request(
     if table.get("h_infinity").is_none() {
         refuse(table, &CHANNEL, "it belongs to `h_infinity`")?;
     }
+    if table.get(weights[0]).is_none() {
+        refuse(table, &weights[1..], &format!("it belongs to `{}`", weights[0]))?;
+    }
     let region = table.get("region");
     if let Some(entry) = region.as_ref().filter(|_| sampled) {
         refuse_disc_and_sector(entry)?;
