@@ -305,6 +305,20 @@ fn requirements_that_are_not_stated_are_open() {
     assert_eq!(read(&stated, |file| file.feedback.requirement.clone()).unwrap(), bandwidth);
 }
 
+/// Its design file would be refused: the controller has one bit of 64 for each actuator.
+#[test]
+fn a_plant_with_more_than_64_actuators_is_refused() {
+    let text = |count: usize| {
+        let row = |entry: &str| format!("[{}]", vec![entry; count].join(", "));
+        let b = format!("B = [{}, {}]", row("0"), row("1"));
+        MASS.replace("B = [[0], [1]]", &b).replace("\"all\"", "[\"u1\"]")
+    };
+    read(&text(64), |_| ()).unwrap();
+    let refused = read(&text(65), |_| ()).unwrap_err();
+    let expected = "plant.toml:2:5: expected at most 64 actuators of a controller, found 65";
+    assert!(refused.starts_with(expected), "{refused}");
+}
+
 #[test]
 fn an_error_shows_the_line_and_underlines_the_value() {
     let message = read(&MASS.replace("[0, 0]]", "[0, zero]]"), |_| ()).unwrap_err();

@@ -117,6 +117,9 @@ pub struct Sampling {
     pub current: bool,
 }
 
+/// The largest number of actuators: the controller has one bit of 64 for each.
+const MOST_ACTUATORS: usize = 64;
+
 const KEYS: [&str; 36] = [
     "description",
     "t_on",
@@ -239,6 +242,7 @@ impl<'a> PlantFile<'a> {
             pid.check_references(file, plant_file.references.as_ref(), &plant_file.measurements)?;
         }
         plant_file.check_columns(file)?;
+        plant_file.check_count()?;
         check_names(&plant_file)?;
         plant_file.check_holds()?;
         check_action(&plant_file)?;
@@ -306,6 +310,17 @@ impl<'a> PlantFile<'a> {
     pub fn checks_measurements(&self) -> bool {
         let mut all = self.measurements.iter();
         all.any(|signal| signal.limits.is_some() || signal.longest_hold.is_some())
+    }
+
+    /// Refuses more than [`MOST_ACTUATORS`].
+    fn check_count(&self) -> Result<(), PlaceError> {
+        let count = self.actuators.len();
+        if count <= MOST_ACTUATORS {
+            return Ok(());
+        }
+        let message =
+            format!("expected at most {MOST_ACTUATORS} actuators of a controller, found {count}");
+        Err(self.error(&["actuators", "B"], message))
     }
 
     /// Refuses ranges and longest holds of measurements in a continuous design with a schedule, and a longest hold of
