@@ -29,7 +29,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 63] = [
+const REFUSALS: [(&str, &str, &str); 65] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -96,6 +96,12 @@ const REFUSALS: [(&str, &str, &str); 63] = [
         "faults = [{ name = \"f\" }]\nC = ",
         "3:11: fault `f`: expected `actuator`, `sensor` or `loss_of`, or a matrix F_a",
     ),
+    (
+        "C = ",
+        "faults = [{ name = \"f\", input = \"d\" }]\nC = ",
+        "3:11: fault `f`: the plant is no FMU: expected `actuator`, `sensor` or `loss_of`",
+    ),
+    ("actuator_faults = \"all\"", "", "no fault is stated: expected `F_a`, `actuator_faults"),
     (
         "C = ",
         "F_a = [[0, 1], [1, 0]]\nfaults = [{ name = \"f\" }]\nC = ",
@@ -413,6 +419,11 @@ observer.region = { decay = 20 }
     .unwrap();
     assert_eq!(path, Path::new("Plant.fmu"));
     assert_eq!(point, [("phi".to_owned(), 0.5), ("tau.c".to_owned(), 0.0)]);
+    // It has no F_a.
+    let without = text.replace("faults = [{ name = \"f\", input = \"tau_f\" }]", "");
+    let refused = read(&without, |_| ()).unwrap_err();
+    let expected = "no fault is stated: expected `actuator_faults = \"all\"` or [[faults]]";
+    assert!(refused.contains(expected), "{refused}");
 }
 
 /// The pendulum sampled at 5 ms by a prediction estimator of a ramp; without estimating the friction

@@ -105,8 +105,9 @@ pub(crate) fn all_faults(
         all.extend((1..=matrix(&entry)?.ncols()).map(unnamed));
     }
     if all.is_empty() {
+        let f_a = if file.get("plant").is_none() { "`F_a`, " } else { "" };
         let message =
-            "no fault is stated: expected `F_a`, `actuator_faults = \"all\"` or [[faults]]";
+            format!("no fault is stated: expected {f_a}`actuator_faults = \"all\"` or [[faults]]");
         return Err(file.source.error(&file.place, message));
     }
     Ok(all)

@@ -353,8 +353,18 @@ impl<'a> PlantFile<'a> {
         Ok(())
     }
 
-    /// Checks that F_a has one column per fault that enters through F_a, and that there is no F_a without such faults.
+    /// Checks that F_a has one column per fault that enters through F_a, and that there is no F_a without such faults;
+    /// and that no fault is an input of an FMU if there is no FMU.
     fn check_columns(&self, file: &Table<'_>) -> Result<(), PlaceError> {
+        let is_input = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Input(_));
+        if let (None, Some(fault)) = (self.fmu(), self.faults.iter().find(is_input)) {
+            let message = format!(
+                "fault `{}`: the plant is no FMU: expected `actuator`, `sensor` or `loss_of` in place of `input`, or a \
+                 matrix F_a with a column for it",
+                fault.name
+            );
+            return Err(self.error_at(&fault.place, message));
+        }
         let columns = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Column(_));
         let expected = self.faults.iter().filter(columns).count();
         if let Some(fault) = self.faults.iter().find(columns) {
