@@ -7,6 +7,7 @@ use nalgebra::Complex;
 
 use crate::assess::checks::checks;
 use crate::assess::detection::detection;
+use crate::assess::remedies::remedies;
 use crate::assess::reporting::{Assessment, report};
 use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
@@ -604,6 +605,25 @@ fn parameters_within_their_tolerances_that_destabilise_make_a_design_red() {
     assert!(reasons.contains("±50 % of A[1][1]"), "{reasons}");
     let (level, reasons) = judged(&format!("{lag}robustness.tolerance = 0.001\n"));
     assert_eq!(level, Level::Green, "{reasons}");
+}
+
+/// Requirements on feedback and observer do not change a loop shape; eigenvalues of a sampled loop are not scaled.
+#[test]
+fn there_is_no_remedy_where_no_other_design_is_tried() {
+    let text = format!("{MASS}robustness.amber = 1.6\n");
+    let (figures, budget) = read(&text, |file| {
+        let nominal = design(file).unwrap().nominal;
+        robustness(&nominal, &file.robustness, None, &TimeLimits::default(), &unobserved()).unwrap()
+    })
+    .unwrap();
+    let plant = text.replace("feedback.eigenvalues = [-1, -2]\n", "");
+    let plant = plant.replace("observer.eigenvalues = [-5, { re = -6, im = 2.5 }]\n", "");
+    let sampled = "sample_time = 0.1\nfeedback.sampled_eigenvalues = [0.8, 0.9]\n\
+                   observer.sampled_eigenvalues = [0.5, 0.6, 0.7]";
+    for requirement in ["loop.bandwidth = 1", sampled] {
+        let count = |file: &PlantFile<'_>| remedies(file, figures.as_ref(), &budget).len();
+        assert_eq!(read(&format!("{plant}{requirement}\n"), count).unwrap(), 0);
+    }
 }
 
 /// The worst plant, as a plant file, has the matrices of the report and is a plant file.

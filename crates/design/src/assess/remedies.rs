@@ -26,8 +26,8 @@ const LARGEST_ORDER: usize = 24;
 const LOWER: f64 = 0.95;
 
 /// Returns what changes the peaks of S above their limit and instability within the tolerances, one item for
-/// each of these reasons. For gains by linear matrix inequalities, several or large plants, and without time,
-/// there is none.
+/// each of these reasons. For gains by linear matrix inequalities or by the shape of the loop, requirements that are
+/// not scaled, several or large plants, and without time, there is none.
 pub(crate) fn remedies(
     file: &PlantFile<'_>,
     robustness: Option<&Robustness>,
@@ -50,9 +50,14 @@ pub(crate) fn remedies(
     let searched = [&file.feedback, &file.observer].iter().any(|request| {
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
-    let single = !searched && file.family.is_empty() && file.schedule.is_none();
+    // Gains by the shape of the loop do not depend on the requirements on feedback and observer.
+    let single = !searched
+        && file.loop_shape.is_none()
+        && file.family.is_empty()
+        && file.schedule.is_none();
     let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
-    if reasons.is_empty() || !single || order > LARGEST_ORDER || budget.is_over() {
+    let variants = if single { variants(file) } else { Vec::new() };
+    if reasons.is_empty() || variants.is_empty() || order > LARGEST_ORDER || budget.is_over() {
         return Vec::new();
     }
     let present = Present {
@@ -61,7 +66,7 @@ pub(crate) fn remedies(
     };
     // A change for a peak must not cost the stability within the tolerances.
     let varies = limits.parameters.is_empty();
-    let mut trials: Vec<_> = variants(file)
+    let mut trials: Vec<_> = variants
         .into_par_iter()
         .filter(|_| !budget.is_over())
         .filter_map(|variant| variant.trial(file, varies))
