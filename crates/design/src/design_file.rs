@@ -231,14 +231,22 @@ impl Solution {
     }
 
     /// Returns the experiment of the plant file. The default covers ten time constants of the
-    /// slowest feedback eigenvalue in 2000 steps, or in steps of the sample time.
-    fn experiment(&self, file: &PlantFile<'_>) -> Result<Defaults, control::Error> {
+    /// slowest feedback eigenvalue in 2000 steps, or in steps of the sample time, at least ten.
+    fn experiment(&self, file: &PlantFile<'_>) -> Result<Defaults, crate::Error> {
         let slowest = self.slowest_rate()?;
-        let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest));
-        let step_size = file.step_size.unwrap_or(match self.domain {
-            Domain::Continuous => round(stop_time / 2000.0),
-            Domain::Sampled { period } => period,
-        });
+        let (shortest, sample_time) = match self.domain {
+            Domain::Continuous => (0.0, None),
+            Domain::Sampled { period } => (10.0 * period, Some(period)),
+        };
+        let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest).max(shortest));
+        let step_size = file.step_size.or(sample_time);
+        let step_size = step_size.unwrap_or_else(|| round(stop_time / 2000.0));
+        if stop_time <= step_size {
+            let message = format!(
+                "expected a `stop_time` above the step size of {step_size} s, found {stop_time} s"
+            );
+            return Err(file.error(&["experiment"], message).into());
+        }
         Ok(Defaults { stop_time, step_size: Some(step_size) })
     }
 }
@@ -254,4 +262,37 @@ fn estimator(estimator: control::aso::Estimator) -> Estimator {
 fn per_second(unit: &str) -> Option<String> {
     let slope = format!("{unit}/s");
     Unit::parse(&slope).is_ok().then_some(slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
+    use super::*;
+    use crate::solve::designed::design;
+
+    /// The experiment of a loop that settles in one sample of 0.1 s, with `more` in its plant file.
+    fn experiment(more: &str) -> Result<Defaults, String> {
+        let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+                    sample_time = 0.1\nfeedback.sampled_eigenvalues = [1e-6]\n\
+                    observer.sampled_eigenvalues = [0.5, 0.6]\n";
+        let source = Source::new(Path::new("plant.toml"), text.to_owned() + more);
+        let parsed = source.parse().unwrap();
+        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+        let designed = design(&file).map_err(|error| error.to_string())?;
+        designed.nominal.experiment(&file).map_err(|error| error.to_string())
+    }
+
+    /// The controller FMU needs more than one step.
+    #[test]
+    fn an_experiment_is_longer_than_a_step() {
+        let expected = Defaults { stop_time: 1.0, step_size: Some(0.1) };
+        assert_eq!(experiment(""), Ok(expected));
+        let refused = experiment("experiment = { stop_time = 0.1 }\n").unwrap_err();
+        let expected =
+            "plant.toml:8:14: expected a `stop_time` above the step size of 0.1 s, found 0.1 s";
+        assert!(refused.starts_with(expected), "{refused}");
+    }
 }
