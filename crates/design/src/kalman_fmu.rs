@@ -71,7 +71,7 @@ pub(crate) fn kalman_design(
         return refuse(
             &["observer", "plant"],
             "`observer.bandwidth` gives covariances up to a common factor; `robustness.noise`, the standard deviation of \
-             each measurement, states it",
+             each measurement and above 0, states it",
         );
     };
     let n = linear.states.len();
@@ -125,7 +125,7 @@ pub(crate) fn kalman_design(
 }
 
 /// Returns the factor of the covariances with which the variances of the measurements are those of the file, in the
-/// geometric mean; None if the file does not state them.
+/// geometric mean; None if the file does not state them, or one is 0.
 fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
     if !noise.is_relative {
         return Some(1.0);
@@ -135,5 +135,38 @@ fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
     let logarithms = limits.noise.iter().zip(&variances).map(|(noise, v)| (noise * noise / v).ln());
     #[expect(clippy::cast_precision_loss, reason = "a number of measurements")]
     let count = variances.len() as f64;
-    limits.noise_is_stated.then(|| (logarithms.sum::<f64>() / count).exp())
+    let factor = limits.noise_is_stated.then(|| (logarithms.sum::<f64>() / count).exp());
+    factor.filter(|factor| *factor > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
+    use super::*;
+
+    /// The factor for a measurement with this noise, of the relative variance 4.
+    fn factor(stated: &str) -> Option<f64> {
+        let text =
+            "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\nrobustness.noise = ";
+        let source = Source::new(Path::new("plant.toml"), format!("{text}{stated}\n"));
+        let parsed = source.parse().unwrap();
+        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+        let [one, four] = [1.0, 4.0].map(|value| DMatrix::from_element(1, 1, value));
+        let noise = Noise {
+            process: one.clone(),
+            measurements: four,
+            covariance: one,
+            is_relative: true,
+        };
+        scale(&file, &noise)
+    }
+
+    #[test]
+    fn covariances_are_those_of_a_noise_above_zero() {
+        assert!((factor("6").unwrap() - 36.0 / 4.0).abs() < 1e-12);
+        assert_eq!(factor("0"), None);
+    }
 }
