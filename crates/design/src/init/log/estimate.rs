@@ -140,11 +140,11 @@ fn windows(logs: &[Log], past: usize) -> Result<Windows, control::Error> {
     Windows::joined(&parts.iter().collect::<Vec<_>>())
 }
 
-/// Divides these windows into about [`BLOCKS`] blocks, at least one for each log.
+/// Divides these windows into about [`BLOCKS`] blocks, at least one for each log that has a window.
 fn blocks(logs: &[Log], past: usize) -> Result<Vec<Windows>, control::Error> {
     let all: usize = logs.iter().map(|log| estimation(log).len()).sum();
     let mut blocks = Vec::new();
-    for log in logs {
+    for log in logs.iter().filter(|log| estimation(log).len() > past) {
         let samples = estimation(log).len();
         let count = ((samples * BLOCKS + all / 2) / all).max(1);
         let edge = |at: usize| past + (samples - past) * at / count;
@@ -239,4 +239,26 @@ fn score(logs: &[Log], model: &IdentifiedModel) -> Result<f64, control::Error> {
         score += mean.max(ROUNDING).ln();
     }
     Ok(score)
+}
+
+#[cfg(test)]
+mod tests {
+    use control::identification::Record;
+
+    use super::*;
+
+    /// A log of ones with this number of samples.
+    fn log(samples: usize) -> Log {
+        let ones = DMatrix::from_element(1, samples, 1.0);
+        let record = Record { inputs: ones.clone(), outputs: ones };
+        Log { period: 1.0, inputs: Vec::new(), outputs: Vec::new(), record }
+    }
+
+    /// Three quarters of 200 samples have 150 - 40 windows of 40 earlier samples; those of 52 have none.
+    #[test]
+    fn blocks_have_the_windows_of_the_logs_that_are_long_enough() -> Result<(), control::Error> {
+        let blocks = blocks(&[log(52), log(200)], 40)?;
+        assert_eq!(blocks.iter().map(Windows::count).sum::<usize>(), 150 - 40);
+        Ok(())
+    }
 }
