@@ -152,14 +152,15 @@ fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
 }
 
 /// Returns the modulus of the slowest eigenvalue that the file states for the feedback, or the stated bandwidth, rad/s;
-/// None for other requirements.
+/// None for other requirements, and if all eigenvalues of a sampled loop are 0, whose modulus is infinite.
 fn requested(file: &PlantFile<'_>) -> Option<f64> {
     let slowest = |sizes: &mut dyn Iterator<Item = f64>| sizes.min_by(f64::total_cmp);
     match &file.feedback.requirement {
         Requirement::Eigenvalues(all) => slowest(&mut all.iter().map(|value| value.norm())),
         Requirement::SampledEigenvalues(all) => {
             let period = file.sampling?.period;
-            slowest(&mut all.iter().map(|value| value.ln().norm() / period))
+            let speed = slowest(&mut all.iter().map(|value| value.ln().norm() / period));
+            speed.filter(|speed| speed.is_finite())
         }
         Requirement::Bandwidth(Bandwidth { rate, is_stated: true }) => *rate,
         _ => None,
@@ -168,4 +169,27 @@ fn requested(file: &PlantFile<'_>) -> Option<f64> {
 
 fn is_right(value: Complex<f64>) -> bool {
     value.re > RIGHT * value.norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
+    use super::*;
+
+    /// The plant (1 - s) / (1 + s)^2. A modulus of 0.5 in 0.1 s is 6.9 rad/s, which the zero at 1 1/s does not allow.
+    #[test]
+    fn a_feedback_that_is_at_rest_after_the_last_sample_has_no_speed() {
+        let count = |eigenvalues: &str| {
+            let text = "A = [[0, 1], [-1, -2]]\nB = [[0], [1]]\nC = [[1, -1]]\nsample_time = 0.1\n\
+                        actuator_faults = \"all\"\nfeedback.sampled_eigenvalues = ";
+            let source = Source::new(Path::new("plant.toml"), format!("{text}{eigenvalues}\n"));
+            let parsed = source.parse().unwrap();
+            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+            warnings(&file, &LinearPlant::of(&file).unwrap()).unwrap().len()
+        };
+        assert_eq!([count("[0.5, 0.5]"), count("[0, 0]")], [1, 0]);
+    }
 }
