@@ -68,7 +68,7 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
     let (n, m, p) = (of_states.len(), columns.len() - of_states.len(), of_outputs.len());
     if n == 0 || m == 0 || p == 0 {
         return Err(format!(
-            "found {n} states, {m} commands and {p} measurements; {EXPECTED}, or a log of signals with a column `time`"
+            "found {n} states, {m} commands and {p} measurements; {EXPECTED}, or a log of signals, a .csv file with a column `time`"
         ));
     }
     let is_state = |at: &usize| row_of(&columns[*at].name).is_some();
@@ -112,5 +112,17 @@ pub(super) fn named(cell: &str) -> Named {
         name: name.trim().to_owned(),
         unit: unit.filter(|unit| !unit.is_empty()),
         ..Named::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only .csv files are read as logs; this one has the column.
+    #[test]
+    fn a_log_in_a_file_of_tables_is_told_the_ending_of_logs() {
+        let refused = table("time\tu\ty\n0\t1\t2\n", "log.tsv").err().unwrap();
+        assert!(refused.ends_with("a .csv file with a column `time`"), "{refused}");
     }
 }
