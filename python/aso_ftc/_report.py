@@ -42,8 +42,9 @@ def report(
     words = [str(command()), "report", os.fspath(results), "--out", os.fspath(page)]
     words += ["--against", os.fspath(against)] if against is not None else []
     words += [word for name in variables for word in ("--variables", name)]
-    words += [f"--from={start_time!r}"] if start_time is not None else []
-    words += [f"--to={stop_time!r}"] if stop_time is not None else []
+    # A number of NumPy has its type in its representation.
+    words += [f"--from={float(start_time)!r}"] if start_time is not None else []
+    words += [f"--to={float(stop_time)!r}"] if stop_time is not None else []
     words += ["--force"] if force else []
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode != 0:

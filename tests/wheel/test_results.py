@@ -131,8 +131,9 @@ def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
     parquet, other = tmp_path / "own.parquet", tmp_path / "other.csv"
     results.to_parquet(parquet)
     other.write_text("time;plant.x_p\n0,0;1,5\n0,1;1,25\n", encoding="utf-8")
-    page = af.report(parquet, against=other, variables=["plant.x_p"], stop_time=0.05)
+    page = af.report(parquet, against=other, variables=["plant.x_p"], start_time=results.time[1], stop_time=0.05)
     text = page.read_text(encoding="utf-8")
+    assert f"Rows from t = {results.time[1]} s to t = 0.05 s only." in text
     assert page == tmp_path / "own.html" and "plant.x_p" in text and "plant.theta" not in text
     assert af.report(other, out=tmp_path / "page.html") == tmp_path / "page.html"
     other.write_text("time,x\n1,0\n0,0\n", encoding="utf-8")
