@@ -38,6 +38,8 @@ def report(
     Raises:
         ResultsError: a file cannot be read, or the page cannot be written.
     """
+    if isinstance(variables, str):
+        raise TypeError(f"variables: expected a sequence of names, found the name {variables!r}")
     page = Path(out) if out is not None else Path(results).with_suffix(".html")
     words = [str(command()), "report", os.fspath(results), "--out", os.fspath(page)]
     words += ["--against", os.fspath(against)] if against is not None else []

@@ -136,6 +136,8 @@ def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
     assert f"Rows from t = {results.time[1]} s to t = 0.05 s only." in text
     assert page == tmp_path / "own.html" and "plant.x_p" in text and "plant.theta" not in text
     assert af.report(other, out=tmp_path / "page.html") == tmp_path / "page.html"
+    with pytest.raises(TypeError, match="variables: expected a sequence of names, found the name 'plant.x_p'"):
+        af.report(parquet, variables="plant.x_p")
     other.write_text("time,x\n1,0\n0,0\n", encoding="utf-8")
     with pytest.raises(af.ResultsError, match="line 3: time is 0 after 1") as raised:
         af.report(other)
