@@ -48,7 +48,7 @@ def report(
     words += [f"--from={float(start_time)!r}"] if start_time is not None else []
     words += [f"--to={float(stop_time)!r}"] if stop_time is not None else []
     words += ["--force"] if force else []
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    done = subprocess.run(words, capture_output=True, encoding="utf-8", check=False)
     if done.returncode != 0:
         raise ResultsError(done.stderr.strip().removeprefix("error: ") or "no report was written", "Report")
     return page

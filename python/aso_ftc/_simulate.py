@@ -174,7 +174,7 @@ def check(fmu: PathLike, *, run: bool = True, time_limit: float = 30.0) -> Check
     """
     words = [str(command()), "check", os.fspath(fmu), "--json", "--time-limit", str(time_limit)]
     done = subprocess.run(
-        words if run else [*words, "--no-run"], capture_output=True, text=True, check=False
+        words if run else [*words, "--no-run"], capture_output=True, encoding="utf-8", check=False
     )
     if done.returncode not in (0, 1) or not done.stdout:
         raise FmuError(done.stderr.strip().removeprefix("error: ") or "the check failed", "Check")

@@ -1,7 +1,10 @@
 """Errors: their classes, sentences and fields."""
 
 import copy
+import os
 import pickle
+import subprocess
+import sys
 
 import aso_ftc as af
 import pytest
@@ -78,6 +81,23 @@ def test_a_missing_fmu_is_an_fmu_error(tmp_path):
     with pytest.raises(af.FmuError) as caught:
         af.read_model_description(broken)
     assert caught.value.fmu is None
+
+
+def test_the_command_is_read_in_its_encoding_in_every_locale():
+    program = """
+import os, aso_ftc as af
+path = os.fsdecode("pr\\xfcfen.fmu".encode())
+for call in (af.check, af.report):
+    try:
+        call(path)
+    except af.Error as error:
+        print(ascii(str(error)))
+"""
+    words = [sys.executable, "-I", "-X", "utf8=0", "-c", program]
+    variables = {**os.environ, "LC_ALL": "C"}
+    done = subprocess.run(words, env=variables, capture_output=True, text=True, check=False)
+    # As in Windows, where the encoding of the system is not UTF-8 either.
+    assert ["pr\\xfcfen.fmu" in line for line in done.stdout.splitlines()] == [True, True], done.stderr
 
 
 def test_errors_survive_pickle_with_their_fields(paper):
