@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from . import _core
-from ._arrays import Array, arrays, spread
+from ._arrays import Array, arrays, plain, spread
 from ._description import Variable
 from ._errors import ConfigurationError, Error
 from ._html import page
@@ -348,10 +348,13 @@ class System:
         return system
 
     def _study(self) -> _core.Study:
-        config = self._config()
+        # Arrays of NumPy cannot be compared as dicts and lists are.
+        config = plain(self._config())
         if self._cache is not None:
             known, slaves, study = self._cache
-            if known == config and slaves == self._slaves:
+            # Objects that are equal may still be two objects, of which the system has one.
+            same = slaves.keys() == self._slaves.keys() and all(slaves[name] is self._slaves[name] for name in slaves)
+            if same and known == config:
                 return study
         study = _core.Study(config, self._folder, list(self._slaves.items()))
         self._cache = copy.deepcopy(config), dict(self._slaves), study
