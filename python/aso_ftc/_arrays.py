@@ -28,7 +28,7 @@ class Array:
 def arrays(names: Iterable[str]) -> dict[str, Array]:
     """Return the complete arrays among the elements with these names, by name."""
     parts: dict[str, dict[tuple[int, ...], str]] = {}
-    known = list(names)
+    known = dict.fromkeys(names)
     for name in known:
         if match := _INDICES.fullmatch(name):
             indices = tuple(map(int, match[2].split(",")))

@@ -6,6 +6,7 @@ import pickle
 import aso_ftc as af
 import numpy as np
 import pytest
+from aso_ftc._arrays import Array, arrays
 
 TIME = np.linspace(0.0, 1.0, 101)
 FORCE = 20.0 * np.sin(6.0 * TIME)
@@ -144,3 +145,12 @@ def test_binaries_are_bytes_and_clocks_are_booleans(packed, tmp_path):
     results.to_csv(tmp_path / "results.csv")
     rows = list(csv.DictReader(open(tmp_path / "results.csv", encoding="utf-8")))
     assert [bytes.fromhex(row[data]) for row in rows] == list(results[data])
+
+
+def test_100_000_elements_of_arrays_are_grouped_in_a_short_time():
+    import time
+
+    start = time.perf_counter()
+    grouped = arrays(f"cell[{k}].x[{i},1]" for k in range(50_000) for i in (1, 2))
+    assert time.perf_counter() - start < 5.0 and len(grouped) == 50_000
+    assert grouped["cell[7].x"] == Array(("cell[7].x[1,1]", "cell[7].x[2,1]"), (2, 1))
