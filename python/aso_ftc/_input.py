@@ -118,14 +118,19 @@ def _described(data: Any) -> str:
 
 
 def _times(columns: dict[str, Any]) -> NDArray[Any]:
-    """Take the column ``time``; checks it and the lengths of the others."""
+    """Take the column ``time``, durations as numbers in s; checks it and the lengths of the others."""
     import numpy
 
     if "time" not in columns:
         names = ", ".join(columns)
         raise ConfigurationError(f'input: expected a column "time", found {names}', "Input")
     try:
-        times = numpy.array(columns.pop("time"), dtype=float)
+        times = numpy.asarray(columns.pop("time"))
+        if times.dtype.kind == "m":
+            times = times / numpy.timedelta64(1, "s")
+        if times.dtype.kind == "M":
+            raise TypeError("found dates, expected the time since the start")
+        times = numpy.array(times, dtype=float)
     except (TypeError, ValueError) as error:
         raise ConfigurationError(f"input: time is no number in s: {error}", "Input") from None
     lengths = {name: numpy.shape(column)[:1] for name, column in columns.items()}

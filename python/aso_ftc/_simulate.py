@@ -50,8 +50,8 @@ def simulate(
         start_time, stop_time: simulated time in s; default: the ``DefaultExperiment``, else 0 and 1.
         step: communication step in s; default: the ``DefaultExperiment``, else 1 ms.
         start_values: values of variables before the run, also as ``(value, unit)`` with the unit of the variable.
-        input: inputs over time. Either a table with the column ``"time"`` in s, with the interpolation of
-            FMPy: a mapping of columns, a structured array, :class:`Results`, a frame of pandas (whose index
+        input: inputs over time. Either a table with the column ``"time"`` in s or of durations, with the
+            interpolation of FMPy: a mapping of columns, a structured array, :class:`Results`, a frame of pandas (whose index
             may be the time) or polars, a dataset of xarray, a table of Arrow; units that it states are
             converted, and columns that are outputs are not used. Or a function that gets the time in s at
             each communication point and returns values by name.

@@ -47,6 +47,21 @@ def test_results_in_every_form_are_an_input_that_repeats_them(first, form):
     assert run(input=FORMS[form](first)) == first
 
 
+def test_durations_are_times_in_s_and_dates_are_none(first):
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    nanoseconds = np.arange(0, 1_010_000_000, 10_000_000).astype("timedelta64[ns]")
+    tables = [
+        {"time": nanoseconds, "u": FORCE},
+        {"time": nanoseconds.astype("timedelta64[ms]"), "u": FORCE},
+        pandas.DataFrame({"u": FORCE}, index=pandas.TimedeltaIndex(nanoseconds, name="time")),
+        xarray.Dataset({"u": ("time", FORCE)}, coords={"time": nanoseconds}),
+    ]
+    for table in tables:
+        assert np.allclose(run(input=table)["x_p"], first["x_p"], rtol=0, atol=1e-12)
+    with pytest.raises(af.ConfigurationError, match="^input: time is no number in s: found dates"):
+        run(input={"time": np.datetime64("2026-11-26") + nanoseconds, "u": FORCE})
+
+
 def test_units_of_a_table_are_converted(first):
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"u": FORCE / 1000.0}, index=pandas.Index(TIME, name="time"))
