@@ -81,7 +81,7 @@ def _columns(data: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     if isinstance(data, Results):
         return dict(data), data.units
     if isinstance(data, Mapping) and not hasattr(data, "data_vars"):
-        return {str(name): numpy.asarray(column) for name, column in data.items()}, {}
+        return {str(name): _unmasked(column) for name, column in data.items()}, {}
     if hasattr(data, "data_vars"):
         # Of xarray.
         parts = {str(name): data[name] for name in [*data.coords, *data.data_vars]}
@@ -102,14 +102,23 @@ def _columns(data: Any) -> tuple[dict[str, Any], dict[str, Any]]:
             field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema
         }
         return {name: table[name].to_numpy() for name in table.column_names}, units
-    array = numpy.asarray(data)
+    array = numpy.asanyarray(data)
     if array.dtype.names is None:
         sentence = (
             "input: expected a table with the column time (results, mapping, structured array, frame, dataset) "
             f"or a function of the time, found {_described(data)}"
         )
         raise ConfigurationError(sentence, "Input")
-    return {name: array[name] for name in array.dtype.names}, {}
+    return {name: _unmasked(array[name]) for name in array.dtype.names}, {}
+
+
+def _unmasked(column: Any) -> NDArray[Any]:
+    """Return a column as an array, with None for the values that are masked."""
+    import numpy
+
+    if numpy.ma.isMaskedArray(column):
+        return numpy.array(column.tolist(), dtype=object)
+    return numpy.asarray(column)
 
 
 def _described(data: Any) -> str:
@@ -187,7 +196,9 @@ def _present(variable: Variable, times: NDArray[Any], column: Any) -> tuple[NDAr
         sentence = f"input: {name} is a Binary, to which a function of the time gives values, not a table"
         raise ConfigurationError(sentence, "Input", {"name": name})
     if values.dtype.kind == "O":
-        gaps = numpy.array([value is None or value != value for value in values.tolist()], dtype=bool)
+        # pandas.NA, an NAType, is neither equal to itself nor different.
+        absent = [value is None or type(value).__name__ == "NAType" or value != value for value in values.tolist()]
+        gaps = numpy.array(absent, dtype=bool)
     else:
         gaps = values != values
     if gaps.any() and variable.type in _REALS and variable.variability == "continuous":

@@ -62,6 +62,22 @@ def test_durations_are_times_in_s_and_dates_are_none(first):
         run(input={"time": np.datetime64("2026-11-26") + nanoseconds, "u": FORCE})
 
 
+def test_values_that_are_masked_or_absent_in_pandas_are_gaps():
+    pandas = pytest.importorskip("pandas")
+    with pytest.raises(af.ConfigurationError, match="^input: u is None in row 51, t = 0.51 s"):
+        run(input={"time": TIME, "u": np.ma.masked_array(FORCE, np.arange(len(TIME)) == 51)})
+
+    def law(table):
+        return af.simulate(af.fmus()["AsoController"], stop_time=0.5, step=0.01, output=["compensate"], input=table)
+
+    whole = law({"time": [0.0, 0.3], "compensate": [True, False]})
+    assert set(whole["compensate"]) == {False, True}
+    masked = np.ma.masked_array([True, False, False], [False, True, False])
+    absent = pandas.array([True, None, False], dtype="boolean")
+    assert law({"time": [0.0, 0.1, 0.3], "compensate": masked}) == whole
+    assert law(pandas.DataFrame({"time": [0.0, 0.1, 0.3], "compensate": absent})) == whole
+
+
 def test_units_of_a_table_are_converted(first):
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"u": FORCE / 1000.0}, index=pandas.Index(TIME, name="time"))
