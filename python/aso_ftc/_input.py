@@ -36,7 +36,10 @@ def options(data: Input, element: str, variables: Iterable[Variable]) -> tuple[l
         function: Callable[[float], Mapping[str, Any]] = data
 
         def values(time: float) -> dict[str, Any]:
-            return {f"{element}.{name}": value for name, value in spread(function(time), shapes)}
+            present = function(time)
+            if not isinstance(present, Mapping):
+                raise TypeError(f"input: expected a dict of values at t = {time:.12g} s, found {type(present).__name__}")
+            return {f"{element}.{name}": value for name, value in spread(present, shapes)}
 
         return [], {"input": values}
     columns, units = _columns(data)

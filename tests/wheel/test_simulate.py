@@ -92,6 +92,8 @@ def test_a_function_of_time_drives_inputs(pendulum):
         af.simulate(pendulum, input=lambda t: {"x_p": t})
     with pytest.raises(ZeroDivisionError):
         af.simulate(pendulum, input=lambda t: {"u": 1 / 0})
+    with pytest.raises(TypeError, match="input: expected a dict of values at t = 0 s, found NoneType"):
+        af.simulate(pendulum, input=lambda t: None)
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="Linux only")
