@@ -292,7 +292,9 @@ class Design:
         robustness = self.report["robustness"]
         if robustness:
             peaks = ", ".join(f"{point['judged']:.3f} at the {point['point']}" for point in robustness["points"])
-            lines.append(f"peak of S: {peaks}; delay margin: {robustness['delay_margin']:.4g} s")
+            # JSON has null for a margin without a limit.
+            delay = robustness["delay_margin"]
+            lines.append(f"peak of S: {peaks}; delay margin: {'∞' if delay is None else f'{delay:.4g}'} s")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

@@ -72,10 +72,10 @@ def measures(result: Design) -> dict[str, float]:
     """Return what is compared; a measure that a design does not have is NaN.
 
     ``speed`` and ``observer_speed``: the decay rates of the slowest eigenvalues in 1/s; ``peak_of_S``: the larger of
-    the peaks at commands and measurements, in the units in which the verdict judges them; ``delay_margin`` in s;
-    ``noise``: the largest root-mean-square value of a command under white noise of all measurements, that of the
-    entry ``robustness.noise``, 1 without it; ``ramp_error``: the largest error of an estimate while its fault rises
-    by 1 in a second.
+    the peaks at commands and measurements, in the units in which the verdict judges them; ``delay_margin`` in s,
+    infinite if no delay makes the loop unstable; ``noise``: the largest root-mean-square value of a command under white
+    noise of all measurements, that of the entry ``robustness.noise``, 1 without it; ``ramp_error``: the largest error of
+    an estimate while its fault rises by 1 in a second.
     """
     import numpy
 
@@ -94,12 +94,13 @@ def measures(result: Design) -> dict[str, float]:
     commands = {signal["name"] for signal in report["plant"]["actuators"]}
     noise = [signal["value"] for signal in robustness["noise_together"] if signal["name"] in commands] if robustness else []
     ramps = [error["ramp"] for error in report["estimation"]["errors"] if error["ramp"] is not None]
-    delay = robustness["delay_margin"] if robustness else None
+    delay = robustness["delay_margin"] if robustness else nan
     return {
         "speed": slowest("feedback"),
         "observer_speed": slowest("observer"),
         "peak_of_S": max((point["judged"] for point in robustness["points"]), default=nan) if robustness else nan,
-        "delay_margin": nan if delay is None else delay,
+        # JSON has null for a margin without a limit.
+        "delay_margin": float("inf") if delay is None else delay,
         "noise": max(noise, default=nan),
         "ramp_error": max(map(abs, ramps), default=nan),
     }

@@ -236,6 +236,17 @@ def test_a_trade_off_shows_what_speed_costs(tmp_path):
         compared.plot("speeds")
 
 
+def test_a_delay_margin_without_a_limit_is_infinite():
+    from aso_ftc._trade_off import measures
+
+    design = af.design(SERVO, **REQUIREMENTS)
+    stated = design.report["robustness"]["delay_margin"]
+    assert measures(design)["delay_margin"] == stated and f"delay margin: {stated:.4g} s" in str(design)
+    # JSON has no infinity.
+    design.report["robustness"]["delay_margin"] = None
+    assert measures(design)["delay_margin"] == np.inf and "delay margin: ∞ s" in str(design)
+
+
 def test_a_wrong_system_says_what_is_expected():
     signal = pytest.importorskip("scipy.signal")
     with pytest.raises(af.DesignError, match="dt = True; expected the time of a sample"):
