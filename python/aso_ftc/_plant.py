@@ -16,6 +16,8 @@ __all__ = ["of_file", "of_system", "stated", "with_names"]
 
 # The part of the largest element below which an element of a realisation counts as rounding.
 _ROUNDING = 1e-10
+# What a file has: a plant, and the time of a sample in s.
+_MATRICES = ("A", "B", "C", "D", "F_a", "Ts")
 _NAMES = (("states", "A", 0, "x"), ("actuators", "B", 1, "u"), ("measurements", "C", 0, "y"))
 _LABELS = {"states": "state_labels", "actuators": "input_labels", "measurements": "output_labels"}
 
@@ -158,15 +160,24 @@ def _observable(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDAr
     return part @ a @ part.T, part @ b, c @ part.T
 
 
+def _read_npz(path: str) -> dict[str, Any]:
+    import numpy
+
+    with numpy.load(path) as file:
+        return {name: file[name] for name in _MATRICES if name in file}
+
+
 def of_file(path: str) -> dict[str, Any]:
     """Read the matrices of a ``.npz`` or ``.mat`` file."""
     import numpy
 
-    content: Mapping[str, Any]
-    if path.lower().endswith(".npz"):
-        content = numpy.load(path)
-    else:
-        content = _package("scipy.io", "a .mat file").loadmat(path)
+    read = _read_npz if path.lower().endswith(".npz") else _package("scipy.io", "a .mat file").loadmat
+    try:
+        content: Mapping[str, Any] = read(path)
+    except Exception as error:
+        # Of the operating system, of zipfile, of NumPy or of scipy, which refuses files of MATLAB 7.3.
+        reason = getattr(error, "strerror", None) or error
+        raise DesignError(f"cannot read {path}: {reason}", "File", {"path": path}) from error
     missing = [name for name in "ABC" if name not in content]
     if missing:
         raise DesignError(f"{path} has no matrix {missing[0]}, expected A, B, C", "Matrix")

@@ -54,6 +54,16 @@ def test_a_dict_and_matrices_give_the_same_gains(design, tmp_path):
         assert all(np.array_equal(of_matrices.gains[name], design.gains[name]) for name in design.gains)
 
 
+def test_a_file_with_matrices_that_cannot_be_read_is_a_design_error(tmp_path):
+    pytest.importorskip("scipy.io")
+    (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
+    (tmp_path / "text.mat").write_bytes(128 * b"no matrices")
+    for name in ("missing.npz", "missing.mat", "text.npz", "text.mat"):
+        with pytest.raises(af.DesignError, match=f"cannot read .*{name}: ") as caught:
+            af.design(tmp_path / name)
+        assert caught.value.path == str(tmp_path / name)
+
+
 def test_matrices_alone_get_names_and_a_linear_system_is_accepted():
     a, b, c = np.array([[0.0, 1.0], [-2.0, -3.0]]), np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]])
     requirements = {
