@@ -19,7 +19,7 @@ from ._system import PathLike
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Controller", "Design", "design"]
+__all__ = ["Controller", "Design", "design", "entries_of"]
 
 
 def design(plant: object, **entries: Any) -> Design:
@@ -43,13 +43,23 @@ def design(plant: object, **entries: Any) -> Design:
 
     >>> result = design((A, B, C), actuator_faults="all")  # doctest: +SKIP
     """
+    if isinstance(plant, (str, os.PathLike)) and not entries and not _has_matrices(os.fspath(plant)):
+        return Design(_core.design_file(os.fspath(plant)), os.path.abspath(os.fspath(plant)))
+    content, path = entries_of(plant)
+    return _of_entries({**content, **entries}, path)
+
+
+def _has_matrices(path: str) -> bool:
+    return path.lower().endswith((".npz", ".mat"))
+
+
+def entries_of(plant: object) -> tuple[dict[str, Any], str]:
+    """Return the entries of a plant, as :func:`design` takes it, and a file in the folder where their paths start."""
     folder = os.getcwd()
     if isinstance(plant, (str, os.PathLike)):
         path = os.path.abspath(os.fspath(plant))
-        if path.lower().endswith((".npz", ".mat")):
+        if _has_matrices(path):
             content = _plant.of_file(path)
-        elif not entries:
-            return Design(_core.design_file(os.fspath(plant)), path)
         else:
             try:
                 with open(path, encoding="utf-8") as file:
@@ -61,7 +71,7 @@ def design(plant: object, **entries: Any) -> Design:
         content = dict(plant)
     else:
         content = _plant.of_system(plant)
-    return _of_entries({**content, **entries}, os.path.join(folder, "plant.toml"))
+    return content, os.path.join(folder, "plant.toml")
 
 
 def _of_entries(entries: Mapping[str, Any], path: str) -> Design:

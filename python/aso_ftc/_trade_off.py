@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from ._design import Design, _axes, design
+from ._design import Design, _axes, _of_entries, entries_of
 from ._errors import DesignError
 from ._results import _package
 
@@ -30,7 +30,7 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
 
     Args:
         plant: as for :func:`design`.
-        grid: by entry, with a dot for the entries of a table, the values to try:
+        grid: by entry, with a dot for an entry of a table, whose other entries stay, the values to try:
             ``{"observer.eigenvalues": [[-4, -5, -6], [-8, -10, -12]]}``.
         entries: as for :func:`design`, the same in all designs.
 
@@ -42,13 +42,14 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
     """
     names, values = list(grid), [list(tried) for tried in grid.values()]
     combinations = [dict(zip(names, chosen)) for chosen in itertools.product(*values)]
+    content, path = entries_of(plant)
 
     def design_or_error(combination: dict[str, Any]) -> Design | DesignError:
-        changed = dict(entries)
+        changed = {**content, **entries}
         for name, value in combination.items():
             _set(changed, name.split("."), value)
         try:
-            return design(plant, **changed)
+            return _of_entries(changed, path)
         except DesignError as error:
             return error
 

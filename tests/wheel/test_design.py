@@ -246,6 +246,14 @@ def test_a_trade_off_shows_what_speed_costs(tmp_path):
         compared.plot("speeds")
 
 
+def test_a_trade_off_keeps_the_other_entries_of_a_table():
+    plant = {name: matrix.reshape(shape) for name, matrix, shape in zip("ABC", SERVO, ((2, 2), (2, 1), (1, 2)))}
+    plant |= {**REQUIREMENTS, "robustness": {"tolerance": 0.05, "amber": 2.5}}
+    compared = af.trade_off(plant, {"robustness.amber": [1.8, 2.2]})
+    limits = [design.report["verdict"]["limits"] for design in compared.designs]
+    assert [(limit["amber"], limit["tolerance"]) for limit in limits] == [(1.8, [0.05] * 4), (2.2, [0.05] * 4)]
+
+
 def test_a_delay_margin_without_a_limit_is_infinite():
     from aso_ftc._trade_off import measures
 
