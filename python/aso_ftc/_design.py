@@ -66,6 +66,9 @@ def entries_of(plant: object) -> tuple[dict[str, Any], str]:
                     content = _core.parse_toml(file.read())
             except OSError as error:
                 raise DesignError(f"cannot read {path}: {error.strerror}", "File", {"path": path}) from None
+            except ValueError as error:
+                # Neither TOML nor UTF-8.
+                raise DesignError(f"{path}: {error}", "Entry", {"path": path}) from None
             folder = os.path.dirname(path)
     elif isinstance(plant, Mapping):
         content = dict(plant)

@@ -123,6 +123,12 @@ def test_a_wrong_plant_is_a_design_error(tmp_path):
     with pytest.raises(af.DesignError) as caught:
         af.design(file)
     assert (caught.value.path, caught.value.line) == (str(file), 1)
+    for content in (b"A = [\n", b"description = 'gr\xfcn'\n"):
+        file.write_bytes(content)
+        for entries in ({}, {"sample_time": 0.01}):
+            with pytest.raises(af.DesignError, match="plant.toml") as caught:
+                af.design(file, **entries)
+            assert caught.value.path == str(file)
     with pytest.raises(TypeError, match="found int"):
         af.design(3)
 
