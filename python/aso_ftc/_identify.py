@@ -97,7 +97,8 @@ def _written(log: object, path: Path) -> str:
         table = {"time": _times(columns), **columns}
     except ConfigurationError as error:
         raise DesignError(f"{path.stem}: {str(error).removeprefix('input: ')}", error.kind) from None
-    header = [f"{name} [{unit}]" if (unit := units.get(name)) else name for name in table]
+    # Without brackets of its unit, the index of an element would be one.
+    header = [f"{name} [{units.get(name) or ''}]" if units.get(name) or name.endswith("]") else name for name in table]
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(header)

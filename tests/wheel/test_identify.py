@@ -50,6 +50,14 @@ def test_several_logs_are_one_estimate_and_results_are_a_log(frame, paper):
         af.identify(results, inputs=["F_c"])
 
 
+def test_the_index_of_an_element_is_no_unit(frame):
+    columns = {"time": frame["time"], "force[1]": frame["force"], "position[1]": frame["position"]}
+    plant = af.identify(columns, inputs=["force[1]"], outputs=["position[1]"], order=2)
+    (command,), (measurement,) = plant["actuators"], plant["measurements"]
+    assert (command["name"], measurement["name"]) == ("force[1]", "position[1]") and "unit" not in {**command, **measurement}
+    np.testing.assert_allclose(plant["A"], [[0, 1], [0, -0.5]], atol=0.01)
+
+
 @pytest.mark.parametrize(
     "log, sentence",
     [
