@@ -3,8 +3,9 @@
 use fmu_description::{Causality, Variability};
 use master::{Port, System, SystemError, Value, ValueType};
 use pyo3::IntoPyObjectExt as _;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyString};
 use slave::CallError;
 
 use crate::error::{self, Exception};
@@ -40,6 +41,10 @@ pub(crate) fn set(
     let converted = match ValueType::of(&system.variable(port).kind) {
         ValueType::Real => value.extract().map(Value::Real),
         ValueType::Integer => value.extract().map(Value::Integer),
+        // Every text but the empty one is true, also "false".
+        ValueType::Boolean if value.is_instance_of::<PyString>() => {
+            Err(PyTypeError::new_err("expected True or False, found a text"))
+        }
         ValueType::Boolean => value.is_truthy().map(Value::Boolean),
         ValueType::String => value.extract().map(Value::String),
         ValueType::Binary => value.extract().map(Value::Binary),

@@ -86,6 +86,16 @@ def test_a_set_input_acts_from_the_next_step_on():
         assert simulation["p.u"] == 1.5
 
 
+def test_a_text_is_no_boolean(paper):
+    with paper.simulation() as simulation:
+        for value in (False, True, np.bool_(False), 1):
+            simulation.set("controller.compensate", value)
+            assert simulation["controller.compensate"] is bool(value)
+        with pytest.raises(af.ConfigurationError, match="controller.compensate cannot be set to false") as caught:
+            simulation.set("controller.compensate", "false")
+        assert isinstance(caught.value.__cause__, TypeError) and simulation["controller.compensate"] is True
+
+
 def test_a_message_arrives_at_the_end_of_the_call_that_caused_it(caplog):
     system = af.System().add("p", af.fmus()["FrictionPendulum"])
     with system.simulation(stop_time=1.0, step=0.01) as simulation, caplog.at_level(logging.WARNING, "aso_ftc"):
