@@ -9,7 +9,7 @@ use fmu_description::{
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping};
+use pyo3::types::{PyDict, PyMapping, PyString};
 use slave::{CallError, Failure, Slave, StepResult};
 
 /// The exception that a Python object raised last, so that the run can raise it as the cause.
@@ -39,8 +39,8 @@ impl PythonSlave {
     ///
     /// # Errors
     ///
-    /// `TypeError` if the object has no function `step` or a start value is no number; `ValueError` if one is an array of
-    /// several elements; an exception of the object.
+    /// `TypeError` if the object has no function `step`, an attribute is a text or a start value is no number;
+    /// `ValueError` if one is an array of several elements; an exception of the object.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;
@@ -283,9 +283,14 @@ impl Start {
     }
 }
 
-/// Returns the variables that an attribute of the object declares; none if the object lacks the attribute.
+/// Returns the variables that an attribute of the object declares; none if the object lacks the attribute. `TypeError`
+/// for a text, whose letters are no names.
 fn declarations(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
     let Some(declaration) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
+    if declaration.is_instance_of::<PyString>() {
+        let what = format!("{attribute}: expected names or a dict, found the text {declaration}");
+        return Err(PyTypeError::new_err(what));
+    }
     if let Ok(mapping) = declaration.cast::<PyMapping>() {
         let items = mapping.items()?;
         let item = |item: Bound<'_, PyAny>| {

@@ -306,6 +306,14 @@ def test_start_values_of_numpy_have_the_types_of_python():
     assert [results[f"law.{name}"].dtype.kind for name in Scalars.outputs] == ["f", "b", "i"]
 
 
+def test_one_name_is_no_list_of_names():
+    class Short(Proportional):
+        inputs = "y"
+
+    with pytest.raises(TypeError, match="inputs: expected names or a dict, found the text y"):
+        loop(Short(2.0)).run()
+
+
 def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
     class Broken(Proportional):
         def step(self, t, dt, inputs):
