@@ -16,7 +16,7 @@ class Slave(Protocol):
 
     * ``direct = False`` states that no output depends on the inputs of the same time.
     * ``start(t, inputs)`` is called before the first step of every run, and may return outputs.
-    * ``stop()`` is called at the end of a run.
+    * ``stop()`` is called at the end of a run, also of one that fails; then ``sys.unraisablehook`` gets its exception.
     * ``save()`` returns a state that can be pickled, ``restore(state)`` returns to it. With both, the
       object can take part in iterations and in :meth:`Simulation.save`.
     """

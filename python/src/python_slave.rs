@@ -29,6 +29,8 @@ pub(crate) struct PythonSlave {
     raised: Raised,
     /// For each slot, the values and the state of the object.
     saved: Vec<Option<(Vec<f64>, Py<PyAny>)>>,
+    /// Whether the object is to be stopped: after `start`, until `stop`.
+    is_started: bool,
 }
 
 impl PythonSlave {
@@ -74,8 +76,8 @@ impl PythonSlave {
         let structure = structure(&inputs, &outputs, direct);
         let description = describe(name, variables, structure, can_save);
         let object = object.clone().unbind();
-        let (start, saved) = (0.0, Vec::new());
-        Ok(Self { object, description, inputs, outputs, values, start, raised, saved })
+        let (start, saved, is_started) = (0.0, Vec::new(), false);
+        Ok(Self { object, description, inputs, outputs, values, start, raised, saved, is_started })
     }
 
     /// Runs `call` with the object; stores its exception as the cause of the error of the run. `function` is the name
@@ -178,14 +180,13 @@ impl Slave for PythonSlave {
             None => Ok(Vec::new()),
         })?;
         self.store(outputs);
+        self.is_started = true;
         Ok(())
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.call("stop", |object| match object.getattr_opt("stop")? {
-            Some(function) => function.call0().map(|_| ()),
-            None => Ok(()),
-        })
+        self.is_started = false;
+        self.call("stop", stop)
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
@@ -262,6 +263,27 @@ impl Slave for PythonSlave {
             Ok(values)
         })?;
         Ok(())
+    }
+}
+
+impl Drop for PythonSlave {
+    /// Stops an object whose run failed or whose simulation was not closed.
+    fn drop(&mut self) {
+        if self.is_started {
+            // `None` while the interpreter shuts down.
+            let _ = Python::try_attach(|py| {
+                let object = self.object.bind(py);
+                stop(object).unwrap_or_else(|error| error.write_unraisable(py, Some(object)));
+            });
+        }
+    }
+}
+
+/// Calls the function `stop` of the object, if it has one.
+fn stop(object: &Bound<'_, PyAny>) -> PyResult<()> {
+    match object.getattr_opt("stop")? {
+        Some(function) => function.call0().map(|_| ()),
+        None => Ok(()),
     }
 }
 

@@ -306,6 +306,32 @@ def test_start_values_of_numpy_have_the_types_of_python():
     assert [results[f"law.{name}"].dtype.kind for name in Scalars.outputs] == ["f", "b", "i"]
 
 
+def test_an_object_is_stopped_once_also_if_its_run_fails_or_is_not_closed():
+    class Stopped(Proportional):
+        stops, fails = 0, False
+
+        def step(self, t, dt, inputs):
+            if self.fails and t > 0.05:
+                raise ArithmeticError("no solution")
+            return super().step(t, dt, inputs)
+
+        def stop(self):
+            self.stops += 1
+
+    whole, failing, left = Stopped(1.0), Stopped(1.0), Stopped(1.0)
+    failing.fails = True
+    loop(whole).run()
+    with pytest.raises(af.RunError, match="no solution") as caught:
+        loop(failing).run()
+    assert isinstance(caught.value.__cause__, ArithmeticError)
+    with loop(left).simulation() as simulation:
+        simulation.step()
+    simulation = loop(left).simulation()
+    simulation.step()
+    del simulation
+    assert [slave.stops for slave in (whole, failing, left)] == [1, 1, 2]
+
+
 def test_one_name_is_no_list_of_names():
     class Short(Proportional):
         inputs = "y"
