@@ -185,6 +185,9 @@ def test_what_counts_as_a_failure(tmp_path):
     assert below.failure_probability(unfinished="exclude").failures == 3
     with pytest.raises(ConfigurationError, match="no limit on 'z'; its limits are on y"):
         below.failure_probability("z")
+    assert below.failure_probability(fault="") == below.failure_probability()
+    with pytest.raises(ConfigurationError, match="has no faults, found the fault 'stuck 1'"):
+        below.failure_probability(fault="stuck 1")
 
 
 def test_a_run_fails_if_any_limit_fails(tmp_path):

@@ -478,6 +478,8 @@ class Outcome:
                     f"fault={str(labels.iloc[-1])!r}; found {fault!r}"
                 )
                 raise ConfigurationError(sentence, "UnknownFault", {"fault": fault})
+        elif fault:
+            raise ConfigurationError(f"the campaign has no faults, found the fault {fault!r}", "UnknownFault", {"fault": fault})
         if unfinished == "exclude":
             rows = rows & ~self.unfinished
         elif unfinished != "failure":
