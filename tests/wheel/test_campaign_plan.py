@@ -213,6 +213,10 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"sistem": "paper"}, "similar: system"),
         ({"parameters": {"plant.f_c": [1.0]}}, "similar: plant.F_c"),
         ({"parameters": {"plant.theta": [1.0]}}, "cannot be set"),
+        *(
+            ({"parameters": {name: {"values": [20.0], "set": "plant.F_c"}}}, f"parameters.{name}: a column of the results")
+            for name in ("run", "row", "status", "seconds", "fault.size")
+        ),
         ({"parameters": {"plant.F_c": {"relative": 0.1}}, "design": {"method": "random", "runs": 10**9}}, "design.runs"),
         ({"parameters": {"plant.F_c": {"relative": 0.1}}, "design": {"method": "random", "runs": 5.5}}, "5.5"),
         ({"parameters": {name: {"relative": 0.1, "steps": 1000} for name in ("plant.F_c", "plant.F_s", "plant.M")}}, "1000000000 runs"),

@@ -21,6 +21,7 @@ from .._html import page
 from .._paper import paper
 from .._system import PathLike, System, fault, hash_of_file
 from .._words import similar
+from ._analysis import FAULT_COLUMNS
 from ._changes import arguments, changes
 from ._entries import TABLES, fail, finite, only, positive, table, whole
 from ._faults import NO_FAULT, FaultCase, cases, disturbances
@@ -42,6 +43,8 @@ _ENTRIES = {
     "settings", "algorithm", "experiment",
 }  # fmt: skip
 _NAME = re.compile(r"[\w.\-\[\], ()]+")
+# The columns of the results beside parameters, measures and those of faults.
+_COLUMNS = ("run", "status", "reason", "seconds", "fault")
 
 
 @dataclass(frozen=True)
@@ -208,6 +211,8 @@ class Campaign:
         for name, entry in definitions.items():
             if not _NAME.fullmatch(name):
                 raise fail(f"parameters.{name}", "a name has letters, digits, dots and brackets")
+            if name in (*_COLUMNS, *FAULT_COLUMNS, "row"):
+                raise fail(f"parameters.{name}", "a column of the results has this name, choose another one, with `set`")
             parameter = Parameter.read(name, entry, self._nominal)
             for place in parameter.places:
                 self._check_place(f"parameters.{name}", place)
@@ -238,7 +243,7 @@ class Campaign:
         self.expressions: dict[str, Expression] = {}
         self.functions: dict[str, Function] = {}
         self.unfinished: dict[str, float] = {}
-        columns = {"run", "status", "reason", "seconds", "fault", *(parameter.name for parameter in self.parameters)}
+        columns = {*_COLUMNS, *(parameter.name for parameter in self.parameters)}
         for name, entry in measures.items():
             if name in columns or name.startswith(("fault.", "unit:")):
                 raise fail(f"measures.{name}", "a column of the results has this name, choose another one")
