@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import itertools
 import json
 import os
 import re
@@ -273,6 +274,9 @@ class Campaign:
     def _keep(self, entry: Any) -> dict[str, Any]:
         keep = table("keep", {} if entry is None else entry)
         only("keep", keep, ["runs", "unfinished", "outside", "record", "every"])
+        for name in ("runs", "outside", "record"):
+            if not isinstance(keep.get(name, []), list):
+                raise fail(f"keep.{name}", f"{keep[name]!r}: expected a list")
         for run in keep.get("runs", []):
             if isinstance(run, bool) or not isinstance(run, int) or not 0 <= run < len(self.plan):
                 raise fail("keep.runs", f"{run!r}: expected numbers of runs, 0 to {len(self.plan) - 1}")
@@ -380,11 +384,12 @@ class Campaign:
                 reader = next(key for key, expression in self.expressions.items() if name in expression.signals)
                 hint = similar(name, self._variables)
                 raise fail(f"measures.{reader}", f"the system has no variable {name}{hint}")
-        for run in sorted({0, len(self.plan) - 1}):
+        # Without this check, an error in the signals to keep would leave out the files of all of them.
+        recordings = [{"record": recorded or None, "record_every": self.record_every}]
+        recordings += [{"record": self.keep.get("record"), "record_every": self.keep.get("every")}] if self.keep else []
+        for run, recording in itertools.product(sorted({0, len(self.plan) - 1}), recordings):
             try:
-                self.system.check(
-                    **arguments(self.changes(run)), record=recorded or None, record_every=self.record_every
-                )
+                self.system.check(**arguments(self.changes(run)), **recording)
             except ConfigurationError as error:
                 text = f"{self.name}, run {run}: {error}"
                 raise ConfigurationError(text, error.kind, error.fields) from None
