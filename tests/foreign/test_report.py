@@ -626,6 +626,10 @@ def test_a_page_of_200_signals_is_short_and_its_filter_finds_each(of_many_signal
         page.until(f"new Set({shown}).size === {len(expected)}")
         assert set(page.evaluate(shown)) == expected
         assert page.evaluate("document.getElementById('found').textContent") == "10 of 200 signals"
+        # The legends keep the time of the cursor.
+        times = "[...document.querySelectorAll('figure:not([hidden]) .u-series:first-child')].map((row) => row.getClientRects().length)"
+        page.evaluate("document.getElementById('filter').dispatchEvent(new Event('input'))")
+        assert set(page.evaluate(times)) == {1}
         assert not page.complaints
 
 

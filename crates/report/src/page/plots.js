@@ -248,7 +248,7 @@
       details.fill();
     }
     figures.forEach(choose);
-    for (const row of document.querySelectorAll("main tbody tr")) row.hidden = !matches(row.querySelector("th").textContent);
+    for (const row of document.querySelectorAll("main .scroll tbody tr")) row.hidden = !matches(row.querySelector("th").textContent);
     const all = [...groups.flatMap(({ curves }) => curves.map(({ name }) => name)),
       ...Array.from(document.querySelectorAll("#unchanged tbody th"), (cell) => cell.textContent)];
     field("found").textContent = words.length === 0 ? "" : `${all.filter(matches).length} of ${many(all.length, "signal")}`;
