@@ -678,6 +678,7 @@ def test_the_second_cursor_and_the_vertical_zoom_work_by_mouse_and_keyboard(aso_
         page.evaluate("document.querySelector('.uplot').focus()")
         key(page, "ArrowRight")
         assert_differences(page, row(page), first)
+        assert page.evaluate("[difference(3, 1), difference(3, null), difference(3, NaN)]") == [" (Δ 2)", " (Δ –)", " (Δ –)"]
         key(page, "Escape")
         assert "Δ" not in "".join(cells(page))
         third = row(page)

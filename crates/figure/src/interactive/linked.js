@@ -395,9 +395,9 @@ function closest(self, curve, index) {
   return index;
 }
 
-/* The difference of a value to that at the second cursor, for a legend. */
+/* The difference of a value to that at the second cursor, for a legend; null is a gap. */
 function difference(value, other) {
-  const text = Number.isFinite(value - other) ? String(Number((value - other).toPrecision(6))) : "–";
+  const text = other !== null && Number.isFinite(value - other) ? String(Number((value - other).toPrecision(6))) : "–";
   return ` (Δ ${text})`;
 }
 
