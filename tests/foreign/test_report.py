@@ -590,8 +590,10 @@ def test_a_plot_without_all_rows_says_so_and_names_the_command_for_them(aso_ftc,
     for name, curve in curves(page).items():
         assert curve["total"] == len(part) and (curve["values"] == part[name]).all()
     assert "Rows from t = 40 s to t = 40.3 s only." in page.text_content()
+    page, _ = report(aso_ftc, tmp_path / "own.parquet", "--to", 0.5, "--out", tmp_path / "start.html")
+    assert "Rows up to t = 0.5 s only." in page.text_content()
     done = aso_ftc("report", tmp_path / "own.parquet", "--from", 400, "--force")
-    assert done.returncode == 2 and "no row from 400 s" in done.stderr
+    assert done.returncode == 2 and "no row from t = 400 s on" in done.stderr
 
 
 @pytest.fixture(scope="module")

@@ -175,13 +175,13 @@ pub enum Error {
         file: String,
     },
     /// A file has no row in the range of time.
-    #[error("{file}: no row from {from} s to {to} s")]
+    #[error("{file}: no row {}", interval((*from, *to)))]
     NoRows {
         /// The file.
         file: String,
-        /// The start of the range.
+        /// The start of the range, negative infinity for that of the file.
         from: f64,
-        /// Its end.
+        /// Its end, positive infinity for that of the file.
         to: f64,
     },
     /// A bus trace cannot be read.
@@ -425,6 +425,17 @@ fn with_unit(column: &Column, request: &Request<'_>) -> Column {
     let known = request.units.iter().find(|(name, _)| *name == column.name);
     let unit = column.unit.clone().or_else(|| known.map(|(_, unit)| unit.clone()));
     Column { unit, ..column.clone() }
+}
+
+/// Returns a range of times for a sentence; one of its ends may be infinite.
+fn interval((from, to): (f64, f64)) -> String {
+    if from.is_infinite() {
+        format!("up to t = {to} s")
+    } else if to.is_infinite() {
+        format!("from t = {from} s on")
+    } else {
+        format!("from t = {from} s to t = {to} s")
+    }
 }
 
 /// Returns the name of a file, without its folder.

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::difference::{Comparison, Difference};
 use crate::plots::Plots;
 use crate::statistics::{Basis, Statistics};
-use crate::{Events, MARKS, Mark, MarkKind, Request, Run, frames, graph, identity, listed};
+use crate::{Events, MARKS, Mark, MarkKind, Request, Run, frames, graph, identity, interval, listed};
 
 const STYLE: &str = include_str!("page/page.css");
 const ROWS: &str = include_str!("page/rows.js");
@@ -78,7 +78,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
                     h1 { (file) @if let Some(other) = &other { " against " (other) } }
                     @if let Some(run) = request.run { (outcome(run)) }
                     @if let (Some(comparison), Some(other)) = (content.comparison, &other) { (largest(comparison, other)) }
-                    @if request.range != ALL { p { "Rows from t = " (request.range.0) " s to t = " (request.range.1) " s only." } }
+                    @if request.range != ALL { p { "Rows " (interval(request.range)) " only." } }
                 }
                 main {
                     section aria-labelledby="plots" {
