@@ -174,6 +174,14 @@ def test_texts_and_values_that_are_not_finite_are_named(aso_ftc, write):
     np.testing.assert_array_equal(curves(page)["x"]["values"], results["x"])
 
 
+def test_numbers_have_six_digits_and_zero_no_sign(aso_ftc, write):
+    constants = {-0.0: "0", 1.23456789: "1.23457", -999999.7: "-1e6", 5e-324: "5e-324", 1.7976931348623157e308: "1.79769e308"}
+    results = pd.DataFrame({"time": [0.0, 1.0], **{f"c{k}": [value, value] for k, value in enumerate(constants)}})
+    page, _ = report(aso_ftc, write("own.parquet", results))
+    cells = page.xpath("//details[@id='unchanged']//td[@title]")
+    assert [cell.text_content() for cell in cells] == list(constants.values())
+
+
 def rates():
     """A variable with a value at every row, and one with a value at every second one."""
     slow = [10, np.nan, 20, np.nan, 30, np.nan, 40]

@@ -306,7 +306,8 @@ fn number(value: f64) -> Markup {
 
 /// Returns a number with six significant digits; a dash for NaN.
 fn short(value: f64) -> String {
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    // The sum has no negative zero.
+    let rounded = format!("{value:.5e}").parse().unwrap_or(value) + 0.0;
     if value.is_nan() {
         "–".to_owned()
     } else if rounded == 0.0 || (1e-3..1e6).contains(&rounded.abs()) {
