@@ -588,6 +588,7 @@ TABLES: dict[str, tuple[bytes, dict[str, list[float]]]] = {
     "bom.csv": (b"\xef\xbb\xbftime,a\n0,1\n1,2\n", {"time": [0, 1], "a": [1, 2]}),
     "utf16.csv": ("\ufefftime,a\n0,1\n1,2\n".encode("utf-16-le"), {"time": [0, 1], "a": [1, 2]}),
     "zipped.csv.gz": (gzip.compress(b"time,a\n0,1\n1,2\n"), {"time": [0, 1], "a": [1, 2]}),
+    "blank.csv": (b"time,a\n0,1\n1, \n2,3\n", {"time": [0, 1, 2], "a": [1, np.nan, 3]}),
     "gaps.csv": (b"time,a,on,text\n0,1,true,x\n1,,false,y\n2,3,,z\n", {"time": [0, 1, 2], "a": [1, np.nan, 3], "on": [1, 0, np.nan]}),
 }
 

@@ -19,7 +19,7 @@ const WORDS = { true: 1, false: 0, True: 1, False: 0, TRUE: 1, FALSE: 0 };
 
 // The number of a cell; NaN for a gap or a text.
 function number(cell, isComma) {
-  if (cell === "") return NaN;
+  if (cell.trim() === "") return NaN;
   const value = Number(isComma ? cell.replace(",", ".") : cell);
   return value === value ? value : WORDS[cell.trim()] ?? NaN;
 }
