@@ -9,6 +9,7 @@ the one that the environment variable PLATFORM_FMUS names; PLATFORM_WHEEL names 
 import hashlib
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -29,7 +30,7 @@ MODELS = {"plant": "FrictionPendulum", "controller": "AsoController"}
 CONNECTED = ("x_p", "theta", "u")
 # The root of another glibc, and a compiler for it, if scripts/cross has installed them.
 GLIBC = Path(os.environ.get("OLD_GLIBC") or "/nowhere")
-ZIG = os.environ.get("ZIG", "").split()
+ZIG = shlex.split(os.environ.get("ZIG", ""))
 LIBRARIES = GLIBC / "lib" / "x86_64-linux-gnu"
 # For each platform: how the host is compiled, and how it is run.
 RUN: dict[str, tuple[str, list, list]] = {
