@@ -1,5 +1,6 @@
 //! State feedbacks with entries that must be zero: PI and PID controllers, low order, decentralised control.
 
+use crate::check::as_number;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
 use crate::robustness::uniform;
 use crate::stability::instability;
@@ -40,45 +41,53 @@ impl Structure<'_> {
     /// ```
     ///
     /// for each row k of K, where S selects the states of its free entries; in sampled time X is the covariance of the
-    /// samples. It minimises the mean square of the difference. The loop may be unstable.
+    /// samples. It minimises the mean square of the difference. States that no command reaches have zero gains. The
+    /// loop may be unstable.
     ///
     /// `k`: m x n, such that A + B K is stable. Source: W. S. Levine, T. L. Johnson, M. Athans, Optimal limited state
     /// variable feedback controllers for linear systems, IEEE Trans. Autom. Control 16 (1971), for the covariance.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for matrices that do not fit; same as [`lyapunov`] and [`discrete_lyapunov`].
+    /// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a free entry that K does not have; same
+    /// as [`lyapunov`] and [`discrete_lyapunov`].
     pub fn projected(&self, k: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Self { a, b, free, domain } = *self;
-        let n = check::square("A", a)?;
-        check::shape("B", b, (n, b.ncols()))?;
-        check::shape("K", k, (b.ncols(), n))?;
-        let (closed, noise) = ((a + b * k).transpose(), b * b.transpose());
+        self.check(k)?;
+        let mut projected = DMatrix::zeros(k.nrows(), k.ncols());
+        let closed = a + b * k;
+        let reached = reached(&closed, b);
+        if reached.is_empty() {
+            return Ok(projected);
+        }
+        let (input, feedback) = (b.select_rows(&reached), k.select_columns(&reached));
+        let closed = closed.select_rows(&reached).select_columns(&reached).transpose();
+        let noise = &input * input.transpose();
         let covariance = match domain {
             Domain::Continuous => lyapunov(&closed, &noise)?.p,
             Domain::Sampled { .. } => discrete_lyapunov(&closed, &noise)?.p,
         };
-        let mut projected = DMatrix::zeros(k.nrows(), n);
         for row in 0..k.nrows() {
-            let columns = free.iter().filter(|entry| entry.0 == row).map(|entry| entry.1);
-            let columns: Vec<_> = columns.collect();
+            let place = |entry: &(usize, usize)| reached.iter().position(|&at| at == entry.1);
+            let columns = free.iter().filter(|entry| entry.0 == row).filter_map(place);
+            let variance = |at: usize| covariance[(at, at)];
+            let columns: Vec<_> = columns.filter(|&at| variance(at) > f64::MIN_POSITIVE).collect();
             if columns.is_empty() {
                 continue;
             }
-            let size = |at: usize| covariance[(at, at)].sqrt().max(f64::MIN_POSITIVE);
-            let sizes: Vec<_> = columns.iter().map(|at| size(*at)).collect();
+            let sizes: Vec<_> = columns.iter().map(|&at| variance(at).sqrt()).collect();
             let count = columns.len();
             let correlation = DMatrix::from_fn(count, count, |i, j| {
                 covariance[(columns[i], columns[j])] / (sizes[i] * sizes[j])
             });
-            let cross = k.row(row) * covariance.select_columns(&columns);
+            let cross = feedback.row(row) * covariance.select_columns(&columns);
             let target = DMatrix::from_fn(count, 1, |i, _| cross[i] / sizes[i]);
             let svd = correlation.svd(true, true);
             let least = ROUNDING * svd.singular_values.max();
             let overflow = |_| Error::Overflow { what: "the correlation of the signals" };
             let gains = svd.solve(&target, least).map_err(overflow)?;
             for (i, column) in columns.iter().enumerate() {
-                projected[(row, *column)] = gains[i] / sizes[i];
+                projected[(row, reached[*column])] = gains[i] / sizes[i];
             }
         }
         Ok(projected)
@@ -98,7 +107,8 @@ impl Structure<'_> {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] for matrices that do not fit; same as [`instability`].
+    /// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a free entry that K does not have; same
+    /// as [`instability`].
     pub fn stabilised(
         &self,
         start: &DMatrix<f64>,
@@ -106,9 +116,7 @@ impl Structure<'_> {
         is_over: &dyn Fn() -> bool,
     ) -> Result<(DMatrix<f64>, f64), Error> {
         let Self { a, b, free, domain } = *self;
-        let n = check::square("A", a)?;
-        check::shape("B", b, (n, b.ncols()))?;
-        check::shape("K", start, (b.ncols(), n))?;
+        self.check(start)?;
         let value_of = |k: &DMatrix<f64>| instability(&(a + b * k), domain);
         let largest = free.iter().map(|at| start[*at].abs()).fold(0.0, f64::max);
         let least = if largest > 0.0 { 1e-3 * largest } else { 1.0 };
@@ -142,6 +150,32 @@ impl Structure<'_> {
         }
         Ok((best, value))
     }
+
+    /// Checks A, B, K and the positions of the free entries.
+    fn check(&self, k: &DMatrix<f64>) -> Result<(), Error> {
+        let (n, m) = (check::with_inputs(self.a, self.b)?, self.b.ncols());
+        check::shape("K", k, (m, n))?;
+        for &(row, column) in self.free {
+            let rule = "an index of K, from zero";
+            check::that(row < m, "the row of a free entry", as_number(row), rule)?;
+            check::that(column < n, "the column of a free entry", as_number(column), rule)?;
+        }
+        Ok(())
+    }
+}
+
+/// The states, ascending, on which inputs with the columns of B act, directly or through other states.
+fn reached(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Vec<usize> {
+    let n = a.nrows();
+    let mut is_reached: Vec<_> = b.row_iter().map(|row| row.amax() > 0.0).collect();
+    for _ in 0..n {
+        for i in 0..n {
+            if (0..n).any(|j| is_reached[j] && a[(i, j)] != 0.0) {
+                is_reached[i] = true;
+            }
+        }
+    }
+    (0..n).filter(|&at| is_reached[at]).collect()
 }
 
 /// A number that is nearly normally distributed: a sum of twelve uniform ones.
@@ -184,6 +218,36 @@ mod tests {
         let k = structure.projected(&DMatrix::from_row_slice(1, 2, &[-2.0, -3.0]))?;
         assert!((k[0] + 2.0).abs() < 1e-9 && k[1].abs() <= 0.0, "{k}");
         Ok(())
+    }
+
+    /// The third state acts on the others, but neither these nor the command act on it. With all entries free the other
+    /// gains stay, also if the third state is constant, which no feedback makes stable.
+    #[test]
+    fn states_that_no_command_reaches_have_zero_gains() -> Result<(), Error> {
+        for rate in [0.0, -1.0] {
+            let a = [0.0, 0.0, 1.0, 1.0, -3.0, 0.0, 0.0, 0.0, rate];
+            let a = DMatrix::from_row_slice(3, 3, &a);
+            let b = DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]);
+            let free = [(0, 2), (0, 0), (0, 1)];
+            let structure = Structure { a: &a, b: &b, free: &free, domain: Domain::Continuous };
+            let k = structure.projected(&DMatrix::from_row_slice(1, 3, &[-2.0, -2.0, -5.0]))?;
+            let expected = DMatrix::from_row_slice(1, 3, &[-2.0, -2.0, 0.0]);
+            assert!((&k - expected).amax() < 1e-9, "{k}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn entries_outside_of_the_feedback_are_refused() {
+        let (a, b) = double_integrator();
+        let k = DMatrix::from_row_slice(1, 2, &[-2.0, -3.0]);
+        for free in [[(0, 2)], [(1, 0)]] {
+            let structure = Structure { a: &a, b: &b, free: &free, domain: Domain::Continuous };
+            let refused = structure.projected(&k);
+            assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
+            let refused = structure.stabilised(&k, -0.1, &|| false);
+            assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
+        }
     }
 
     /// 1 / (s^2 (s + 2)) needs the rate; with it and K = (1, 1), s^3 + 2 s^2 + s + 1 is stable.
