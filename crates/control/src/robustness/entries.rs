@@ -49,9 +49,9 @@ pub struct SensitivityPeak {
 /// respect to the frequency is zero, so that a move of the peak has an effect of second order only. The derivative
 /// exists if the largest singular value is simple. For a sampled loop the derivatives with respect to A and B follow
 /// from those of the sampled plant by the adjoint of the derivative of the matrix exponential, L(M', G) for the
-/// gradient G. Cost: about that of three solutions of a complex system of the order of the loop. An infinite
-/// frequency gives the value 1, as S = I there, and zeros, also for D, although S depends on D there if the controller
-/// has a direct term.
+/// gradient G. Cost: about that of three solutions of a complex system of the order of the loop. At an infinite
+/// frequency S = I, so that the value is 1 and only D has an effect, through the direct term of the controller; with
+/// several channels, all with the singular value 1, the derivatives are those for the first one.
 ///
 /// Source: derivative of a simple singular value, G. W. Stewart and J. Sun, Matrix perturbation
 /// theory (1990), section IV.2; Fréchet derivative of the exponential by a block matrix, N. J.
@@ -71,11 +71,6 @@ pub fn peak_derivatives(
         Domain::Sampled { period } => held_plant(plant, period)?,
     };
     let closed = Loop::new(model, controller.clone())?;
-    if !peak.frequency.is_finite() {
-        let zero = |m: &DMatrix<f64>| DMatrix::zeros(m.nrows(), m.ncols());
-        let [a, b, c, d] = [&plant.a, &plant.b, &plant.c, &plant.d].map(zero);
-        return Ok(PeakDerivatives { value: 1.0, a, b, c, d });
-    }
     let mut derivatives = closed.derivatives(peak)?;
     let (n, m) = plant.b.shape();
     derivatives.a = derivatives.a.view((0, 0), (n, n)).into();
@@ -97,14 +92,18 @@ impl Loop {
         let SensitivityPeak { point, frequency, scaled } = *peak;
         let (plant, controller) = (self.plant(), self.controller());
         let (n, k) = (plant.a.nrows(), controller.a.nrows());
-        let s = plant.domain.point(frequency);
         let StateSpace { a: dynamics, b: inputs, c: outputs, .. } = self.system();
-        let pencil = ComplexMatrix::identity(n + k, n + k) * s - to_complex(&dynamics);
         let (m, p) = controller.d.shape();
-        let singular = Error::Overflow { what: "S at its peak" };
-        let x = pencil.clone().lu().solve(&to_complex(&inputs)).ok_or(singular.clone())?;
-        let y = pencil.transpose().lu().solve(&to_complex(&outputs.transpose()));
-        let y = y.ok_or(singular)?.transpose();
+        let (x, y) = if frequency.is_finite() {
+            let s = plant.domain.point(frequency);
+            let pencil = ComplexMatrix::identity(n + k, n + k) * s - to_complex(&dynamics);
+            let singular = Error::Overflow { what: "S at its peak" };
+            let x = pencil.clone().lu().solve(&to_complex(&inputs)).ok_or(singular.clone())?;
+            let y = pencil.transpose().lu().solve(&to_complex(&outputs.transpose()));
+            (x, y.ok_or(singular)?.transpose())
+        } else {
+            (ComplexMatrix::zeros(n + k, m + p), ComplexMatrix::zeros(m + p, n + k))
+        };
         let mut response = to_complex(&outputs) * &x;
         // The direct terms of controller and plant, and the added signals themselves.
         for (row, column) in (0..m).flat_map(|i| (0..p).map(move |j| (i, j))) {

@@ -147,6 +147,21 @@ fn derivatives_of_the_peaks_are_those_of_the_peaks_of_changed_plants() {
     }
 }
 
+/// S = 1 / (1 - K D) with K = -k at infinite frequency, and the derivative with respect to D is K where D = 0.
+#[test]
+fn a_peak_at_infinite_frequency_depends_on_the_direct_term_of_the_plant() {
+    let closed = servo(0.5);
+    for (name, point) in POINTS {
+        for scaled in [false, true] {
+            let at = SensitivityPeak { point, frequency: f64::INFINITY, scaled };
+            let peak = peak_derivatives(closed.plant(), closed.controller(), &at).expect("a peak");
+            assert_near(peak.value, 1.0, 1e-15, name);
+            assert_near(peak.d[0], -0.5, 1e-15, name);
+            assert!(peak.a.amax() <= 0.0 && peak.b.amax() <= 0.0 && peak.c.amax() <= 0.0);
+        }
+    }
+}
+
 #[test]
 fn disk_margins_agree_with_slicot_and_are_certified() {
     for case in cases(RECORDED, "loop") {
