@@ -64,7 +64,10 @@ impl Weight {
         for (name, value) in [("low", low), ("frequency", frequency), ("high", high)] {
             check::positive(name, value)?;
         }
-        let first = |low: f64, high: f64| [[high, (low * high).sqrt()], [1.0, (high / low).sqrt()]];
+        // Roots first: products and quotients of the numbers may leave the range of double precision.
+        let first = |low: f64, high: f64| {
+            [[high, low.sqrt() * high.sqrt()], [1.0, high.sqrt() / low.sqrt()]]
+        };
         let [numerator, denominator] = match order {
             1 => first(low, high).map(Vec::from),
             2 => first(low.sqrt(), high.sqrt()).map(|[b, c]| vec![b * b, 2.0 * b * c, c * c]),
@@ -89,7 +92,7 @@ impl Weight {
         let value = |coefficients: &[f64]| {
             coefficients.iter().fold(Complex::new(0.0, 0.0), |sum, b| sum * p + b)
         };
-        (value(&self.numerator) / value(&self.denominator)).norm()
+        value(&self.numerator).norm() / value(&self.denominator).norm()
     }
 
     /// The weight as a system with one input and one output, in sampled time by the bilinear
@@ -232,6 +235,19 @@ mod tests {
                     all.iter().fold(Complex::new(0.0, 0.0), |sum, one| sum * point + one)
                 };
                 assert!(((at(&numerator) / at(&denominator)).norm() - 2.0).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn weights_of_very_large_and_small_numbers_have_the_stated_magnitudes() {
+        for [low, mean, high] in [[1e200, 1e190, 1e180], [1e-200, 1.0, 1e200]] {
+            for order in [1, 2] {
+                let weight = Weight::lead_lag(low, 1.0, high, order).unwrap();
+                for (frequency, expected) in [(0.0, low), (1.0, mean)] {
+                    let magnitude = weight.magnitude(frequency);
+                    assert!((magnitude / expected - 1.0).abs() < 1e-9, "{order}: {magnitude:e}");
+                }
             }
         }
     }
