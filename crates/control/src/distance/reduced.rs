@@ -5,6 +5,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// Number of steps of the inverse iteration.
 const ITERATIONS: usize = 6;
+/// Entries above this divide their vector in a substitution, so that no product overflows.
+const LARGE: f64 = 1e100;
 
 /// The pencil [B, A - s I] in coordinates in which [B, A] is zero below its diagonal.
 ///
@@ -54,7 +56,7 @@ impl ReducedPencil {
         let mut t = triangular(pencil, self.inputs);
         // A singular T is replaced by one that differs by rounding, whose inverse shows the left vector of zero.
         for i in 0..n {
-            if t[(i, i)].norm() <= 0.0 {
+            if t[(i, i)].norm() < f64::EPSILON {
                 t[(i, i)] = Complex::from(f64::EPSILON);
             }
         }
@@ -62,16 +64,42 @@ impl ReducedPencil {
             DVector::from_fn(n, |i, _| Complex::new(1.0, if i % 2 == 0 { 0.3 } else { -0.2 }));
         u.unscale_mut(u.norm());
         for _ in 0..ITERATIONS {
-            let next = t.solve_upper_triangular(&u).and_then(|y| t.ad_solve_upper_triangular(&y));
-            let Some(next) = next else { break };
-            let size = next.norm();
-            if !size.is_normal() {
-                break;
-            }
-            u = next / Complex::new(size, 0.0);
+            solve(&t, &mut u);
+            solve_adjoint(&t, &mut u);
         }
         let image = self.both.columns(self.inputs, n) * &u;
         (t.ad_mul(&u).norm(), u.dotc(&image))
+    }
+}
+
+/// Replaces u by the direction of T^-1 u; T: upper triangular with at least rounding on its diagonal.
+///
+/// The inverse of a chain of k states that no input reaches has the size of rounding to the power -k.
+fn solve(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
+    for i in (0..u.len()).rev() {
+        u[i] /= t[(i, i)];
+        limit(u, i);
+        let entry = u[i];
+        u.rows_mut(0, i).axpy(-entry, &t.column(i).rows(0, i), Complex::from(1.0));
+    }
+    u.unscale_mut(u.norm());
+}
+
+/// Replaces u by the direction of T^-* u, see [`solve`].
+fn solve_adjoint(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
+    for i in 0..u.len() {
+        let known = t.column(i).rows(0, i).dotc(&u.rows(0, i));
+        u[i] = (u[i] - known) / t[(i, i)].conj();
+        limit(u, i);
+    }
+    u.unscale_mut(u.norm());
+}
+
+/// Divides the vector by the size of one entry if that is large.
+fn limit(u: &mut DVector<Complex<f64>>, at: usize) {
+    let size = u[at].norm();
+    if size > LARGE {
+        u.unscale_mut(size);
     }
 }
 
@@ -140,5 +168,19 @@ mod tests {
         let b = DMatrix::from_fn(30, 1, |i, _| f64::from(u8::from(i == 0)));
         let (value, s) = ReducedPencil::new(&a, &b).at(Complex::from(0.25));
         assert!(value < 1e-15 && (s - 0.25).norm() < 1e-15, "{value} {s}");
+    }
+
+    #[test]
+    fn a_chain_of_uncontrollable_states_has_the_singular_value_zero_whatever_its_length() {
+        for first in [39, 30, 15] {
+            let mut a = DMatrix::zeros(40, 40);
+            for i in 0..39 {
+                a[if i + 1 < first { (i + 1, i) } else { (i, i + 1) }] = 1.0;
+            }
+            a[(first - 1, first)] = 0.0;
+            let b = DMatrix::from_fn(40, 1, |i, _| f64::from(u8::from(i == 0)));
+            let (value, s) = ReducedPencil::new(&a, &b).at(Complex::from(0.0));
+            assert!(value < 1e-15 && s.norm() < 1e-15, "{first}: {value} {s}");
+        }
     }
 }
