@@ -117,11 +117,12 @@ pub fn certify_common(
         if let Some(certificate) = certify_in(&coordinates, vertices, region, domain)?.optimal() {
             return Ok(Outcome::Optimal(certificate));
         }
-        let (problem, p) = decision(&coordinates, &all);
-        match coordinates.refined_by(&problem, &p) {
-            Some(refined) if refinement < REFINEMENTS => coordinates = refined,
-            _ => break,
+        if refinement == REFINEMENTS {
+            break;
         }
+        let (problem, p) = decision(&coordinates, &all);
+        let Some(refined) = coordinates.refined_by(&problem, &p) else { break };
+        coordinates = refined;
     }
     contradiction(all, |members| decision(&coordinates, members).0)
 }
@@ -254,10 +255,11 @@ pub fn common_feedback(
                 return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
             }
         }
-        match coordinates.refined_by(&program.problem, &program.p) {
-            Some(refined) if refinement < REFINEMENTS => coordinates = refined,
-            _ => break,
+        if refinement == REFINEMENTS {
+            break;
         }
+        let Some(refined) = coordinates.refined_by(&program.problem, &program.p) else { break };
+        coordinates = refined;
     }
     if has_candidate {
         return Ok(Outcome::Inconclusive(NOT_PROVEN));
