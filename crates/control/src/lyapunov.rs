@@ -218,12 +218,40 @@ impl Equation {
 /// |P| with entries of at least the root of `P[i,i] P[j,j]`, so that an entry that is zero in theory counts
 /// with the size of its rounding error.
 pub(crate) fn sizes(p: &DMatrix<f64>) -> DMatrix<f64> {
-    let size = |i: usize, j: usize| (p[(i, i)] * p[(j, j)]).abs().sqrt().max(p[(i, j)].abs());
+    let root = p.map_diagonal(|entry| entry.abs().sqrt());
+    let size = |i: usize, j: usize| (root[i] * root[j]).max(p[(i, j)].abs());
     DMatrix::from_fn(p.nrows(), p.ncols(), size)
 }
 
 /// The largest entry of |remainder| relative to the same entry of `terms`; entries for which that is zero are left
-/// out.
+/// out. Infinite if an entry of either is not finite.
 pub(crate) fn relative(remainder: &DMatrix<f64>, terms: &DMatrix<f64>) -> f64 {
+    if !remainder.iter().chain(terms).all(|entry| entry.is_finite()) {
+        return f64::INFINITY;
+    }
     remainder.zip_map(terms, |r, t| if t > 0.0 { r.abs() / t } else { 0.0 }).amax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_residual_that_is_not_a_number_is_infinite_wherever_it_is() {
+        let good = DMatrix::from_element(2, 2, 1.0);
+        for at in 0..good.len() {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                let mut bad = good.clone();
+                bad[at] = value;
+                assert!(relative(&bad, &good).is_infinite() && relative(&good, &bad).is_infinite());
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_of_large_entries_are_their_geometric_means() {
+        let p = DMatrix::from_row_slice(2, 2, &[1e200, 0.0, 0.0, 1e300]);
+        let mean = sizes(&p)[(0, 1)];
+        assert!((mean - 1e250).abs() < 1e236, "{mean}");
+    }
 }

@@ -50,7 +50,7 @@ impl RiccatiEquation {
     }
 
     /// Largest entry of the left side relative to the sum of its absolute terms, by which iterates are compared;
-    /// infinite if P has no gain or the left side is not finite.
+    /// infinite if P has no gain, or the left side or a term is not finite.
     pub(super) fn entrywise_residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &p.abs(), 0.0)
     }
@@ -65,9 +65,6 @@ impl RiccatiEquation {
     fn relative_residual(&self, p: &DMatrix<f64>, size: &DMatrix<f64>, floor: f64) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);
-        if left.iter().any(|entry| !entry.is_finite()) {
-            return f64::INFINITY;
-        }
         let (a, b, n) = (self.a.abs(), self.b.abs(), self.n.abs());
         let effect = b.tr_mul(size);
         let terms = match self.domain {
@@ -87,7 +84,8 @@ impl RiccatiEquation {
         };
         let terms = terms + self.q.abs();
         let least = floor * terms.amax();
-        relative(&left, &terms.map(|term| term.max(least)))
+        // A term that is not a number stays one.
+        relative(&left, &terms.map(|term| if term < least { least } else { term }))
     }
 
     /// One step of Newton's method; None when A + B K is not stable or the step cannot be computed.
