@@ -4,7 +4,7 @@ use crate::blocks::symmetric_part;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
 use crate::rank::Staircase;
 use crate::svd::norm_2;
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// The H2 norm and the generalised H2 norms of a system.
@@ -87,7 +87,7 @@ fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
             c * state * c.transpose() + d * d.transpose()
         }
     };
-    Ok(symmetric_part(&covariance))
+    check::in_range("the covariance of the output", symmetric_part(&covariance))
 }
 
 /// The system without the states that w does not reach; None if w reaches all states, or none.

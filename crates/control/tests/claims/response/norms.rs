@@ -213,3 +213,11 @@ fn the_energy_to_peak_norm_is_reached_by_the_reversed_impulse_response() {
     let computed = energy(&sampled).unwrap();
     assert!((computed.peaks[0] - (1.0 + 36.0_f64 / 0.75).sqrt()).abs() < 1e-14);
 }
+
+#[test]
+fn a_covariance_that_overflows_is_no_norm_of_zero() {
+    // The output is -1e200 times a lag: its covariance is 1e400 / 2.
+    let a = -DMatrix::identity(2, 2);
+    let refused = energy(&single(a, &[1.0, 2.0], &[1e200, -1e200], CONTINUOUS));
+    assert!(matches!(refused, Err(Error::Overflow { .. })), "{refused:?}");
+}
