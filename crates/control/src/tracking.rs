@@ -193,8 +193,9 @@ pub fn feedforward(
     crate::stability::require_stable("A + B K_x", &controlled.a, domain)?;
     let constant = controlled.dc_matrix().lu();
     let gain = |input: &DMatrix<f64>| {
-        let states = constant.solve(&(b * input));
-        states.map(|states| output * states).ok_or(Error::Overflow { what: "the gain at s = 0" })
+        let what = "the gain at s = 0";
+        let states = constant.solve(&(b * input)).ok_or(Error::Overflow { what })?;
+        check::in_range(what, output * states)
     };
     let whole = gain(&DMatrix::identity(m, m))?;
     let svd = Svd::new(&whole.transpose())?;

@@ -290,6 +290,16 @@ fn the_feedforward_of_one_state_is_its_closed_form() {
 }
 
 #[test]
+fn a_feedforward_for_which_a_state_overflows_is_refused() {
+    // r_1 = 1 needs u_1 = 1e10, which leads x_2 to 1e310.
+    let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -1e-300, -1.0]));
+    let b = matrix(3, &[1.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    let output = matrix(2, &[1e-10, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let refused = feedforward(&a, &b, &output, &DMatrix::zeros(2, 3), Domain::Continuous);
+    assert!(matches!(refused, Err(Error::Overflow { .. })), "{refused:?}");
+}
+
+#[test]
 fn references_are_reached_without_error_by_both_actions() {
     let [a, b, c] = plant();
     let output = h() * &c;
