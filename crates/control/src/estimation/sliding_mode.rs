@@ -44,8 +44,8 @@ pub struct SlidingMode {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is
-/// not above zero, faults that are not modelled as constant, a continuous plant or a prediction estimator;
+/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter or a `rate`
+/// that is not above zero, faults that are not modelled as constant, a continuous plant or a prediction estimator;
 /// [`Error::NotSchur`] for a delta so small that the samples oscillate about s = 0; [`Error::Overflow`] if A is
 /// singular.
 pub fn sliding_mode(
@@ -65,6 +65,7 @@ pub fn sliding_mode(
         check::column(name, list, q)?;
         list.iter().try_for_each(|&value| check::positive(name, value))?;
     }
+    check::positive("rate", rate)?;
     let fast = eigenvalue(rate, domain);
     let pole = domain.constant() - LEFT * (domain.constant() - fast);
     let slope = pole - fast;

@@ -258,6 +258,17 @@ fn sliding_mode_and_learning_are_laws_of_sampled_controllers_with_a_current_esti
 }
 
 #[test]
+fn a_sliding_mode_without_a_rate_of_decay_is_refused() {
+    let (plant, gains, domain) = sampled();
+    let form = DirectForm::new(&plant, domain).unwrap();
+    let law = SlidingMode { rho: vec![3.0], delta: None };
+    for rate in [f64::NAN, f64::INFINITY, 0.0, -5.0] {
+        let refused = sliding_mode(&plant, &form, &gains, &law, rate);
+        assert!(matches!(refused, Err(Error::OutOfRange { name: "rate", .. })), "{refused:?}");
+    }
+}
+
+#[test]
 fn the_mean_rate_of_equal_poles_is_their_rate_in_both_domains() {
     let m = DMatrix::from_diagonal_element(2, 2, -5.0);
     assert!((mean_rate(&m, Domain::Continuous).unwrap() - 5.0).abs() < 1e-12);
