@@ -223,4 +223,31 @@ mod tests {
         assert!((tuned.peak.gamma - 1.25).abs() < 5e-3, "{tuned:?}");
         Ok(())
     }
+
+    /// x+ = x / 2 + u each second, K = -k from k = 0.2: S = (z - 0.5) / (z - 0.5 + k).
+    fn sampled(terms: Vec<Term>, rate: f64) -> Result<Tuned, Error> {
+        let domain = Domain::Sampled { period: 1.0 };
+        let controller = |parameters: &DVector<f64>| {
+            let d = one(-parameters[0]);
+            Ok(StateSpace { a: one(0.0), b: one(0.0), c: one(0.0), d, domain })
+        };
+        let tuning = Tuning {
+            plant: StateSpace { a: one(0.5), b: one(1.0), c: one(1.0), d: one(0.0), domain },
+            controller: &controller,
+            references: DMatrix::zeros(0, 1),
+            terms,
+            instability: -0.01,
+            is_allowed: &|_| true,
+            rate,
+            is_over: &|| false,
+        };
+        tuning.tuned(&DVector::from_element(1, 0.2), &DVector::from_element(1, 1.0))
+    }
+
+    #[test]
+    fn without_terms_the_parameters_stay() -> Result<(), Error> {
+        let tuned = sampled(Vec::new(), 0.1)?;
+        assert_eq!(tuned.parameters, DVector::from_element(1, 0.2));
+        Ok(())
+    }
 }

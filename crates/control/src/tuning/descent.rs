@@ -92,7 +92,8 @@ impl Search<'_> {
         for _ in 0..STEPS {
             let value = iterate.largest();
             let places = active(&iterate.values, ACTIVE * value);
-            let Some(cuts) = self.cuts(&iterate, &self.at, &places) else { break };
+            let cuts = self.cuts(&iterate, &self.at, &places);
+            let Some(cuts) = cuts.filter(|cuts| !cuts.is_empty()) else { break };
             if is_fresh {
                 // The first step changes the parameters by a twentieth of their sizes.
                 let size = cuts.iter().map(|cut| cut.gradient.norm()).fold(0.0, f64::max);
