@@ -250,4 +250,15 @@ mod tests {
         assert_eq!(tuned.parameters, DVector::from_element(1, 0.2));
         Ok(())
     }
+
+    /// The mean of ln |S| over the circle is zero, so that its maximum is at least 1; at the start it is 1.5 / 1.3.
+    #[test]
+    fn a_bandwidth_far_above_the_sampling_rate_is_examined_at_half_of_that_rate()
+    -> Result<(), Error> {
+        let weight = Weight::constant(1.0);
+        let terms = vec![Term { transfer: Transfer::Sensitivity(Point::Output), weight }];
+        let gamma = sampled(terms, 1e8)?.peak.gamma;
+        assert!((0.999..1.155).contains(&gamma), "{gamma}");
+        Ok(())
+    }
 }

@@ -66,7 +66,8 @@ impl<'a> Grid<'a> {
             Domain::Continuous => rate * 10_f64.powi(2 * DECADES),
             Domain::Sampled { period } => (1.0 - 1e-6) * PI / period,
         };
-        let frequency = frequency.clamp(lowest, highest);
+        // The sampling rate counts if the bandwidth is more than six decades above it.
+        let frequency = frequency.max(lowest).min(highest);
         let at = self.nodes.partition_point(|node| node.frequency < frequency);
         if self.nodes.get(at).is_some_and(|node| node.frequency <= frequency) {
             return Ok(());
