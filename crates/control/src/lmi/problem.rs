@@ -143,7 +143,10 @@ impl Problem {
     fn push(&mut self, name: Option<&'static str>, matrix: &Affine, margin: f64) {
         let (rows, cols) = matrix.shape();
         assert_eq!(rows, cols, "a requirement is a square matrix");
-        self.requirements.push(Requirement { name, matrix: matrix.clone(), margin });
+        // A matrix without entries is positive definite.
+        if rows > 0 {
+            self.requirements.push(Requirement { name, matrix: matrix.clone(), margin });
+        }
     }
 
     /// Sets the objective to minimise: an expression of one row and column.

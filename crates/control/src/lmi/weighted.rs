@@ -298,4 +298,21 @@ mod tests {
             assert!(least <= best, "{domain:?}: {least}, {best}");
         }
     }
+
+    /// x' = -L x + w - L v, v twice and z three times as large: the norm is 3 sqrt(1 / L^2 + 4).
+    #[test]
+    fn weights_without_states_are_factors_of_the_norm() {
+        let domain = Domain::Continuous;
+        let weights = weights(&Weight::constant(2.0), &Weight::constant(3.0), domain);
+        let performance = Performance { gamma: Some(9.0), ..fault_through_noise() };
+        let region = Region { decay: Some(1.0), ..Region::default() };
+        let (a, c) = (row(&[0.0]), row(&[1.0]));
+        let outcome = weights.observer_gain(&a, &c, &region, &performance, domain);
+        let Outcome::Optimal(Synthesis { gain, .. }) = outcome.unwrap() else { panic!() };
+        let expected = 3.0 * (gain[0].powi(-2) + 4.0).sqrt();
+        let b = &performance.disturbance - &gain * &performance.feedthrough;
+        let closed = strictly_proper(-&gain, b, row(&[1.0]), domain);
+        let norm = h_infinity(&weights.around(&closed), 1e-6).unwrap().upper;
+        assert!((norm / expected - 1.0).abs() < 1e-5 && gain[0] > 1.0, "{norm} {expected}");
+    }
 }
