@@ -163,14 +163,12 @@ impl Cusum {
             sums.step(sign * sum / as_number(group).sqrt());
             let (before, left) = (missed[start], sums.total());
             // Within a group the probability is interpolated.
-            missed.extend(
-                (1..=group).map(|k| before + (left - before) * as_number(k) / as_number(group)),
-            );
+            let part = |k| before + (left - before) * as_number(k) / as_number(group);
+            missed.extend((1..=group).take(most - start).map(part));
             if left < 1e-6 {
                 break;
             }
         }
-        missed.truncate(most + 1);
         Delay { missed }
     }
 
@@ -396,5 +394,12 @@ mod tests {
         assert!(Cusum::with_false_alarms(0.5, f64::NAN).is_err());
         assert!(Cusum::with_false_alarms(0.5, f64::INFINITY).is_err());
         assert!(Cusum::with_false_alarms(1e-12, 1e40).is_err());
+    }
+
+    #[test]
+    fn a_large_threshold_needs_memory_for_the_samples_that_are_followed_alone() {
+        let missed = Cusum { drift: 0.5, threshold: 1e4 }.delay(|_| 0.0, 3).missed;
+        assert!(missed.len() == 4 && missed.capacity() < 1000, "{}", missed.capacity());
+        assert!(missed.iter().all(|part| (part - 1.0).abs() < 1e-12), "{missed:?}");
     }
 }
