@@ -131,6 +131,9 @@ impl HiddenDisturbance {
         let Some(factor) = noise.clone().cholesky() else { return Ok(None) };
         let inverse = factor.solve(d).transpose();
         let free = null_space(&(&inverse * d));
+        if free.is_empty() {
+            return Ok(None);
+        }
         let (hidden, driven) = (a - b * &inverse * c, b * free);
         let part = controllable_part(&hidden, &driven)?;
         if part.a.is_empty() {
@@ -311,5 +314,14 @@ mod tests {
         let outcome =
             observer_norm_lower_bound(&row(&[0.0]), &row(&[1.0]), &performance, Domain::Continuous);
         assert_eq!(outcome.unwrap(), None);
+    }
+
+    #[test]
+    fn a_disturbance_that_the_measurement_shows_completely_has_no_bound() {
+        let one = || row(&[1.0]);
+        let performance = performance(one(), one(), one());
+        let domain = Domain::Continuous;
+        let outcome = observer_norm_lower_bound(&row(&[-1.0]), &one(), &performance, domain);
+        assert_eq!(outcome, Ok(None));
     }
 }
