@@ -48,7 +48,8 @@ def simulate(
     Args:
         fmu: the archive, or a folder with the unpacked FMU.
         start_time, stop_time: simulated time in s; default: the ``DefaultExperiment``, else 0 and 1.
-        step: communication step in s; default: the ``DefaultExperiment``, else 1 ms.
+        step: communication step in s; default: the ``DefaultExperiment``, else 1 ms, or for more than 100 s
+            the power of ten that gives at most 100,000 steps.
         start_values: values of variables before the run, also as ``(value, unit)`` with the unit of the variable.
         input: inputs over time. Either a table with the column ``"time"`` in s or of durations, with the
             interpolation of FMPy: a mapping of columns, a structured array, :class:`Results`, a frame of pandas (whose index

@@ -141,7 +141,7 @@ class System:
 
     @classmethod
     def from_ssp(cls, path: PathLike) -> System:
-        """Build on a system structure: an SSP, an SSD, or a folder with one."""
+        """Build on a system structure: an SSP, an SSD, an ``OspSystemStructure.xml``, or a folder with one."""
         return cls({"system": os.fspath(path)})
 
     def _path(self, path: PathLike) -> str:
