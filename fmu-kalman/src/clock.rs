@@ -26,6 +26,11 @@ impl Clock {
         (self.start, self.next) = (time, 1.0);
     }
 
+    /// The time of sample 0 in s.
+    pub(crate) fn first(&self) -> f64 {
+        self.start
+    }
+
     /// The instant of the next sample in s, at most `end`; `None` if it is not due until `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.start + self.next * self.period;

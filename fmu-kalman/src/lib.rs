@@ -180,6 +180,8 @@ impl Model for KalmanFilter {
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let carrier = self.carrier()?;
+        // An FMU state may be set before an initialisation, or after one at another time.
+        carrier.start(self.clock.first())?;
         let (mut from, transform) = (step.start, self.transform());
         while let Some(instant) = self.clock.next_until(step.end()) {
             self.applied.add(&self.u, instant - from);

@@ -7,6 +7,8 @@ import zipfile
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
 from scipy.integrate import solve_ivp
 
 from any_fmu import instance
@@ -427,7 +429,7 @@ def test_the_template_names_the_command_that_gives_it_a_plant(aso_ftc, packed_fi
 
 
 def test_a_saved_state_repeats_the_estimates(tanks, tmp_path, record):
-    """In this instance, and as bytes in another one, which has another instance of the plant."""
+    """In this instance, and as bytes in others, which have other instances of the plant: initialised, and only instantiated."""
     commands, measured = record
     settings = {"method": METHODS["unscented"]}
 
@@ -454,6 +456,19 @@ def test_a_saved_state_repeats_the_estimates(tanks, tmp_path, record):
         other.setFMUstate(state)
         assert samples(other, variables, range(10, 20)) == expected
         other.freeFMUstate(state)
+    description = read_model_description(str(tanks))
+    new = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=extract(str(tanks), str(tmp_path / "new")),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="new",
+    )
+    new.instantiate()
+    state = new.deSerializeFMUstate(data)
+    new.setFMUstate(state)
+    assert samples(new, variables, range(10, 20)) == expected
+    new.freeFMUstate(state)
+    new.freeInstance()
 
 
 def test_a_bias_of_a_sensor_is_estimated(attempt, examples, tmp_path):
