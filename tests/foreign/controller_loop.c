@@ -67,6 +67,8 @@ int main(void)
 {
     JOIN(NAME, State) state;
     double values[ALL + FLAGS + SWITCHES];
+    /* The start sets every field that is read: no flag may keep these bytes. */
+    memset(&state, 0xa5, sizeof(state));
     JOIN(NAME, init)(&state);
     fprintf(stderr, "%zu\n", sizeof(state));
     while (fread(values, sizeof(values), 1, stdin) == 1)

@@ -382,6 +382,9 @@ static void start_with_all_actuators(aso_State *state)
     for (i = 0U; i < ASO_ACTUATORS; i++)
     {
         state->gone[i] = false;
+#if ASO_HAS_TRANSFER
+        state->was_gone[i] = false;
+#endif
     }
 #if ASO_CASES > 0
     for (i = 0U; i < ASO_CASES; i++)
@@ -393,6 +396,9 @@ static void start_with_all_actuators(aso_State *state)
     }
 #endif
     state->set = 0U;
+#if ASO_HAS_TRANSFER
+    state->last_set = 0U;
+#endif
     state->reconfiguration = 0;
 }
 
