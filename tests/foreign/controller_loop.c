@@ -2,7 +2,8 @@
  * commands, estimates and status to standard output. Each sample has the measurements, the references, the
  * scheduling variable, whether to compensate, of a detection whether to reset it, and of a reconfiguration what is known about the actuators,
  * all as doubles. Macros: NAME (of the controller), REAL (double or
- * float), REFERENCES and SCHEDULE if it has them as inputs, DETECTION and RECONFIGURATIONS if it has them; the header comes by -include. */
+ * float), REFERENCES and SCHEDULE if it has them as inputs, DETECTION and RECONFIGURATIONS if it has them, FIRST_SAMPLE for another number
+ * of the first sample than 0; the header comes by -include. */
 #include <stdio.h>
 #include <string.h>
 
@@ -70,6 +71,9 @@ int main(void)
     /* The start sets every field that is read: no flag may keep these bytes. */
     memset(&state, 0xa5, sizeof(state));
     JOIN(NAME, init)(&state);
+#ifdef FIRST_SAMPLE
+    state.sample = FIRST_SAMPLE;
+#endif
     fprintf(stderr, "%zu\n", sizeof(state));
     while (fread(values, sizeof(values), 1, stdin) == 1)
     {

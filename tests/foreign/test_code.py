@@ -283,6 +283,16 @@ def test_the_samples_of_a_reconfiguration_have_each_kind_of_gains(designed, name
         assert ((number > 0) & ~switches.any(axis=1)).any(), "an estimated loss decides"
 
 
+def test_after_2_to_32_samples_losses_decide_as_before(designed):
+    """Two instances that both compensate from their first sample on differ in nothing but the number of samples before it."""
+    code = designed("reconfiguration")
+    numbers = (100_000, 2**32 - 100)
+    early, late = (fed(code.compiled("-O2", f"-DFIRST_SAMPLE={number}U"), code.samples)[0] for number in numbers)
+    assert (bits(early) == bits(late)).all()
+    reported = code.samples[:, -len(code.design["reconfigurations"]) :].any(axis=1)
+    assert ((late[:, -2] > 0) & ~reported)[100:].any(), "an estimated loss decides"
+
+
 @pytest.mark.parametrize("name", ["fall-back", "reconfiguration"])
 def test_the_stated_arithmetic_of_a_reconfiguration_has_the_commands_of_stuck_actuators(designed, name):
     code = designed(name)

@@ -390,8 +390,7 @@ static void start_with_all_actuators(aso_State *state)
     for (i = 0U; i < ASO_CASES; i++)
     {
         state->lost[i] = ASO_ZERO;
-        state->above_since[i] = 0U;
-        state->above[i] = false;
+        state->above_for[i] = 0U;
         state->decided[i] = false;
     }
 #endif
@@ -416,19 +415,18 @@ static void find_gone(aso_State *state, const bool reported[ASO_CASES], bool fal
 
         if ((!fall_back) && (state->lost[i] > most_lost[i]))
         {
-            if (!state->above[i])
-            {
-                state->above[i] = true;
-                state->above_since[i] = state->sample;
-            }
-            if ((state->sample - state->above_since[i]) >= case_samples[i])
+            if (state->above_for[i] >= case_samples[i])
             {
                 state->decided[i] = true;
+            }
+            if (state->above_for[i] < UINT32_MAX)
+            {
+                state->above_for[i]++;
             }
         }
         else
         {
-            state->above[i] = false;
+            state->above_for[i] = 0U;
         }
         gone = reported[i] || state->decided[i];
         if (gone != state->gone[case_actuator[i]])

@@ -246,7 +246,7 @@ impl Memory {
             let cases = reconfiguration.cases.len();
             stored += cases;
             counters += cases + 2;
-            flags += Kind::Actuator.count(controller) + 2 * cases;
+            flags += Kind::Actuator.count(controller) + cases;
         }
         if controller.transfer.is_some() {
             // The last law: whether it compensates, its set of gains, the actuators that are gone.

@@ -219,11 +219,9 @@ impl Source<'_> {
             lines.extend(has_cases.then(|| format!("    {real} lost[{cases}];")));
             return;
         }
-        lines.extend(has_cases.then(|| format!("    uint32_t above_since[{cases}];")));
+        lines.extend(has_cases.then(|| format!("    uint32_t above_for[{cases}];")));
         lines.extend(["    uint32_t set;", "    int32_t reconfiguration;"].map(str::to_owned));
         lines.push(format!("    bool gone[{actuators}];"));
-        if has_cases {
-            lines.extend(["above", "decided"].map(|flag| format!("    bool {flag}[{cases}];")));
-        }
+        lines.extend(has_cases.then(|| format!("    bool decided[{cases}];")));
     }
 }

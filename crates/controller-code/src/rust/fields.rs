@@ -73,8 +73,7 @@ impl Source<'_> {
         if !reconfiguration.cases.is_empty() {
             all.extend([
                 field("lost", format!("[{}; CASES]", self.real), "[0.0; CASES]"),
-                field("above", "[bool; CASES]", "[false; CASES]"),
-                field("since", "[u32; CASES]", "[0; CASES]"),
+                field("above_for", "[u32; CASES]", "[0; CASES]"),
                 field("decided", "[bool; CASES]", "[false; CASES]"),
             ]);
         }

@@ -188,13 +188,13 @@ impl Controller {{
         if !reconfiguration.cases.is_empty() {
             lines.push(format!(
                 "            let reported: [bool; SWITCHES] = (*actuators).into();
-            let memory = self.lost.iter().zip(&mut self.above).zip(&mut self.since).zip(&mut self.decided);
-            for (((((lost, above), since), decided), case), (limit, is_reported)) in
+            let memory = self.lost.iter().zip(&mut self.above_for).zip(&mut self.decided);
+            for ((((lost, above_for), decided), case), (limit, is_reported)) in
                 memory.zip(&ALL_CASES).zip(MOST_LOST.iter().zip(reported))
             {{
                 let request = Request {{ is_reported, is_fall_back: {fall_back} }};
-                let mut watch = Watch {{ lost, above, since, decided }};
-                let is_gone = watch.decide(case, limit, request, self.sample);
+                let mut watch = Watch {{ lost, above_for, decided }};
+                let is_gone = watch.decide(case, limit, request);
                 case.note(is_gone, &mut self.gone, &mut self.f_hat);
             }}"
             ));

@@ -17,10 +17,8 @@ pub struct Case<'a> {
 pub struct Watch<'a, N> {
     /// Its estimated loss of effectiveness in the last sample.
     pub lost: &'a N,
-    /// Whether the loss is above the limit.
-    pub above: &'a mut bool,
-    /// The sample since which the loss is above the limit.
-    pub since: &'a mut u32,
+    /// The number of samples in a row in which the loss was above the limit.
+    pub above_for: &'a mut u32,
     /// Whether the loss has decided that the actuator is gone.
     pub decided: &'a mut bool,
 }
@@ -38,14 +36,12 @@ impl<N: Number> Watch<'_, N> {
     /// Decides in a sample whether the actuator is gone: it is reported, or its loss has been above `limit` for
     /// `case.samples` samples now or before.
     #[inline(always)]
-    pub fn decide(&mut self, case: &Case<'_>, limit: &N, request: Request, sample: u32) -> bool {
+    pub fn decide(&mut self, case: &Case<'_>, limit: &N, request: Request) -> bool {
         if !request.is_fall_back && self.lost.is_above(limit) {
-            if !*self.above {
-                (*self.above, *self.since) = (true, sample);
-            }
-            *self.decided |= sample.wrapping_sub(*self.since) >= case.samples;
+            *self.decided |= *self.above_for >= case.samples;
+            *self.above_for = self.above_for.saturating_add(1);
         } else {
-            *self.above = false;
+            *self.above_for = 0;
         }
         request.is_reported || *self.decided
     }
