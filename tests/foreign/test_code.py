@@ -173,6 +173,15 @@ def test_the_c_code_follows_all_rules_of_misra_c_that_are_not_advisory(designed,
     assert set(violations.split()) <= {*advisory, "badBitmaskCheck"}, violations
 
 
+@pytest.mark.parametrize("name", ["reconfiguration-detection", "transfer-reconfiguration", "held-detection"])
+def test_an_instance_has_its_fields_by_size(designed, name):
+    """Numbers, counters, flags: without padding between them, the stated memory is right for any number of actuators and tests."""
+    body = designed(name).header.split("its fields belong to the functions below. */")[1].split("}")[0]
+    of_type = {"double": 8, "uint32_t": 4, "int32_t": 4, "bool": 1}
+    sizes = [of_type[line.split()[0]] for line in body.splitlines() if line.startswith("    ")]
+    assert set(sizes) == {8, 4, 1} and sizes == sorted(sizes, reverse=True)
+
+
 def test_the_stated_arithmetic_is_that_of_the_equations(designed):
     code = designed("sensor-fault")
     n, m, p, q = code.sizes  # n with the filter's states

@@ -53,6 +53,7 @@ impl Source<'_> {
         }
         self.detection_state(&mut lines, true);
         self.reconfiguration_state(&mut lines, true);
+        let first_integer = lines.len();
         if controller.has_counter() {
             lines.push("    uint32_t sample;".to_owned());
         }
@@ -78,6 +79,8 @@ impl Source<'_> {
         if controller.filter.is_some() {
             lines.push("    bool started;".to_owned());
         }
+        // The flags come last, so that there is no padding between the fields.
+        lines[first_integer..].sort_by_key(|line| line.starts_with("    bool "));
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
         lines.extend([
             format!("}} {name}_State;"),
