@@ -103,8 +103,10 @@ impl Design {
             let text = "schedule and sliding_mode are stated, expected one of them";
             return refuse(text.to_owned());
         }
-        if self.sample_time.is_none() && self.checks_measurements() {
-            let text = "schedule and range or longest_hold of a measurement are stated, expected sample_time, too";
+        // Its equations are integrated: no function of a whole step checks measurements or computes residuals.
+        if self.sample_time.is_none() && (self.checks_measurements() || self.detection.is_some()) {
+            let text = "schedule is stated together with detection, or with range or longest_hold of a measurement; \
+                        expected sample_time, too";
             return refuse(text.to_owned());
         }
         if schedule.points.len() < 2 {

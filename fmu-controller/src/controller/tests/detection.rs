@@ -105,6 +105,21 @@ fn run(mut controller: AsoController, sizes: &[f64], end: f64) -> AsoController 
     controller
 }
 
+/// The exporter integrates its equations, of which the filter of the residuals is no part.
+#[test]
+fn a_continuous_controller_with_a_schedule_has_no_detection() {
+    let text = continuous("");
+    let [first, end] = ["A = [[", "[experiment]"].map(|mark| text.find(mark).unwrap());
+    let point = |at: f64| {
+        let operating = "x_op = [0.0, 0.0]\nu_op = [0.0]\ny_op = [0.0]\n";
+        format!("[[schedule.points]]\nat = {at:?}\n{}{operating}", &text[first..end])
+    };
+    let points = [1.0, 2.0].map(point).concat();
+    let text = format!("{text}[schedule]\nvariable = \"mass\"\n{points}");
+    let message = with_design(&text).err().unwrap().to_string();
+    assert!(message.contains("schedule is stated together with detection"), "{message}");
+}
+
 #[test]
 fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_step() {
     for (limits, range) in
