@@ -85,8 +85,9 @@ impl Reconfigurator {
                 let loss = losses.iter().find(|loss| loss.actuator == case.actuator);
                 let above = !is_fall_back_set && loss.is_some_and(|loss| loss.estimate > most);
                 *since = since.or(Some(time)).filter(|_| above);
-                // The importer adds up its steps with rounding.
-                let enough = since.is_some_and(|since| time - since >= least_time * (1.0 - 1e-9));
+                // The importer adds up its steps with rounding, and the time of the event is rounded.
+                let rounding = 1e-9 * least_time + 8.0 * f64::EPSILON * time.abs();
+                let enough = since.is_some_and(|since| time - since >= least_time - rounding);
                 self.decided |= u64::from(enough) << case.actuator;
             }
             let gone = self.reported[case.actuator] || self.decided & (1 << case.actuator) != 0;

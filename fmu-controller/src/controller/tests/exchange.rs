@@ -151,6 +151,20 @@ fn the_activation_is_a_time_event_while_it_is_to_come_and_wanted() {
     assert!(!controller.mode.compensating);
 }
 
+/// At 1e7 s neighbouring numbers differ by 1.9e-9 s: the announced time is 3.7e-10 s too early.
+#[test]
+fn a_loss_decides_at_the_announced_time_late_in_a_run_too() {
+    let fault = "[[faults]]\nname = \"f\"\n";
+    let case = "loss_of = \"u\"\nleast_command = 1.0\n[[reconfigurations]]\ngone = \"u\"\nstuck_at = 0.0\n\
+                K_x = [[0.0, 0.0]]\nK_f = [[0.0]]\nK_s = [0.0]\nloss = 0.5\ntime = 0.1\n";
+    let text = small("").replace(fault, &format!("{fault}{case}"));
+    let mut controller = ready(with_design(&text).unwrap());
+    controller.losses[0].estimate = 1.0;
+    assert_eq!(controller.event(1e7).unwrap().next_event_time, Some(1e7 + 0.1));
+    assert_eq!(controller.event(1e7 + 0.1).unwrap().next_event_time, None);
+    assert_eq!(controller.reconfigurator.output, 1);
+}
+
 #[test]
 fn a_copy_through_bytes_stays_in_its_mode() {
     let (mut controller, _) = exchanged("limits = [-1.5, 0.3]");
