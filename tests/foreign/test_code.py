@@ -156,6 +156,14 @@ def test_clang_compiles_it_without_warnings_and_with_the_same_bits(designed):
     assert (bits(outputs[:, :-1]) == bits(code.expected)).all()
 
 
+@pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only"])
+def test_an_option_that_removes_the_checks_of_nan_is_an_error(designed, option):
+    code = designed("constant-prediction")
+    source = code.folder / "c" / f"{code.name}.c"
+    done = subprocess.run(["gcc", "-std=c99", option, "-fsyntax-only", source], capture_output=True, text=True)
+    assert done.returncode != 0 and "remove the checks of NaN" in done.stderr
+
+
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is not installed")
 @pytest.mark.parametrize(
     "name",

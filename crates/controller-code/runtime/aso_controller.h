@@ -33,8 +33,8 @@
  * Switches, 1 or 0: those after #if below. Types: aso_real, aso_State.
  */
 
-#if defined(__FAST_MATH__)
-#error "-ffast-math removes the checks of NaN and changes the results"
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
+#error "-ffast-math, -ffinite-math-only and /fp:fast remove the checks of NaN"
 #endif
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
