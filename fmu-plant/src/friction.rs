@@ -131,6 +131,8 @@ impl StribeckLaw {
 
 #[cfg(test)]
 mod tests {
+    use num_dual::Dual64;
+
     use super::*;
     use crate::functions::Direct;
 
@@ -156,6 +158,15 @@ mod tests {
         let cubic = law(|p| p.stribeck_exponent = 3.0);
         assert!((linear.magnitude(&Direct, 0.3) - (25.0 + 5.0 * (-2.0_f64).exp())).abs() < 1e-13);
         assert!((cubic.magnitude(&Direct, 0.3) - (25.0 + 5.0 * (-8.0_f64).exp())).abs() < 1e-13);
+    }
+
+    /// (v / v_s)^(delta - 1) is beyond the range of the numbers there, g(v) is F_c.
+    #[test]
+    fn far_above_the_stribeck_velocity_the_friction_has_no_slope() {
+        let parameters = Parameters { stribeck_exponent: 200.0, ..Parameters::default() };
+        let law = StribeckLaw::new(&parameters.along(None));
+        let friction = law.magnitude(&Direct, Dual64::new(20.0, 1.0));
+        assert_eq!([friction.re, friction.eps].map(f64::to_bits), [25.0, 0.0].map(f64::to_bits));
     }
 
     #[test]

@@ -75,7 +75,8 @@ impl Number for Dual64 {
 
     fn exponential(self) -> Self {
         let value = self.re.exponential();
-        Self::new(value, value * self.eps)
+        // e^x tends to zero faster than any power of x, whose derivative may be infinite.
+        Self::new(value, if value == 0.0 { 0.0 } else { value * self.eps })
     }
 
     fn power(self, exponent: Self) -> Self {
