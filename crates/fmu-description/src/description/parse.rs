@@ -57,10 +57,10 @@ impl ModelDescription {
     /// the meaning for a simulation is clear or other importers accept it: other encodings,
     /// `fmiVersion` 2.0.x, unknown elements and attributes, wrong order, words in another case,
     /// unknown words, flags, types and dependencies, numbers that are infinite or empty. Content
-    /// that would mislead a simulation is an error: missing required attributes, numbers that are
-    /// malformed or too large, value references that two inputs or parameters share, a name of two
-    /// variables unless both are local or have one value, types that refer to types.
-    /// [`ModelDescription::problems`] checks further rules.
+    /// that would mislead a simulation is an error: missing required attributes, a `modelIdentifier`
+    /// that is a path, numbers that are malformed or too large, value references that two inputs or
+    /// parameters share, a name of two variables unless both are local or have one value, types that
+    /// refer to types. [`ModelDescription::problems`] checks further rules.
     ///
     /// [Limits](crate::limits): 512 MiB, 4,000,000 elements, 12,000,000 attributes, 256 attributes of an
     /// element, 64 levels, 1,000,000 variables, 128 MiB of texts and lists that aliases inherit. Cost: linear

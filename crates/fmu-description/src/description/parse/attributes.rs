@@ -125,6 +125,16 @@ impl<'a> Node<'a> {
         value.ok_or_else(|| self.fault(name, "a value", "no such attribute".to_owned()))
     }
 
+    /// Reads `modelIdentifier`, the name of a library. An error for a path, which could lead out of the FMU.
+    pub(super) fn model_identifier(&self) -> Result<String> {
+        const NAME: &str = "modelIdentifier";
+        let text = self.required(NAME)?;
+        if text.contains(['/', '\\', ':']) {
+            return Err(self.wrong(NAME, "the name of a library without /, \\ and :", text));
+        }
+        Ok(text.to_owned())
+    }
+
     /// Returns the value of an attribute, unchanged and without white space around it. An empty one gives a
     /// warning and counts as missing.
     fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {

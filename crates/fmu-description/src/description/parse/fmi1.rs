@@ -11,7 +11,7 @@ use crate::unit::{DisplayUnit, Unit};
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     schema::check(root, Version::V1);
-    let identifier = root.required("modelIdentifier")?.to_owned();
+    let identifier = root.model_identifier()?;
     let types = root.list("TypeDefinitions", "Type", simple_type)?;
     let variables = root.optional("ModelVariables", |list| variables::read(list, &types))?;
     let (variables, structure) = variables.unwrap_or_default();

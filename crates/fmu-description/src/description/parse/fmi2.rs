@@ -41,7 +41,7 @@ fn source_files(element: Node<'_>) -> Result<Vec<String>> {
 fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
     let flag = |name| element.flag(name);
     Ok(ModelExchange {
-        model_identifier: element.required("modelIdentifier")?.to_owned(),
+        model_identifier: element.model_identifier()?,
         needs_execution_tool: flag("needsExecutionTool"),
         completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
         can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
@@ -57,7 +57,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
 fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
     let flag = |name| element.flag(name);
     Ok(CoSimulation {
-        model_identifier: element.required("modelIdentifier")?.to_owned(),
+        model_identifier: element.model_identifier()?,
         needs_execution_tool: flag("needsExecutionTool"),
         can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
         can_interpolate_inputs: flag("canInterpolateInputs"),

@@ -42,7 +42,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
     let flag = |name| element.flag(name);
     let completed = flag("needsCompletedIntegratorStep");
     Ok(ModelExchange {
-        model_identifier: element.required("modelIdentifier")?.to_owned(),
+        model_identifier: element.model_identifier()?,
         needs_execution_tool: flag("needsExecutionTool"),
         completed_integrator_step_not_needed: !completed,
         can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
@@ -60,7 +60,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
 fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
     let flag = |name| element.flag(name);
     Ok(CoSimulation {
-        model_identifier: element.required("modelIdentifier")?.to_owned(),
+        model_identifier: element.model_identifier()?,
         needs_execution_tool: flag("needsExecutionTool"),
         can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
         max_output_derivative_order: element
@@ -88,7 +88,7 @@ fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
 fn scheduled_execution(element: Node<'_>) -> Result<ScheduledExecution> {
     let flag = |name| element.flag(name);
     Ok(ScheduledExecution {
-        model_identifier: element.required("modelIdentifier")?.to_owned(),
+        model_identifier: element.model_identifier()?,
         needs_execution_tool: flag("needsExecutionTool"),
         can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
         can_get_and_set_fmu_state: flag("canGetAndSetFMUState"),

@@ -178,6 +178,32 @@ fn other_versions_are_named() {
 }
 
 #[test]
+fn a_model_identifier_that_leads_out_of_the_fmu_is_refused() {
+    for identifier in ["../../M", "/tmp/M", "folder/M", "..\\M", "\\\\server\\M", "C:M"] {
+        let model = format!("modelName='M' modelIdentifier='{identifier}' guid='1'");
+        let interface = |version: u32, name: &str| {
+            format!(
+                "<fmiModelDescription fmiVersion='{version}.0' guid='1' instantiationToken='1'>\
+                 <{name} modelIdentifier='{identifier}'/><ModelVariables/></fmiModelDescription>"
+            )
+        };
+        for xml in [
+            format!("<fmiModelDescription fmiVersion='1.0' {model}/>"),
+            interface(2, "ModelExchange"),
+            interface(2, "CoSimulation"),
+            interface(3, "ModelExchange"),
+            interface(3, "CoSimulation"),
+            interface(3, "ScheduledExecution"),
+        ] {
+            let error = ModelDescription::parse(&xml).unwrap_err().to_string();
+            let value = format!("found {identifier:?}");
+            assert!(error.contains("modelIdentifier") && error.contains(&value), "{xml}: {error}");
+            assert!(ModelDescription::parse(xml.replace(identifier, "M")).is_ok(), "{xml}");
+        }
+    }
+}
+
+#[test]
 fn malformed_numbers_are_refused() {
     let number = |attribute: &str| {
         refused(
