@@ -260,7 +260,9 @@ fn is_needed(name: &str) -> bool {
         (Some("documentation" | "sources" | "model.png"), _) => false,
         (Some("terminalsAndIcons"), _) => name == terminals::PATH,
         (Some("binaries"), Some(platform)) => {
-            platforms().contains(&platform) || !PLATFORMS.contains(&platform)
+            platforms().contains(&platform)
+                || platforms_of(Version::V3).contains(&platform)
+                || !PLATFORMS.contains(&platform)
         }
         _ => true,
     }
