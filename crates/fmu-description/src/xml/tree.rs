@@ -114,11 +114,10 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
-    /// Sets the text of the open element, unless it has one.
-    fn text(&mut self, text: &'a str) {
-        let text = text.trim();
+    /// Sets the text of the open element, unless it has one: the start of `rest`, up to the next markup.
+    fn text(&mut self, rest: &'a str) {
         if let Some(element) = self.open.last_mut().filter(|element| element.text.is_empty()) {
-            element.text = text;
+            element.text = rest.split('<').next().unwrap_or_default().trim();
         }
     }
 
@@ -209,8 +208,9 @@ pub(super) fn read_but(
                 tree.add(element)?;
             }
             Ok(Event::End(_)) => tree.end()?,
-            Ok(Event::Text(part)) => {
-                tree.text(text.get(offset..offset + part.len()).unwrap_or_default());
+            // The reader splits a text at its references.
+            Ok(Event::Text(_) | Event::GeneralRef(_)) => {
+                tree.text(text.get(offset..).unwrap_or_default());
             }
             Ok(Event::Eof) => return tree.finish(at),
             Ok(_) => {}

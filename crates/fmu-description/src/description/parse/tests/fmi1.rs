@@ -99,6 +99,14 @@ fn a_direct_dependency_is_one_of_an_output() {
 }
 
 #[test]
+fn a_direct_dependency_names_an_input_with_escaped_characters() {
+    let xml = COUPLING
+        .replace("name=\"gear\"", "name=\"gear &lt;1&gt;\"")
+        .replace("<Name>gear</Name>", "<Name> gear &lt;1&#62; </Name>");
+    assert_eq!(read(&xml).structure.outputs[0].dependencies.as_deref(), Some(&[3, 4][..]));
+}
+
+#[test]
 fn types_units_and_the_experiment_are_read() {
     let description = read(COUPLING);
     assert_eq!((description.version(), description.guid.as_str()), (Version::V1, "{1}"));
