@@ -173,6 +173,7 @@ impl Table {
 
     /// Returns the dependencies of a variable, or of its initial value if `initial`. There are none for a variable that
     /// is no unknown. An output or a derivative that is neither a state nor an alias of one also depends on all parameters.
+    /// An event indicator depends on all knowns; its initial value is no unknown.
     ///
     /// # Errors
     ///
@@ -182,7 +183,11 @@ impl Table {
         reference: u32,
         initial: bool,
     ) -> Result<Vec<Dependency>, Failure> {
-        self.entry(reference, "exported")?;
+        let entry = self.entry(reference, "exported")?;
+        if entry.kind == NativeType::Float64 && entry.first & INDICATOR != 0 && !initial {
+            let [_, all] = &self.knowns;
+            return Ok(all.iter().map(|&known| self.dependency(0, known, None)).collect());
+        }
         let scalars = &self.scalars;
         let later = || scalars.outputs.iter().chain(&scalars.derivatives);
         let rows: Vec<_> =

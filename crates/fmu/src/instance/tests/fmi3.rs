@@ -285,6 +285,19 @@ fn an_event_indicator_is_a_variable() {
 }
 
 #[test]
+fn an_event_indicator_depends_on_all_knowns_as_its_description_states() {
+    let (description, indicator) = (description(), reference("event_indicator[1]"));
+    assert_eq!(description.structure.event_indicators[0].dependencies, None);
+    let dependencies = |instance: &Instance<Linear>| instance.dependencies(indicator).unwrap();
+    let all = dependencies(&initialized(InterfaceType::ModelExchange, false));
+    let on = |name: &str| all.iter().filter(|one| one.known == reference(name)).count();
+    assert_eq!(["time", "u", "A", "x"].map(on), [1, 1, 4, 2]);
+    assert_eq!(all.len(), 8);
+    let starting = instantiate(InterfaceType::ModelExchange, false, false).unwrap();
+    assert!(dependencies(&starting).is_empty());
+}
+
+#[test]
 fn event_mode_of_co_simulation_is_refused_without_has_event_mode() {
     assert!(instantiate::<super::Decay>(InterfaceType::CoSimulation, true, true).is_err());
     assert!(instantiate::<super::Decay>(InterfaceType::ModelExchange, false, false).is_err());
