@@ -339,11 +339,14 @@ impl Integrator {
         Ok(reached)
     }
 
-    /// The distance to an event at the end of a step of `length`.
+    /// The distance to an event at the end of a step of `length`; an error if an indicator is NaN there.
     fn margin(&mut self, system: &mut (impl System + ?Sized), length: f64) -> Result<f64, Failure> {
         self.take(system, length)?;
         system.indicators(self.time + length, self.step.end(), &mut self.values)?;
-        Ok(self.indicators.margin(&self.values))
+        match self.indicators.margin(&self.values) {
+            margin if margin.is_nan() => Err(self.stopped("an event indicator is NaN".to_owned())),
+            margin => Ok(margin),
+        }
     }
 
     #[cold]

@@ -114,6 +114,24 @@ fn a_zero_exactly_at_the_end_of_a_step_is_an_event() {
 }
 
 #[test]
+fn an_indicator_that_is_nan_only_close_to_its_zero_stops_the_integration_before_it() {
+    let derivative = |_: f64, _: &[f64], slope: &mut [f64]| {
+        slope[0] = 1.0;
+        Ok(())
+    };
+    let indicator = |_: f64, y: &[f64], z: &mut [f64]| {
+        z[0] = if (y[0] - 0.6).abs() < 1e-3 { f64::NAN } else { 0.6 - y[0] };
+    };
+    let mut system = system(derivative, indicator);
+    let mut integrator = Integrator::new(vec![1.0], 1);
+    integrator.start(&mut system, 0.0, &[0.0], 1.0).unwrap();
+    let Err(Failure::Incomplete { time, message }) = integrator.advance(&mut system, 1.0) else {
+        panic!("at {} s the state is {:?}", integrator.time(), integrator.state());
+    };
+    assert!(time < 0.6 && message.contains("NaN"), "{time}: {message}");
+}
+
+#[test]
 fn a_pole_stops_the_integration_with_the_time_reached() {
     // y' = y^2 has the solution 1 / (1 - t).
     let square = |_: f64, y: &[f64], slope: &mut [f64]| {
