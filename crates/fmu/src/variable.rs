@@ -393,7 +393,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Sets the display unit, one of the display units of the variable's unit.
+    /// Sets the display unit, in which importers show the value: another unit of the same quantity, such as `degC`
+    /// for `K`. It is an expression for [`Unit::parse`](fmu_description::unit::Unit::parse), like the unit.
     #[must_use]
     pub fn display_unit(mut self, unit: impl Into<String>) -> Self {
         self.declaration.number.display_unit = Some(unit.into());

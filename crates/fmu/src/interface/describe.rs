@@ -3,7 +3,7 @@
 use super::structure;
 use crate::model::Failure;
 use crate::variable::{Base, Declaration, Enumeration};
-use fmu_description::unit::Unit;
+use fmu_description::unit::{DisplayUnit, Unit};
 use fmu_description::{
     Causality, Initial, IntegerType, Kind, ModelDescription, RealType, ScalarVariable, SimpleType,
     Variability,
@@ -73,15 +73,30 @@ fn time() -> ScalarVariable {
     }
 }
 
-/// Adds the unit of the variable to `units`, unless it is there.
+/// Adds the unit of the variable to `units`, and to this unit the display unit, unless they are there. An error for a
+/// display unit with other base units.
 fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Failure> {
     let Some(name) = &variable.number.unit else { return Ok(()) };
+    let wrong = |reason: String| {
+        let name = &variable.name;
+        Failure::Error(format!("variable {name}: {reason} (FMI 2.0.5, section 2.2.2)"))
+    };
+    let parse = |name: &str| Unit::parse(name).map_err(|error| wrong(error.to_string()));
     if units.iter().all(|unit| unit.name != *name) {
-        let unit = Unit::parse(name).map_err(|error| {
-            let name = &variable.name;
-            Failure::Error(format!("variable {name}: {error} (FMI 2.0.5, section 2.2.2)"))
+        units.push(parse(name)?);
+    }
+    let unit = units.iter_mut().find(|unit| unit.name == *name);
+    let Some((unit, display)) = unit.zip(variable.number.display_unit.as_ref()) else {
+        return Ok(());
+    };
+    if unit.display_units.iter().all(|known| known.name != *display) {
+        let bases = unit.base.zip(parse(display)?.base);
+        let conversion = bases.and_then(|(base, shown)| base.conversion(&shown));
+        let (factor, offset) = conversion.ok_or_else(|| {
+            wrong(format!("display unit {display:?}, expected a unit of the quantity of {name:?}"))
         })?;
-        units.push(unit);
+        let name = display.clone();
+        unit.display_units.push(DisplayUnit { name, factor, offset, inverse: false });
     }
     Ok(())
 }

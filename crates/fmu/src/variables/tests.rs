@@ -156,6 +156,54 @@ fn arrays_of_states_are_integrated() {
     assert!((left - 1.0).abs() < 1e-14 && (right - 2.0).abs() < 1e-14);
 }
 
+/// A model with variables that importers show in other units.
+#[derive(Clone, Default, Variables, Serialize, Deserialize)]
+struct Displayed {
+    #[fmu(output, unit = "K", display_unit = "degC")]
+    temperature: f64,
+    #[fmu(output, unit = "m/s", display_unit = "km/h")]
+    speed: f64,
+    #[fmu(output, unit = "m/s", display_unit = "m/min")]
+    rise: f64,
+}
+
+#[fmu::model]
+impl Model for Displayed {}
+
+#[test]
+fn a_display_unit_has_the_conversion_from_the_unit() {
+    assert_eq!(crate::problems::<Displayed>(Path::new("")), Ok(vec![]));
+    let units = crate::describe::<Displayed>(Path::new("")).unwrap().units;
+    for (unit, display, value, expected) in [
+        ("K", "degC", 293.15, 20.0),
+        ("m/s", "km/h", 10.0, 36.0),
+        ("m/s", "m/min", 10.0, 600.0),
+    ] {
+        let unit = units.iter().find(|known| known.name == unit).unwrap();
+        let display = unit.display_units.iter().find(|known| known.name == display).unwrap();
+        let actual = display.factor * value + display.offset;
+        assert!((actual - expected).abs() < 1e-11, "{actual} {}", display.name);
+    }
+}
+
+/// A temperature that is shown as a length.
+#[derive(Clone, Default, Variables, Serialize, Deserialize)]
+struct Confused {
+    #[fmu(output, unit = "K", display_unit = "m")]
+    temperature: f64,
+}
+
+#[fmu::model]
+impl Model for Confused {}
+
+#[test]
+fn a_display_unit_of_another_quantity_is_refused() {
+    let actual = crate::problems::<Confused>(Path::new("")).unwrap_err().to_string();
+    for part in ["variable temperature", "display unit \"m\"", "\"K\"", "section 2.2.2"] {
+        assert!(actual.contains(part), "{actual}");
+    }
+}
+
 /// A model with an unknown unit.
 #[derive(Clone, Default, Variables, Serialize, Deserialize)]
 struct Misspelt {
