@@ -129,6 +129,8 @@ fn check_attributes(variable: &Variable<'_>) -> Vec<Error> {
     }
     if let Some(span) = attributes.flag("discrete") {
         require(is_real, span, "only a variable of type f64 or f32 can be discrete or not");
+        let changes = role.is_computed() || role == Role::Input;
+        require(changes, span, "only an input, an output or a local variable can be discrete");
     }
     if let Some(span) = attributes.flag("state") {
         let message =

@@ -43,6 +43,8 @@ fn each_mistake_has_its_message() {
         ("#[fmu(input, enumeration(\"Mode\"))] m: i32", "at least one item"),
         ("#[fmu(input, enumeration(\"Mode\", off = 0))] m: f64", "a field of type i32"),
         ("#[fmu(output, discrete)] n: i32", "can be discrete"),
+        ("#[fmu(constant, discrete)] h: f64", "only an input, an output or a local variable"),
+        ("#[fmu(tunable, discrete)] h: f64", "only an input, an output or a local variable"),
         ("#[fmu(output, depends(u))] h: f64", "`u` is no variable"),
         (
             "#[fmu(parameter)] p: f64, #[fmu(output, depends(p))] h: f64",
