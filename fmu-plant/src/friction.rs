@@ -160,7 +160,7 @@ mod tests {
         assert!((cubic.magnitude(&Direct, 0.3) - (25.0 + 5.0 * (-8.0_f64).exp())).abs() < 1e-13);
     }
 
-    /// (v / v_s)^(delta - 1) is beyond the range of the numbers there, g(v) is F_c.
+    /// `(v / v_s)^(delta - 1)` is beyond the range of the numbers there, and the friction is that of Coulomb.
     #[test]
     fn far_above_the_stribeck_velocity_the_friction_has_no_slope() {
         let parameters = Parameters { stribeck_exponent: 200.0, ..Parameters::default() };

@@ -155,12 +155,8 @@ mod tests {
         let parsed = source.parse().unwrap();
         let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
         let [one, four] = [1.0, 4.0].map(|value| DMatrix::from_element(1, 1, value));
-        let noise = Noise {
-            process: one.clone(),
-            measurements: four,
-            covariance: one,
-            is_relative: true,
-        };
+        let noise =
+            Noise { process: one.clone(), measurements: four, covariance: one, is_relative: true };
         scale(&file, &noise)
     }
 

@@ -176,16 +176,16 @@ impl<M: Model> Interface<M> {
             }
             Access::Integer(field) => {
                 let start = start_given.then(|| i128::from(*field(model)));
-                let kind = match enumeration {
-                    Some(Enumeration { name, .. }) => Kind::Enumeration(IntegerType {
-                        declared_type: Some(name),
+                let kind = if let Some(Enumeration { name, .. }) = enumeration {
+                    let declared_type = Some(name);
+                    Kind::Enumeration(IntegerType {
+                        declared_type,
                         start,
                         ..IntegerType::default()
-                    }),
-                    None => {
-                        let limits = integer(number, &(i32::MIN.into()..=i32::MAX.into()))?;
-                        Kind::Integer(IntegerType { start, ..limits })
-                    }
+                    })
+                } else {
+                    let limits = integer(number, &(i32::MIN.into()..=i32::MAX.into()))?;
+                    Kind::Integer(IntegerType { start, ..limits })
                 };
                 (kind, builder.build(&mut self.integers, field))
             }

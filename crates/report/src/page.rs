@@ -13,7 +13,9 @@ use serde::Serialize;
 use crate::difference::{Comparison, Difference};
 use crate::plots::Plots;
 use crate::statistics::{Basis, Statistics};
-use crate::{Events, MARKS, Mark, MarkKind, Request, Run, frames, graph, identity, interval, listed};
+use crate::{
+    Events, MARKS, Mark, MarkKind, Request, Run, frames, graph, identity, interval, listed,
+};
 
 const STYLE: &str = include_str!("page/page.css");
 const ROWS: &str = include_str!("page/rows.js");

@@ -51,10 +51,8 @@ pub(crate) fn remedies(
         matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. })
     });
     // Gains by the shape of the loop do not depend on the requirements on feedback and observer.
-    let single = !searched
-        && file.loop_shape.is_none()
-        && file.family.is_empty()
-        && file.schedule.is_none();
+    let single =
+        !searched && file.loop_shape.is_none() && file.family.is_empty() && file.schedule.is_none();
     let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
     let variants = if single { variants(file) } else { Vec::new() };
     if reasons.is_empty() || variants.is_empty() || order > LARGEST_ORDER || budget.is_over() {

@@ -53,9 +53,11 @@ impl Record {
     }
 }
 
+type Observer = dyn Fn(&str) + Send + Sync;
+
 /// Receives the name of each function that an instance enters, and an empty one when the instance leaves it. Only
 /// workers of isolation have it.
-static OBSERVER: OnceLock<Box<dyn Fn(&str) + Send + Sync>> = OnceLock::new();
+static OBSERVER: OnceLock<Box<Observer>> = OnceLock::new();
 
 /// Passes the functions of all instances of this process to `observer`: their names, and an empty name when an instance
 /// leaves its function. Only the first call of `observe` has an effect.

@@ -174,11 +174,9 @@ impl Model for Displayed {}
 fn a_display_unit_has_the_conversion_from_the_unit() {
     assert_eq!(crate::problems::<Displayed>(Path::new("")), Ok(vec![]));
     let units = crate::describe::<Displayed>(Path::new("")).unwrap().units;
-    for (unit, display, value, expected) in [
-        ("K", "degC", 293.15, 20.0),
-        ("m/s", "km/h", 10.0, 36.0),
-        ("m/s", "m/min", 10.0, 600.0),
-    ] {
+    for (unit, display, value, expected) in
+        [("K", "degC", 293.15, 20.0), ("m/s", "km/h", 10.0, 36.0), ("m/s", "m/min", 10.0, 600.0)]
+    {
         let unit = units.iter().find(|known| known.name == unit).unwrap();
         let display = unit.display_units.iter().find(|known| known.name == display).unwrap();
         let actual = display.factor * value + display.offset;

@@ -14,15 +14,8 @@ const STEP: f64 = 0.1;
 /// Maximum number of inputs and of components of a sum.
 const COUNT: usize = 100_000;
 /// The elements that may occur once.
-const ONCE: [&str; 7] = [
-    "StartTime",
-    "EndTime",
-    "BaseStepSize",
-    "Algorithm",
-    "Simulators",
-    "Functions",
-    "Connections",
-];
+const ONCE: [&str; 7] =
+    ["StartTime", "EndTime", "BaseStepSize", "Algorithm", "Simulators", "Functions", "Connections"];
 
 /// The content of the file.
 #[derive(Debug, Default)]

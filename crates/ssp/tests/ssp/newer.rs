@@ -126,7 +126,8 @@ fn integers_of_64_bits_are_set_to_the_last_digit() {
     let variable = r#"<Int64 name="n" valueReference="1" causality="parameter" variability="fixed" start="0"/>"#;
     fmu_of_fmi_3(&bench, "a", variable, "");
     // -2^63
-    let value = r#"<ssv:Parameter name="n"><ssv:Int64 value="-9223372036854775808"/></ssv:Parameter>"#;
+    let value =
+        r#"<ssv:Parameter name="n"><ssv:Int64 value="-9223372036854775808"/></ssv:Parameter>"#;
     bench.file("p.ssv", newer(&ssv(value)));
     let bindings =
         r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;

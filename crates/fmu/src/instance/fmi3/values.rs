@@ -161,12 +161,12 @@ impl<M: Model> Instance<M> {
     /// Sets enumerations: sets all values or, after a failure, none.
     fn set_enumerations(&mut self, places: &[u32], values: &[i64]) -> Result<(), Failure> {
         // A value beyond 32 bits is no item of any enumeration.
-        let accept = |slot: &Slot<M, i32>, value: &i64| match i32::try_from(*value) {
-            Ok(value) => check_integer(slot, value),
-            Err(_) => {
-                let (name, items) = (&slot.name, &slot.items);
-                Err(Failure::Discard(format!("{name} = {value}, expected one of {items:?}")))
+        let accept = |slot: &Slot<M, i32>, value: &i64| {
+            if let Ok(value) = i32::try_from(*value) {
+                return check_integer(slot, value);
             }
+            let (name, items) = (&slot.name, &slot.items);
+            Err(Failure::Discard(format!("{name} = {value}, expected one of {items:?}")))
         };
         let assign =
             |field: &mut i32, value: &i64| *field = i32::try_from(*value).unwrap_or(*field);
