@@ -77,9 +77,9 @@ fn plain(py: Python<'_>, mut config: Config) -> PyResult<Bound<'_, PyAny>> {
 }
 
 /// Replaces the entries of `base` that `changes` states, also settings of the same name and entries of
-/// `algorithm.every`; adds further ones, and all entries of the scenario. Covers the entries that a run may change, not
-/// the system itself.
-pub(crate) fn merge(base: &mut Config, changes: Config) {
+/// `algorithm.every`; adds further ones, and all entries of the scenario. `stated` has the nested dicts of `changes`; an
+/// empty list in them clears the list. Covers the entries that a run may change, not the system itself.
+pub(crate) fn merge(base: &mut Config, changes: Config, stated: &Bound<'_, PyAny>) {
     for (name, value, place) in changes.settings.0 {
         base.settings.0.retain(|(known, _, _)| *known != name);
         base.settings.0.push((name, value, place));
@@ -89,37 +89,26 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     base.scenario.table.extend(changes.scenario.table);
     base.scenario.fault.extend(changes.scenario.fault);
     base.algorithm.every.extend(changes.algorithm.every);
-    // Calls the function for each entry of the tables.
-    macro_rules! each {
-        ($function:ident: $($table:ident [$($entry:ident)*])*) => {
-            $($($function(&mut base.$table.$entry, changes.$table.$entry);)*)*
+    let is_stated = |table: &str, entry: &str| {
+        let entries = stated.get_item(table);
+        entries.and_then(|entries| entries.get_item(entry.replace('_', "-"))).is_ok()
+    };
+    // Replaces each entry of the tables that is stated.
+    macro_rules! replace {
+        ($($table:ident [$($entry:ident)*])*) => {
+            $($(if is_stated(stringify!($table), stringify!($entry)) {
+                base.$table.$entry = changes.$table.$entry;
+            })*)*
         };
     }
-    each! { replace:
-        results [record exclude]
-        algorithm [next_event crossing discrete power_bonds]
-    }
-    each! { set:
-        results [every file bus_trace]
+    replace! {
+        results [record exclude every file bus_trace]
         experiment [start_time stop_time tolerance]
         isolation [isolate time_limit memory_limit]
         algorithm [
             method extrapolation coupling step_control step relative_tolerance absolute_tolerance
-            smallest_step largest_step iterations fallback jobs rollback allow_nan
+            smallest_step largest_step iterations fallback next_event crossing discrete power_bonds
+            jobs rollback allow_nan
         ]
-    }
-}
-
-/// Replaces the value if there is a new one.
-fn set<T>(value: &mut Option<T>, new: Option<T>) {
-    if new.is_some() {
-        *value = new;
-    }
-}
-
-/// Replaces the list if the new one is not empty.
-fn replace<T>(list: &mut Vec<T>, new: Vec<T>) {
-    if !new.is_empty() {
-        *list = new;
     }
 }

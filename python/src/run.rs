@@ -178,7 +178,7 @@ impl Study {
     fn with_changes(&self, changes: &Bound<'_, PyAny>) -> PyResult<LoadedConfig> {
         let mut config = self.config.clone();
         if changes.len()? > 0 {
-            merge(&mut config, read(changes, &self.folder)?);
+            merge(&mut config, read(changes, &self.folder)?, changes);
         }
         Ok(LoadedConfig { config, source: None })
     }

@@ -59,6 +59,15 @@ def test_the_arguments_of_a_run_do_what_the_options_of_the_command_do(paper, com
     assert "plant.M" not in paper.start_values and len(paper.run().time) == 21
 
 
+def test_an_empty_list_of_a_run_clears_that_of_the_system(paper):
+    plain = paper.run()
+    paper.results["exclude"] = ["plant.*"]
+    paper.algorithm["discrete"] = ["controller.u"]
+    again = paper.run(exclude=[], algorithm={"discrete": []})
+    assert same(again, plain) and again.settings == plain.settings
+    assert "plant.x_p" not in paper.run()
+
+
 def test_the_paper_is_the_experiment_of_the_command(command, tmp_path):
     packed = af.fmus()
     file = tmp_path / "system.toml"
