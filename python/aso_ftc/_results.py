@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -266,9 +267,9 @@ class Results(Mapping[str, "NDArray[Any]"]):
 
     def _draw(self, axes: matplotlib.axes.Axes, names: list[str], unit: str) -> None:
         for name in names:
-            values = self[name].reshape(len(self.time), -1)
-            labels = self._arrays[name].elements if name in self._arrays else name
-            axes.plot(self.time, values, label=labels)
+            values, labels = self[name], self._arrays[name].elements if name in self._arrays else name
+            # Without rows, NumPy cannot find the number of elements.
+            axes.plot(self.time, values.reshape(len(values), math.prod(values.shape[1:])), label=labels)
         axes.set_ylabel(unit)
         axes.legend(loc="best")
         axes.grid(True, alpha=0.3)

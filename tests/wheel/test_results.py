@@ -112,6 +112,13 @@ def test_a_picture_has_a_panel_for_each_unit(results):
     assert [axes.get_ylabel() for axes in figure.axes] == ["m", "rad"]
 
 
+def test_a_picture_of_a_column_without_rows_has_its_name_and_no_points(paper):
+    pytest.importorskip("matplotlib").use("Agg")
+    (axes,) = paper.run(record_every="never").plot("time").axes
+    (line,) = axes.lines
+    assert line.get_label() == "time" and len(line.get_xdata()) == 0
+
+
 def test_a_picture_is_drawn_into_axes_that_are_given(results):
     pytest.importorskip("matplotlib").use("Agg")
     from matplotlib import pyplot
