@@ -119,7 +119,13 @@ class DesignError(Error, ValueError):
 
 
 class ResultsError(Error, OSError):
-    """Results cannot be written or read."""
+    """Results cannot be written or read.
+
+    Attributes:
+        results: the rows of a run whose file cannot be written; not kept when the exception is pickled.
+    """
+
+    results: Results | None = None
 
 
 class MissingPackageError(Error, ImportError):

@@ -430,6 +430,7 @@ class System:
             ConfigurationError: a name, a value or a setting is wrong.
             FmuError: an FMU cannot be loaded or instantiated.
             RunError: the run failed after its start; its ``results`` has the rows up to then.
+            ResultsError: the file cannot be written; its ``results`` has the rows if the run has started.
         """
         changes = _changes(
             start_values=start_values,

@@ -137,6 +137,10 @@ impl Study {
         let shown = fmu_description::number::seconds(time);
         let (end, exception) = match (watch.stop.take(), ended) {
             (Some(Stop::Raised(error)), _) => ("interrupted".to_owned(), Some(error)),
+            (_, RunEnd::Failed(error)) => {
+                let error = with_cause(py, error::study(&error).with_time(time), &raised);
+                ("failed".to_owned(), Some(error))
+            }
             (Some(Stop::TimeLimit(limit)), _) => {
                 let sentence =
                     format!("the run reached its time limit of {limit} s at t = {shown} s");
@@ -149,10 +153,6 @@ impl Study {
                 ("cancelled".to_owned(), Some(exception.number("time", time).raise(py)))
             }
             (None, RunEnd::ByFmu(name)) => (name, None),
-            (None, RunEnd::Failed(error)) => {
-                let error = with_cause(py, error::study(&error).with_time(time), &raised);
-                ("failed".to_owned(), Some(error))
-            }
             (None, RunEnd::AtStop | RunEnd::Interrupted) => ("stop time".to_owned(), None),
         };
         let table = Py::new(py, Table::new(recorded, &binaries, prefix)?)?;
@@ -275,7 +275,11 @@ fn run(
     let finished = run.finish().map(|_| ()).and(run.finish_trace());
     let reasons = std::mem::take(&mut run.plan.reasons);
     drop(run);
-    finished?;
+    // The rows are in memory, also if their file is not complete.
+    let ended = match (ended, finished) {
+        (RunEnd::Failed(error), _) | (_, Err(error)) => RunEnd::Failed(error),
+        (ended, Ok(())) => ended,
+    };
     let recorded = (recorded.take(), binaries);
     let (steps, seconds) = (tally.steps, tally.seconds);
     Ok(EndedRun { ended, time, steps, seconds, recorded, settings, reasons, watch })

@@ -341,6 +341,21 @@ def test_an_object_is_stopped_once_also_if_its_run_fails_or_is_not_closed():
     assert [slave.stops for slave in (whole, failing, left)] == [1, 1, 2]
 
 
+def test_a_run_whose_file_is_lost_at_its_end_leaves_all_rows_in_memory(tmp_path):
+    file = tmp_path / "results.csv"
+
+    class Remover(Proportional):
+        def step(self, t, dt, inputs):
+            if t > 0.0985:
+                file.unlink()
+            return super().step(t, dt, inputs)
+
+    with pytest.raises(af.ResultsError, match=r"results\.csv") as caught:
+        loop(Remover(2.0)).run(file=file)
+    results = caught.value.results
+    assert results.end == "failed" and np.array_equal(results["plant.x_p"], loop(Proportional(2.0)).run()["plant.x_p"])
+
+
 def test_one_name_is_no_list_of_names():
     class Short(Proportional):
         inputs = "y"
