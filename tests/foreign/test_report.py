@@ -559,6 +559,17 @@ def test_values_between_empty_cells_are_drawn_as_points_or_held(aso_ftc, write, 
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_rows_at_one_time_are_drawn_also_where_times_are_seconds_apart(aso_ftc, write, tmp_path):
+    with browser(tmp_path / "profile") as page:
+        # The next number after 1e15 is 0.125 away, that after 1e17 is 16 away.
+        for time in (1e15, 1e17):
+            report(aso_ftc, write("own.csv", pd.DataFrame({"time": [time, time], "x": [0.0, 1.0]})))
+            page.open((tmp_path / "own.html").as_uri())
+            page.until(DRAWN)
+            assert read(page, 0, 0.5) == (time, {"x": 1.0})
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_the_keyboard_reaches_each_row_of_an_event(aso_ftc, write, tmp_path):
     results = pd.DataFrame({"time": [0.0, 1.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 3.0, 5.0]})
     report(aso_ftc, write("own.csv", results))

@@ -5,9 +5,10 @@
 const ticks = (() => {
   const minus = (text) => text.replaceAll("-", "−");
 
-  /* The multiples of a round step within a range, at most about `most` of them. */
+  /* The multiples of a round step within a range, at most about `most` of them. The step is never so small that a
+     multiple and the next one are equal. */
   function linear(low, high, most) {
-    const least = (high - low) / most;
+    const least = Math.max((high - low) / most, 1e-14 * Math.max(Math.abs(low), Math.abs(high)));
     const power = 10 ** Math.floor(Math.log10(least));
     const step = power * ([1, 2, 5].find((factor) => factor * power >= 0.999 * least) ?? 10);
     const found = [];

@@ -63,8 +63,8 @@
 
   function whole(times) {
     const ends = times.filter((time) => time.length > 0).flatMap((time) => [time[0], time[time.length - 1]]);
-    const [low, high] = [Math.min(...ends), Math.max(...ends)];
-    return high > low ? [low, high] : [ends.length > 0 ? low : 0, (ends.length > 0 ? low : 0) + 1];
+    const [low, high] = ends.length > 0 ? [Math.min(...ends), Math.max(...ends)] : [0, 0];
+    return high > low ? [low, high] : [low, low + Math.max(1, 1e-9 * Math.abs(low))];
   }
 
   const times = await Promise.all(grids.map(({ time, rows }) => column(time, rows)));
