@@ -122,7 +122,8 @@ def write_wheel(folder, files, platform_tag=None, maturin="maturin"):
     files = {**files, **{str(path.relative_to(metadata)): path for path in info.rglob("*") if path.is_file()}}
     name, record = f"{info.stem}-{tag}.whl", f"{info.name}/RECORD"
     lines = []
-    with zipfile.ZipFile(Path(folder) / name, "w", zipfile.ZIP_DEFLATED) as archive:
+    # In another folder, so that an interrupted call leaves nothing that looks whole.
+    with zipfile.ZipFile(WORK / name, "w", zipfile.ZIP_DEFLATED) as archive:
         for member, path in sorted(files.items()):
             content = path.read_bytes()
             # The same files give the same wheel.
@@ -132,6 +133,7 @@ def write_wheel(folder, files, platform_tag=None, maturin="maturin"):
             digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
             lines.append(f"{entry.filename},sha256={digest},{len(content)}\n")
         archive.writestr(zipfile.ZipInfo(record), "".join([*lines, f"{record},,\n"]), zipfile.ZIP_DEFLATED)
+    shutil.move(WORK / name, Path(folder) / name)
     return name
 
 
