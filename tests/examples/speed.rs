@@ -54,7 +54,7 @@ fn read(path: &Path) -> anyhow::Result<System> {
     let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let (mut system, mut opened) = (System::default(), HashMap::<PathBuf, Fmu>::new());
     for line in text.lines() {
-        match line.split(' ').collect::<Vec<_>>()[..] {
+        match line.splitn(3, ' ').collect::<Vec<_>>()[..] {
             ["fmu", name, path] => {
                 let path = PathBuf::from(path);
                 if !opened.contains_key(&path) {
