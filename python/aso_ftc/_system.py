@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
+from urllib.parse import unquote
+from xml.etree import ElementTree
 
 from . import _core
 from ._arrays import Array, arrays, plain, spread
@@ -321,7 +325,8 @@ class System:
     def files(self) -> dict[str, str]:
         """Return the SHA-256 of every file that the system reads, by absolute path.
 
-        A folder has the hash of the names and hashes of its files.
+        A folder has the hash of the names and hashes of its files. The hash of an SSD, or of a system of
+        libcosim, includes the files that it names.
         """
         return {path: hash_of_file(path) for path in sorted(set(self._named_files()))}
 
@@ -697,16 +702,43 @@ def _changes(
     return changes
 
 
-def hash_of_file(path: str) -> str:
-    """Return the SHA-256 of a file, or of a folder."""
+def files_named_by(path: str) -> list[str]:
+    """Return the files that an SSD, or a system of libcosim, names by relative paths, and those that these name."""
+    named: list[str] = []
+    for file in itertools.chain([path], named):
+        if not file.lower().endswith((".ssd", ".xml")):
+            continue
+        try:
+            sources = [element.get("source", "") for element in ElementTree.parse(file).iter()]
+        except (OSError, ElementTree.ParseError):
+            # The run says what is wrong.
+            continue
+        for source in sources:
+            # libcosim runs proxyfmu://HOST?file=NAME elsewhere.
+            name = unquote(source.rpartition("?file=")[2].partition("#")[0]).replace("\\", "/")
+            inner = os.path.normpath(os.path.join(os.path.dirname(file), name))
+            if name and not os.path.isabs(name) and os.path.exists(inner) and inner not in (path, *named):
+                named.append(inner)
+    if path.lower().endswith(".xml"):
+        # The descriptions of groups of variables are beside the FMUs or the system.
+        folders = dict.fromkeys(os.path.dirname(file) for file in (path, *named))
+        named += [str(file) for folder in folders for file in sorted(Path(folder).glob("*_OspModelDescription.xml"))]
+    return named
+
+
+def hash_of_file(path: str, *, alone: bool = False) -> str:
+    """Return the SHA-256 of a file with those that it names, or only of the file, or of a folder."""
     digest = hashlib.sha256()
     if os.path.isdir(path):
         for folder, folders, names in os.walk(path):
             folders.sort()
             for name in sorted(names):
                 inner = os.path.join(folder, name)
-                digest.update(os.path.relpath(inner, path).encode() + b"\0" + hash_of_file(inner).encode())
+                digest.update(os.path.relpath(inner, path).encode() + b"\0" + hash_of_file(inner, alone=True).encode())
         return digest.hexdigest()
+    for inner in [] if alone else files_named_by(path):
+        name = os.path.relpath(inner, os.path.dirname(path))
+        digest.update(name.encode() + b"\0" + hash_of_file(inner, alone=True).encode())
     try:
         with open(path, "rb") as file:
             while block := file.read(1 << 20):

@@ -485,6 +485,25 @@ def test_an_fmu_without_binaries_for_the_workers_is_named_before_the_first_run(t
     assert not (tmp_path / "out").exists()
 
 
+SSP = ROOT / "dist" / "InvertedPendulum.ssp"
+
+
+@pytest.mark.skipif(not SSP.exists(), reason="pack --ssp makes it")
+def test_a_campaign_on_an_ssd_takes_the_fmus_beside_it_to_its_workers(tmp_path):
+    structure = tmp_path / "system" / "SystemStructure.ssd"
+    with zipfile.ZipFile(SSP) as archive:
+        archive.extractall(structure.parent)
+    system = af.System.from_ssp(structure)
+    expected, before = system.run(stop_time=0.1, record_every="step"), system.files()
+    name = next(name for name in expected if name.endswith(".x_p"))
+    campaign = af.campaign.Campaign(structure, experiment={"stop_time": 0.1}, measures={"last": f"last({name})"})
+    table = campaign.run(tmp_path / "out", workers=1, progress=False).table
+    assert list(table["last"]) == [expected[name][-1]]
+    (fmu, *_) = sorted(structure.parent.rglob("*.fmu"))
+    fmu.write_bytes(fmu.read_bytes() + b"\0")
+    assert set(before) == {str(structure)} and system.files() != before
+
+
 def test_a_full_disk_ends_the_campaign_with_one_sentence(campaign, tmp_path):
     folder = tmp_path / "out"
     assert done(campaign(runs=8), "--out", folder, "--workers", 1)[0] == 0

@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import _core
 from .._errors import Error, RunError, TimeLimitError
-from .._system import System
+from .._system import System, files_named_by
 from ._campaign import Campaign, Function
 from ._changes import arguments, changes
 from ._faults import FaultCase
@@ -110,17 +110,19 @@ class Job:
 
 
 def pack(path: str) -> tuple[str, bytes]:
-    """Return the name and the content of a file; of a folder a tar archive."""
-    source = Path(path)
-    if source.is_file():
+    """Return the name and the content of a file; of a folder, and of a file with those that it names, a tar archive."""
+    source, named = Path(os.path.normpath(path)), [Path(file) for file in files_named_by(path)]
+    if source.is_file() and not named:
         try:
             return source.name, source.read_bytes()
         except OSError as error:
             raise Error(f"cannot read {path}: {error.strerror}") from error
+    root = Path(os.path.commonpath([file.parent for file in (source, *named)]))
     buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w") as archive:
-        archive.add(source, arcname=source.name)
-    return source.name + "/", buffer.getvalue()
+    with tarfile.open(fileobj=buffer, mode="w", dereference=True) as archive:
+        for file in (source, *named):
+            archive.add(file, arcname=file.relative_to(root))
+    return source.relative_to(root).as_posix() + "/", buffer.getvalue()
 
 
 def _place(folder: Path, name: str, content: bytes) -> Path:
