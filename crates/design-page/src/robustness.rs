@@ -201,8 +201,11 @@ fn parameters(report: &Report, robustness: &Robustness) -> Markup {
     let size = |at: usize| all.iter().map(|entries| entries[at].1.abs()).fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
     order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
+    // With states of delays or filters, the matrices of the report have other entries.
+    let states = robustness.sensitivity[0].matrices.first().map_or(0, |a| a.values.len());
     let values: Vec<f64> = ["A", "B", "C", "D"]
         .iter()
+        .filter(|_| states == report.plant.states.len())
         .filter_map(|name| report.plant.matrices.iter().find(|matrix| matrix.name == *name))
         .flat_map(|matrix| matrix.values.iter().flatten().copied())
         .collect();

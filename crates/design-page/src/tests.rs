@@ -301,3 +301,22 @@ fn the_stability_boundary_is_between_stable_and_unstable_eigenvalues() {
         assert!((distance - pole[0].hypot(pole[1])).abs() < 2e-3);
     }
 }
+
+/// The text of the table with a caption.
+fn table(report: &Report, caption: &str) -> String {
+    let page = xml(&page(report));
+    let document = Document::parse(&page).unwrap();
+    let mut captions = elements(&document, "caption");
+    let caption = captions.find(|node| text(*node) == caption).unwrap();
+    text(caption.parent().unwrap())
+}
+
+/// The sensitivities are those of a plant with ten states.
+#[test]
+fn the_sensitivities_have_no_values_of_matrices_with_other_states() {
+    let shown = |report: &Report| table(report, "Sensitivity of the peaks of S").contains("value");
+    let mut report = hostile();
+    assert!(shown(&report));
+    report.plant.states.pop();
+    assert!(!shown(&report));
+}
