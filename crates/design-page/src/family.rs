@@ -115,8 +115,10 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
         ("stable cases (%)", |member| {
             tolerance(member).and_then(|test| test.stable).map(|part| 100.0 * part).into()
         }),
-        ("unstable from (tolerances)", |member| {
-            tolerance(member).map(|test| test.first_unstable).into()
+        ("unstable from (tolerances)", |member| match tolerance(member) {
+            // The most that is tried.
+            Some(test) if test.first_unstable.is_infinite() => "not up to 16".into(),
+            test => test.map(|test| test.first_unstable).into(),
         }),
     ];
     table_of(caption, members.iter().copied(), &columns)
@@ -126,8 +128,9 @@ fn point(member: &MemberReport, at: usize) -> Option<&LoopPoint> {
     member.margins.as_ref()?.points.get(at)
 }
 
+/// The tolerances of a member; none if nothing varies.
 fn tolerance(member: &MemberReport) -> Option<&ToleranceResult> {
-    member.margins.as_ref()?.tolerance.as_ref()
+    member.margins.as_ref()?.tolerance.as_ref().filter(|test| test.is_examined())
 }
 
 /// The effect of the measurement noise, with a column for each member whose loop is stable; empty without any.

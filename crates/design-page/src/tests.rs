@@ -8,7 +8,8 @@ mod plots;
 use resvg::usvg::roxmltree::{Document, Node};
 
 use design_report::Report;
-use design_report::robustness::Level;
+use design_report::family::{FamilyReport, MemberMargins, MemberReport};
+use design_report::robustness::{Level, ToleranceResult};
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 
@@ -319,4 +320,36 @@ fn the_sensitivities_have_no_values_of_matrices_with_other_states() {
     assert!(shown(&report));
     report.plant.states.pop();
     assert!(!shown(&report));
+}
+
+#[test]
+fn a_member_whose_entries_are_exact_has_no_limit_of_its_tolerances() {
+    let shown = |entries| {
+        let mut report = bare();
+        let tolerance = ToleranceResult {
+            entries,
+            varying: Vec::new(),
+            parameters: Vec::new(),
+            cases: 200,
+            seed: 1,
+            stable: None,
+            worst_instability: -1.0,
+            first_unstable: f64::INFINITY,
+            worst: Vec::new(),
+        };
+        let margins = MemberMargins {
+            points: Vec::new(),
+            delay_margin: 1.0,
+            longest_hold: 1.0,
+            noise_together: Vec::new(),
+            tolerance: Some(tolerance),
+        };
+        let name = "nominal".to_owned();
+        let member = MemberReport { name, instability: -1.0, margins: Some(margins) };
+        let whole = Err("not found".to_owned());
+        report.family = Some(FamilyReport { members: vec![member], feedback: None, whole });
+        table(&report, "Members of the family")
+    };
+    assert!(!shown(0).contains("tolerances"), "{}", shown(0));
+    assert!(shown(3).contains("not up to 16"), "{}", shown(3));
 }
