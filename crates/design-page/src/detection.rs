@@ -77,12 +77,17 @@ fn faults(faults: &[DetectedFault]) -> Markup {
             ("size of its step", |fault| fault.size.into()),
             ("unit", |fault| (&fault.unit).into()),
             ("mean of the residuals", |fault| fault.mean.into()),
-            ("mean delay, s", |fault| fault.delay.into()),
-            ("90 % within, s", |fault| fault.delay_90.into()),
-            ("least detectable", |fault| fault.least.into()),
+            ("mean delay, s", |fault| or(fault.delay, "never for sure")),
+            ("90 % within, s", |fault| or(fault.delay_90, "never for sure")),
+            ("least detectable", |fault| or(fault.least, "none")),
             ("within, s", |fault| fault.within.into()),
         ],
     )
+}
+
+/// A number, or a text if there is none.
+fn or(number: Option<f64>, missing: &str) -> Cell {
+    number.map_or_else(|| missing.into(), Cell::Number)
 }
 
 fn reactions(section: &Detection) -> Markup {

@@ -353,3 +353,11 @@ fn a_member_whose_entries_are_exact_has_no_limit_of_its_tolerances() {
     assert!(!shown(0).contains("tolerances"), "{}", shown(0));
     assert!(shown(3).contains("not up to 16"), "{}", shown(3));
 }
+
+/// The only fault of this report has neither a mean delay nor a least size.
+#[test]
+fn a_fault_that_is_not_detected_for_sure_says_so() {
+    let shown = table(&hostile(), "Predicted detection");
+    assert!(shown.contains("mean delay, s") && shown.contains("never for sure"), "{shown}");
+    assert!(shown.contains("least detectable") && shown.contains("none"), "{shown}");
+}
