@@ -49,10 +49,12 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
 /// How to lower the peaks of S above `limit`; `None` if there are none.
 fn lower_peaks(robustness: &Robustness, limit: f64) -> Option<Markup> {
     let high: Vec<_> = robustness.points.iter().filter(|point| point.judged > limit).collect();
+    // That peak is in the units of the plant file, as the judged one is where it is not lower than `s_peak`.
     let linear_quadratic = |point: &LoopPoint| {
         let name = format!("peak of S at the {}", point.point);
         let compared = robustness.comparison.iter().find(|compared| compared.name == name)?;
-        compared.linear_quadratic.filter(|peak| *peak < BETTER * point.s_peak)
+        let peak = compared.linear_quadratic.filter(|_| point.judged >= point.s_peak)?;
+        (peak < BETTER * point.judged).then_some(peak)
     };
     (!high.is_empty()).then(|| {
         html! {

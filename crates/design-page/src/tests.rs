@@ -361,3 +361,18 @@ fn a_fault_that_is_not_detected_for_sure_says_so() {
     assert!(shown.contains("mean delay, s") && shown.contains("never for sure"), "{shown}");
     assert!(shown.contains("least detectable") && shown.contains("none"), "{shown}");
 }
+
+/// The judged peak is 3 in the best units, and 1.5e5 in those of the plant file, as is the 12.5 of the other design.
+#[test]
+fn a_linear_quadratic_design_is_proposed_for_a_peak_in_the_same_units_only() {
+    let proposed = |judged: f64| {
+        let mut report = hostile();
+        report.verdict.remedies.clear();
+        let robustness = report.robustness.as_mut().unwrap();
+        robustness.points[0].judged = judged;
+        robustness.comparison[0].name = "peak of S at the input".to_owned();
+        robustness.comparison[0].linear_quadratic = Some(12.5);
+        page(&report).contains("for the linear-quadratic design of the same speed")
+    };
+    assert!(!proposed(3.0) && proposed(1.5e5));
+}
