@@ -6,6 +6,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::assess::responses::{PARTS, SETTLED, add_outputs, points};
+use crate::report::number::rounded;
 use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::solve::solution::Solution;
@@ -46,11 +47,13 @@ pub(crate) fn beyond_limits(step: &ReferenceStep) -> Option<String> {
     let names: Vec<_> = step.commands.iter().filter(beyond).map(|one| one.name.as_str()).collect();
     let unit = step.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
     Some(format!(
-        "a step of {} by {}{unit} takes {} to a limit; steps from {low:.4}{unit} to {high:.4}{unit} stay \
-         within the limits, larger ones respond more slowly than the report shows",
+        "a step of {} by {}{unit} takes {} to a limit; steps from {}{unit} to {}{unit} stay within the \
+         limits, larger ones respond more slowly than the report shows",
         step.reference,
         step.size,
         names.join(" and "),
+        rounded(low),
+        rounded(high),
     ))
 }
 
@@ -296,6 +299,26 @@ mod tests {
         // A step of -2 moves u from -4 to 1; per unit -0.5 to 2, too.
         let one = command([-4.0, 1.0], Some([-3.0, 8.0]));
         assert_eq!(limits(one, -2.0), ["-1.5", "4"]);
+    }
+
+    #[test]
+    fn the_warning_of_a_step_beyond_small_limits_has_their_digits() {
+        let step = ReferenceStep {
+            reference: "r".to_owned(),
+            unit: Some("m".to_owned()),
+            size: 2.5e-5,
+            stated: true,
+            rise_time: None,
+            overshoot: 0.0,
+            settling_time: 0.0,
+            steady_state_error: 0.0,
+            commands: Vec::new(),
+            others: Vec::new(),
+            largest_step: [-1.25e-5, 1.25e-5],
+            curves: Vec::new(),
+        };
+        let warning = beyond_limits(&step).unwrap();
+        assert!(warning.contains("steps from -1.25e-5 m to 1.25e-5 m stay"), "{warning}");
     }
 
     #[test]

@@ -70,8 +70,8 @@ pub(crate) fn instability(test: &ToleranceResult) -> String {
 
 /// Returns which random cases are unstable, and from which part of the tolerances on.
 pub(crate) fn unstable_cases(test: &ToleranceResult) -> String {
-    let (cases, first) = (test.cases, test.first_unstable);
-    let worst = format!("the worst case found, from {first:.3} of the tolerances on");
+    let (cases, first) = (test.cases, rounded(test.first_unstable));
+    let worst = format!("the worst case found, from {first} of the tolerances on");
     match test.stable {
         Some(part) if part < 1.0 => {
             let unstable = rounded(100.0 * (1.0 - part));
@@ -79,5 +79,27 @@ pub(crate) fn unstable_cases(test: &ToleranceResult) -> String {
         }
         Some(_) => format!("none of {cases} random cases, but {worst}"),
         None => worst,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_part_of_the_tolerances_keeps_its_digits() {
+        let test = ToleranceResult {
+            entries: 1,
+            varying: Vec::new(),
+            parameters: Vec::new(),
+            cases: 0,
+            seed: 1,
+            stable: None,
+            worst_instability: 1.0,
+            first_unstable: 0.00025,
+            worst: Vec::new(),
+        };
+        let expected = "the worst case found, from 0.00025 of the tolerances on";
+        assert_eq!(unstable_cases(&test), expected);
     }
 }
