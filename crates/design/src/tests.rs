@@ -449,6 +449,21 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
     assert!(failed(&pendulum.replace("monitor = false", "monitor = true")).is_empty());
 }
 
+/// A bias of one of two sensors of a position.
+#[test]
+fn a_plant_with_faults_of_sensors_only_has_no_check_of_the_compensation() {
+    let sensor = MASS
+        .replace("[0, 0]]", "[0, -1]]")
+        .replace("C = [[1, 0]]", "C = [[1, 0], [1, 0]]\nfilter = 50")
+        .replace("actuator_faults = \"all\"", "faults = [{ name = \"bias\", sensor = \"y1\" }]")
+        .replace("[-5, { re = -6, im = 2.5 }]", "[-5, -6, -7, -8, -9]");
+    let count = |text: &str| {
+        let checks = read(text, |file| checks(&design(file).unwrap().nominal)).unwrap();
+        checks.iter().filter(|check| check.condition.starts_with("the compensation")).count()
+    };
+    assert_eq!([count(MASS), count(&sensor)], [1, 0]);
+}
+
 /// The first line of the error of a design, or its warnings.
 fn designed(text: &str) -> Result<Vec<String>, String> {
     let warnings = read(text, |file| {

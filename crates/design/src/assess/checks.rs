@@ -13,12 +13,16 @@ const CANCELLED: f64 = 1e-9;
 /// Returns all conditions, with a numerical value where there is one.
 pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     let mut all = Vec::from(existence(designed));
-    all.push(check(
-        "the compensation cancels the faults of the actuators",
-        designed.cancellation_residual < CANCELLED,
-        Some(designed.cancellation_residual),
-        "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
-    ));
+    let extended = &designed.extended;
+    // Faults of sensors leave nothing to cancel.
+    if extended.plant.f_a.rows(0, extended.states).amax() > 0.0 {
+        all.push(check(
+            "the compensation cancels the faults of the actuators",
+            designed.cancellation_residual < CANCELLED,
+            Some(designed.cancellation_residual),
+            "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
+        ));
+    }
     let margin = match designed.domain {
         Domain::Continuous => "largest real part of the eigenvalues, 1/s",
         Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
