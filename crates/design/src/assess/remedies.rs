@@ -64,14 +64,15 @@ pub(crate) fn remedies(
     };
     // A change for a peak must not cost the stability within the tolerances.
     let varies = limits.parameters.is_empty();
-    let mut trials: Vec<_> = variants
+    let tried = variants
         .into_par_iter()
-        .filter(|_| !budget.is_over())
-        .filter_map(|variant| variant.trial(file, varies))
-        .collect();
+        .map(|variant| (!budget.is_over()).then(|| variant.trial(file, varies)))
+        .collect::<Vec<_>>();
+    let is_complete = tried.iter().all(Option::is_some);
+    let mut trials: Vec<_> = tried.into_iter().flatten().flatten().collect();
     trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
-    let remedy = |reason: Reason| reason.remedy(&trials, &present, limits);
-    reasons.into_iter().map(remedy).collect()
+    let remedy = |reason: Reason| reason.remedy(&trials, is_complete, &present, limits);
+    reasons.into_iter().filter_map(remedy).collect()
 }
 
 /// A reason of the verdict, and what a change has to reach.
@@ -228,8 +229,15 @@ impl Trial {
 impl Reason {
     /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, else for a
     /// peak the change with the lowest one; without any, a sentence that says so. Changes that make something else
-    /// worse are left out.
-    fn remedy(self, trials: &[Trial], present: &Present, limits: &RobustnessLimits) -> Remedy {
+    /// worse are left out. None if no change removes this reason and the time was over before all were tried, so that
+    /// the trials are not complete.
+    fn remedy(
+        self,
+        trials: &[Trial],
+        is_complete: bool,
+        present: &Present,
+        limits: &RobustnessLimits,
+    ) -> Option<Remedy> {
         let harmless = || trials.iter().filter(|trial| trial.is_harmless(present, limits));
         let reached = |trial: &&Trial| match self.aim {
             Aim::Peak(at) => trial.judged.points[at].judged <= limits.amber,
@@ -255,6 +263,7 @@ impl Reason {
                 };
                 (trial, format!("with {}, the peak of S is {peaks}{stable}", trial.words))
             }
+            (None, _) if !is_complete => return None,
             (None, Some(trial)) => {
                 let peaks = trial.peaks();
                 let change = format!(
@@ -266,14 +275,48 @@ impl Reason {
                 (trial, change)
             }
             (None, None) => {
-                let change = format!(
-                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, is better \
-                     without being worse elsewhere: other measurements, actuators or requirements are needed",
-                    trials.len()
-                );
-                return Remedy { reason: self.text, change, lines: Vec::new() };
+                let trials = match trials.len() {
+                    0 => format!(
+                        "no other design from {SLOWEST} to {FASTEST} times as fast is stable"
+                    ),
+                    count => format!(
+                        "none of {count} other stable designs, from {SLOWEST} to {FASTEST} times as fast, is better \
+                         without being worse elsewhere"
+                    ),
+                };
+                let change =
+                    format!("{trials}: other measurements, actuators or requirements are needed");
+                return Some(Remedy { reason: self.text, change, lines: Vec::new() });
             }
         };
-        Remedy { reason: self.text, change, lines: trial.lines.clone() }
+        Some(Remedy { reason: self.text, change, lines: trial.lines.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_any_trial_a_remedy_says_that_none_is_stable_if_all_were_tried() {
+        let limits = RobustnessLimits {
+            tolerance: [0.1; 4],
+            entries: Vec::new(),
+            parameters: Vec::new(),
+            cases: 0,
+            seed: 1,
+            noise: Vec::new(),
+            noise_is_stated: false,
+            amber: 2.0,
+            red: 4.0,
+        };
+        let change = |is_complete| {
+            let reason = Reason { text: "unstable".to_owned(), aim: Aim::Stable };
+            let present = Present { peaks: Vec::new(), is_unstable: true };
+            reason.remedy(&[], is_complete, &present, &limits).map(|remedy| remedy.change)
+        };
+        let expected = "no other design from 0.25 to 4 times as fast is stable: \
+                        other measurements, actuators or requirements are needed";
+        assert_eq!((change(true).as_deref(), change(false)), (Some(expected), None));
     }
 }
