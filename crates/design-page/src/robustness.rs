@@ -59,6 +59,10 @@ pub(super) fn robustness<'a>(
             ". "
             @if report.plant.sample_time.is_some() {
                 "This is in whole samples."
+            } @else if robustness.longest_hold.is_infinite() {
+                "No time over which the signals between plant and controller are held made the loop unstable, up to "
+                @if report.sampling.is_some() { "1000 sample times." }
+                @else { "100 times its longest time constant." }
             } @else if report.sampling.is_some() {
                 "With the same matrices of the controller the loop is stable up to a sample time of "
                 (number(robustness.longest_hold)) " s."

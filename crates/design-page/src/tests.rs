@@ -376,3 +376,14 @@ fn a_linear_quadratic_design_is_proposed_for_a_peak_in_the_same_units_only() {
     };
     assert!(!proposed(3.0) && proposed(1.5e5));
 }
+
+#[test]
+fn a_hold_without_a_limit_makes_no_loop_unstable() {
+    let hold = |longest| {
+        let mut report = hostile();
+        report.robustness.as_mut().unwrap().longest_hold = longest;
+        let text = page(&report);
+        ["stable up to a sample time of", "up to 1000 sample times"].map(|part| text.contains(part))
+    };
+    assert_eq!([hold(0.5), hold(f64::INFINITY)], [[true, false], [false, true]]);
+}
