@@ -158,7 +158,8 @@ fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
     for (group, names) in names.iter().enumerate() {
         for (at, signal) in names.iter().enumerate() {
             let values = schedule.points.iter().map(|point| Cell::from(point.operating[group][at]));
-            rows.push(std::iter::once(signal.name.as_str().into()).chain(values).collect());
+            let name = with_unit(&signal.name, signal.unit.as_ref());
+            rows.push(std::iter::once(name).chain(values).collect());
         }
     }
     if schedule.measured {

@@ -29,6 +29,7 @@ use figure::interactive::{
     BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
 };
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use plane::Plane;
 use plots::Plots;
 
 use design_report::Report;
@@ -177,7 +178,9 @@ fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
         (
             "reconfiguration",
             "Without an actuator",
-            reconfiguration.as_ref().map(reconfiguration::reconfiguration),
+            reconfiguration
+                .as_ref()
+                .map(|section| reconfiguration::reconfiguration(section, Plane::of(report))),
         ),
         ("fallback", "Fall-back", fallback.as_ref().map(fallback::fallback)),
         ("interface", "Interface of the FMU", any(interface, || plant::interface(report))),

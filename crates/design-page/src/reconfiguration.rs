@@ -3,11 +3,13 @@
 use maud::{Markup, html};
 
 use super::number::number;
+use super::plane::Plane;
 use super::table::{Cell, Columns, table, table_of};
 use design_report::reconfiguration::{ReconfigurationReport, Reconfigured, ServedByFallback};
 use design_report::robustness::Number;
 
-pub(super) fn reconfiguration(section: &ReconfigurationReport) -> Markup {
+/// `plane`: that of the eigenvalues.
+pub(super) fn reconfiguration(section: &ReconfigurationReport, plane: Plane) -> Markup {
     html! {
         p {
             "An actuator that is gone is stuck at a constant command. The controller FMU then uses that \
@@ -20,8 +22,10 @@ pub(super) fn reconfiguration(section: &ReconfigurationReport) -> Markup {
             ". The observer stays the same, so that its eigenvalues and those of the feedback are those of \
              the loop."
         }
-        @for case in &section.without { (without(&case.actuator, &case.outcome)) }
-        @for case in &section.several { (without(&case.actuators.join(", "), &case.outcome)) }
+        @for case in &section.without { (without(&case.actuator, &case.outcome, plane)) }
+        @for case in &section.several {
+            (without(&case.actuators.join(", "), &case.outcome, plane))
+        }
         (by_fallback(&section.by_fallback))
     }
 }
@@ -46,17 +50,18 @@ fn by_fallback(cases: &[ServedByFallback]) -> Markup {
     }
 }
 
-fn without(name: &str, outcome: &Result<Reconfigured, String>) -> Markup {
+fn without(name: &str, outcome: &Result<Reconfigured, String>, plane: Plane) -> Markup {
     html! {
         h3 { "Without " (name) }
         @match outcome {
             Err(reason) => p { strong { "There is no controller: " } (reason) "." },
-            Ok(case) => (controller(name, case)),
+            Ok(case) => (controller(name, case, plane)),
         }
     }
 }
 
-fn controller(name: &str, case: &Reconfigured) -> Markup {
+fn controller(name: &str, case: &Reconfigured, plane: Plane) -> Markup {
+    let head = format!("eigenvalue of A + B K_x{}", plane.unit());
     let numbers = |signal, value| -> Columns<'_, Number, 3> {
         [
             (signal, |signal| (&signal.name).into()),
@@ -84,7 +89,7 @@ fn controller(name: &str, case: &Reconfigured) -> Markup {
                 " " strong { "Beyond their limits: " } (case.beyond_limits.join(", ")) "."
             }
         }
-        (table(&format!("Eigenvalues without {name}"), &["number", "eigenvalue of A + B K_x"], &eigenvalues))
+        (table(&format!("Eigenvalues without {name}"), &["number", &head], &eigenvalues))
         (table_of(
             &format!("Commands at rest without {name}"),
             &case.commands,

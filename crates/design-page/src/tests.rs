@@ -387,3 +387,11 @@ fn a_hold_without_a_limit_makes_no_loop_unstable() {
     };
     assert_eq!([hold(0.5), hold(f64::INFINITY)], [[true, false], [false, true]]);
 }
+
+#[test]
+fn eigenvalues_without_an_actuator_have_the_plane_of_the_design() {
+    assert!(page(&hostile()).contains("eigenvalue of A + B K_x (z-plane)"));
+    let mut report = hostile();
+    report.sampling = None;
+    assert!(page(&report).contains("eigenvalue of A + B K_x (1/s)"));
+}
