@@ -8,7 +8,7 @@ use nalgebra::Complex;
 use crate::assess::checks::checks;
 use crate::assess::detection::detection;
 use crate::assess::remedies::remedies;
-use crate::assess::reporting::{Assessment, report};
+use crate::assess::reporting::{Assessment, effectiveness, report};
 use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
 use crate::budget::TimeLimits;
@@ -819,4 +819,35 @@ fn each_step_of_a_design_is_reported_once_with_the_part_that_is_done() {
     assert_eq!(names.len(), 10);
     assert!(reported.iter().all(|step| (0.0..1.0).contains(&step.done)), "{reported:?}");
     assert!(reported[9].done > 0.5);
+}
+
+/// Lags that do not act on each other, each with an actuator that may lose its effect.
+#[test]
+fn each_of_ten_actuators_has_the_largest_stable_loss_of_one_alone() {
+    let losses = |rates: &[f64]| {
+        let count = rates.len();
+        let diagonal = |entry: &dyn Fn(usize) -> f64| -> Vec<Vec<f64>> {
+            let row = |i| (0..count).map(|j| if i == j { entry(i) } else { 0.0 }).collect();
+            (0..count).map(row).collect()
+        };
+        let (a, b) = (diagonal(&|i| -rates[i]), diagonal(&|_| 1.0));
+        let [q, w] = [count, 2 * count].map(|length| vec![1.0; length]);
+        let faults = (1..=count).map(|k| {
+            format!("[[faults]]\nname = \"f{k}\"\nloss_of = \"u{k}\"\nleast_command = 0.5\n")
+        });
+        let faults = faults.collect::<String>();
+        let text = format!(
+            "A = {a:?}\nB = {b:?}\nC = {b:?}\nfeedback.Q = {q:?}\nfeedback.R = {q:?}\n\
+             observer.W = {w:?}\nobserver.V = {q:?}\n{faults}"
+        );
+        let losses = |file: &PlantFile<'_>| effectiveness(&design(file).unwrap().nominal).unwrap();
+        read(&text, losses).unwrap()
+    };
+    let rates: Vec<f64> = (0..10).map(|k| 1.0 + 0.25 * f64::from(k)).collect();
+    let together = losses(&rates);
+    assert_eq!(together.len(), 10);
+    for (rate, loss) in rates.iter().zip(together) {
+        let (loss, alone) = (loss.largest_stable_loss, losses(&[*rate])[0].largest_stable_loss);
+        assert!(alone > 0.5 && (loss - alone).abs() < 1e-6, "{rate}: {loss}, alone {alone}");
+    }
 }
