@@ -68,8 +68,9 @@ pub(super) fn errors(errors: &[EstimationErrors]) -> Markup {
             p {
                 "The sine has " (number(one.sine_frequency)) " rad/s, a tenth of the mean rate of the \
                  augmented observer of the same requirement. The lasting error of a ramp is per rate of the fault. \
-                 The peak gain is the largest error for any fault of at most 1. Root mean square: under the \
-                 white noise assumed below; a direct term passes it without limit in continuous time. Peak: \
+                 The peak gain is the largest error for any fault of at most 1. The errors of a sampled \
+                 design are those at its samples. Root mean square: under the white noise assumed below; \
+                 a direct term passes it without limit in continuous time. Peak: \
                  the largest amplitude for sinusoidal errors of the measurements of that size."
             }
         }

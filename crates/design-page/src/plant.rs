@@ -87,8 +87,8 @@ pub(super) fn effectiveness(report: &Report) -> Markup {
     ];
     html! {
         p {
-            "An actuator with loss E gives (1 − E) u. The loop is stable for every loss from 0 up \
-             to the one stated."
+            "An actuator with loss E gives (1 − E) u. Of 50 losses from 0 to 1 that were tested for each \
+             actuator, the loop is stable with all up to the one stated."
         }
         (table_of("Loss of effectiveness", &report.effectiveness, &columns))
     }

@@ -395,3 +395,10 @@ fn eigenvalues_without_an_actuator_have_the_plane_of_the_design() {
     report.sampling = None;
     assert!(page(&report).contains("eigenvalue of A + B K_x (1/s)"));
 }
+
+#[test]
+fn errors_at_samples_and_losses_that_were_tested_are_named_so() {
+    let text = page(&hostile());
+    assert!(text.contains("The errors of a sampled design are those at its samples."));
+    assert!(text.contains("Of 50 losses from 0 to 1 that were tested for each actuator,"));
+}
