@@ -644,19 +644,21 @@ fn there_is_no_remedy_where_no_other_design_is_tried() {
 /// The worst plant, as a plant file, has the matrices of the report and is a plant file.
 #[test]
 fn the_worst_plant_is_a_plant_file() {
-    let text = format!("{MASS}robustness.tolerance = 0.2\n").replace("[0, 0]]", "[-2.0, -0.5]]");
-    let (worst, a) = read(&text, |file| {
-        let designed = design(file).unwrap();
-        let report = report_within(file, &designed, TimeLimits::default()).unwrap();
-        let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
-        (
-            crate::assess::worst_case::plant_file(file, &designed.nominal, &report)
-                .unwrap()
-                .unwrap(),
-            a,
-        )
-    })
-    .unwrap();
+    let of = |tolerance: &str| {
+        let text = format!("{MASS}robustness.tolerance = {tolerance}\n");
+        let worst = |file: &PlantFile<'_>| {
+            let designed = design(file).unwrap();
+            let report = report_within(file, &designed, TimeLimits::default()).unwrap();
+            let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
+            let worst = crate::assess::worst_case::plant_file(file, &designed.nominal, &report);
+            (worst.unwrap().unwrap(), a)
+        };
+        read(&text.replace("[0, 0]]", "[-2.0, -0.5]]"), worst).unwrap()
+    };
+    let (exact, _) = of("0");
+    let expected = ": the worst plant found is the plant itself, because nothing varies.\n";
+    assert!(exact.contains(expected), "{exact}");
+    let (worst, a) = of("0.2");
     assert!((a[1][0].abs() - 2.0).abs() > 0.39 && a[0] == [0.0, 1.0], "{a:?}");
     let stated = read(&worst, |file| {
         let Model::Matrices { a, .. } = &file.model else { panic!("matrices") };

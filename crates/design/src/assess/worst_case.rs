@@ -41,7 +41,9 @@ pub(crate) fn plant_file(
     }
     let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
     let parameters = &robustness.tolerance.parameters;
-    let within = if parameters.is_empty() {
+    let within = if !robustness.tolerance.is_examined() {
+        "is the plant itself, because nothing varies".to_owned()
+    } else if parameters.is_empty() {
         format!("within {}", robustness.tolerance.range())
     } else {
         let worst = |parameter: &Parameter| format!("{} = {}", parameter.name, parameter.worst);
