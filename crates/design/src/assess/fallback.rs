@@ -78,7 +78,8 @@ pub(crate) fn report(
         plants.whole(&examination.gains, lossy)
     });
     let loops = loops.collect::<Result<Vec<_>, Error>>()?;
-    let whole_left_out = budget.is_over();
+    let whole = common(&loops, designed.domain, budget, |at| plants.name(at))?;
+    let whole_left_out = whole.is_err() && budget.is_over();
     Ok(Some(FallbackReport {
         loss: request.loss,
         method: fallback.method.clone(),
@@ -89,7 +90,7 @@ pub(crate) fn report(
         intact_gain_norm: designed.gains.k_x.norm(),
         intact_decay: decay(&intact, designed.domain)?,
         feedback: reported(&fallback.certificate),
-        whole: common(&loops, designed.domain, budget, |at| plants.name(at))?,
+        whole,
         whole_left_out,
         cases,
     }))
