@@ -677,6 +677,19 @@ fn report_within(
     report(Assessment { limits, ..assessment })
 }
 
+#[test]
+fn the_bound_of_the_rate_of_a_fault_is_per_second() {
+    let fault = "[[faults]]\nname = \"f\"\nactuator = \"u1\"\nbound = 2\nrate_bound = 0.5\nstep = 1\n";
+    let text = MASS.replace("actuator_faults = \"all\"\n", "") + fault;
+    let limits = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
+    let notes = |file: &PlantFile<'_>| {
+        let report = report_within(file, &design(file).unwrap(), limits.clone()).unwrap();
+        report.plant.faults[0].notes.clone()
+    };
+    let notes = read(&text, notes).unwrap();
+    assert!(notes.ends_with(", at most 2, rate at most 0.5 per s, jumps by 1"), "{notes}");
+}
+
 /// The proof ends before the case found, which is in one direction only; without time, or without an entry that varies, it says so.
 #[test]
 fn a_fraction_of_the_tolerances_is_proven() {

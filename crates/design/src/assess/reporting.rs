@@ -276,9 +276,13 @@ fn notes(fault: &Fault, designed: &Solution) -> String {
         FaultDynamics::Constant => "modelled as constant".to_owned(),
         FaultDynamics::Ramp => "modelled as a ramp".to_owned(),
     });
-    let numbers = [("at most", fault.bound), ("rate at most", fault.rate_bound)];
-    for (text, value) in numbers.into_iter().chain([("jumps by", fault.step)]) {
-        parts.extend(value.map(|value| format!("{text} {value}")));
+    let numbers = [
+        ("at most", fault.bound, ""),
+        ("rate at most", fault.rate_bound, " per s"),
+        ("jumps by", fault.step, ""),
+    ];
+    for (text, value, unit) in numbers {
+        parts.extend(value.map(|value| format!("{text} {value}{unit}")));
     }
     parts.join(", ")
 }
