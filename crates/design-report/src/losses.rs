@@ -19,7 +19,7 @@ pub struct LossReport {
 /// A loop under losses of effectiveness.
 #[derive(Serialize, JsonSchema)]
 pub struct LossLoop {
-    /// `compensation on`, `compensation off`, `passive`.
+    /// `compensation on` or `compensation off`.
     pub name: String,
     /// What the controller does in this loop, in a sentence.
     pub meaning: String,
