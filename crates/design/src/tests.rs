@@ -866,3 +866,22 @@ fn each_of_ten_actuators_has_the_largest_stable_loss_of_one_alone() {
         assert!(alone > 0.5 && (loss - alone).abs() < 1e-6, "{rate}: {loss}, alone {alone}");
     }
 }
+
+/// From the fault to y: (10 s + 1) / (s^2 + s + 1). The observer has s^3 + 18 s^2 + 107 s + 210 with the estimate, and
+/// s^2 + 18 s + 107 - 10 * 210 while it is held.
+#[test]
+fn a_loop_that_is_unstable_without_any_loss_is_so_from_a_loss_of_zero_on() {
+    let text = "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[1, 10]]\n\
+                feedback.eigenvalues = [-1, -2]\nobserver.eigenvalues = [-5, -6, -7]\n\
+                [[faults]]\nname = \"f\"\nloss_of = \"u1\"\nleast_command = 0.5\nup_to = 0.3\n";
+    let reasons = read(text, |file| {
+        let budget = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
+        let nominal = design(file).unwrap().nominal;
+        let report = crate::assess::losses::losses(&nominal, &budget.of_certificates()).unwrap();
+        crate::assess::losses::reasons(&report.unwrap())
+    });
+    let expected = "constant losses of effectiveness within the stated range make the loop unstable, \
+                    compensation off: from u1 0 on (amber)";
+    let reasons = reasons.unwrap();
+    assert!(reasons.iter().any(|(_, reason)| reason == expected), "{reasons:?}");
+}

@@ -220,7 +220,8 @@ impl Examination<'_> {
         let losses = self.stated.iter().zip(&limit.loss);
         let losses = losses.map(|(stated, loss)| number(&stated.name, *loss));
         Ok(ConstantLoss {
-            losses: losses.filter(|loss| loss.value > 0.0).collect(),
+            // A loop that is unstable without a loss is so from 0 on.
+            losses: losses.filter(|loss| loss.value > 0.0 || limit.factor <= 0.0).collect(),
             stable: limit.factor >= most,
             factor: limit.factor,
         })
