@@ -9,7 +9,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use report::Message;
 use study::LogFields;
 use tracing::{Event, Level, Subscriber};
-use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
@@ -19,9 +19,11 @@ use crate::output;
 
 /// `target` of the events for messages of FMUs.
 const FMU: &str = "fmu";
+/// `target` of the events of a results file; the information that it is replaced is logged without `verbose`, too.
+const RESULTS_FILE: &str = "results::output";
 
-/// Starts logging: errors and warnings; with `verbose` 1, also information; from 2 on, everything. `json` writes each
-/// message as a JSON object. Only the first call has an effect.
+/// Starts logging: errors, warnings, and that a results file is replaced; with `verbose` 1, all information; from 2 on,
+/// everything. `json` writes each message as a JSON object. Only the first call has an effect.
 pub(crate) fn start(verbose: u8, json: bool) {
     let level = match verbose {
         0 => LevelFilter::WARN,
@@ -29,7 +31,10 @@ pub(crate) fn start(verbose: u8, json: bool) {
         _ => LevelFilter::TRACE,
     };
     let text = tracing_subscriber::fmt::layer().with_writer(|| StandardError);
-    let registry = tracing_subscriber::registry().with(level).with(Collector);
+    let filter = Targets::new()
+        .with_default(level)
+        .with_target(RESULTS_FILE, level.max(LevelFilter::INFO));
+    let registry = tracing_subscriber::registry().with(filter).with(Collector);
     // Fails at a second call.
     let _ = if json {
         tracing::subscriber::set_global_default(registry.with(text.json().flatten_event(true)))

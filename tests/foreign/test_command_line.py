@@ -124,6 +124,7 @@ def test_the_progress_bar_shows_per_cent_speed_and_time_left(command, packed, tm
     words = ["run", *packed.values(), "--step", "0.00001", "--stop-time", "5", "--out", tmp_path]
     shown = on_terminal(command, *words)
     assert re.search(r" \d+ %, t = [0-9.e-]+ s, [0-9.e]+ times real time, \d+s left", shown), shown
+    words[-1] = tmp_path / "other"
     assert subprocess.run([command, *words], capture_output=True, check=True).stderr == b""
 
 

@@ -45,6 +45,21 @@ fn a_run_without_problems_writes_nothing_to_standard_error() {
 }
 
 #[test]
+fn a_results_file_that_is_replaced_is_one_line_on_standard_error() {
+    let bench = Bench::new();
+    let message =
+        |more: &[&str]| said(&bench.coupled(&[&["--stop-time", "0.1"][..], more].concat()));
+    assert_eq!(message(&[]), "");
+    let line = message(&[]);
+    let end = "out/results.csv: replaces the results of an earlier run\n";
+    assert!(line.starts_with("info: ") && line.ends_with(end), "{line:?}");
+    assert_eq!(line.lines().count(), 1, "{line:?}");
+    let line: Value = serde_json::from_str(&message(&["--log-json"])).unwrap();
+    assert_eq!(line["level"], "INFO");
+    assert_eq!(message(&["--results", "out/other.csv"]), "");
+}
+
+#[test]
 fn fmus_without_common_names_run_unconnected_with_a_warning() {
     let bench = Bench::new();
     let fmus = ["a", "b"].map(|name| format!("{name}={}", fmu("FrictionPendulum")));
