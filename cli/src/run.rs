@@ -108,7 +108,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<ActiveRun>> {
     if options.results.report && config.results.every == Some(Every::Never) {
         bail!("--report: there is nothing to report where rows are recorded `never`");
     }
-    describe(options, system, plan, by_name);
+    describe(options, &prepared, by_name);
     let units = units(system, ports);
     let report = options.results.report.then(|| facts::facts(system, plan, &config.results.plot));
     let planned = PlannedEntries::of(&config.scenario);
@@ -152,11 +152,12 @@ fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Prints the connections, the inputs without one if variables are connected `by_name`, and the algorithm with
-/// `--explain`; warns of loops that are not iterated.
-fn describe(options: &Options, system: &System, plan: &Plan, by_name: bool) {
+/// Prints the connections, the inputs that keep their start values if variables are connected `by_name`, and the
+/// algorithm with `--explain`; warns of loops that are not iterated.
+fn describe(options: &Options, prepared: &PreparedRun, by_name: bool) {
+    let PreparedRun { system, plan, .. } = prepared;
     println!("{}", connections(system));
-    let open = if by_name { open_inputs::list(system) } else { String::new() };
+    let open = if by_name { open_inputs::list(prepared) } else { String::new() };
     if !open.is_empty() {
         println!("{open}");
     }

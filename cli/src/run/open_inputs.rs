@@ -1,16 +1,19 @@
-//! Lists the inputs without a connection, with options that set or connect them.
+//! Lists the inputs that keep their start values, with options that set or connect them.
 
 use master::{Port, System};
+use study::PreparedRun;
 
 /// Largest number of inputs that are listed.
 const INPUTS: usize = 20;
 /// Largest number of outputs that are proposed for an input.
 const OUTPUTS: usize = 3;
 
-/// Returns a heading, a line for each of the first [`INPUTS`] inputs without a connection, and the number of further
-/// ones; empty for a single FMU and if every input has a source.
-pub(super) fn list(system: &System) -> String {
-    let open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
+/// Returns a heading, a line for each of the first [`INPUTS`] inputs without a connection, a setting and a signal, and
+/// the number of further ones; empty for a single FMU and if there are none.
+pub(super) fn list(prepared: &PreparedRun) -> String {
+    let system = &prepared.system;
+    let mut open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
+    open.retain(|input| !prepared.sets(*input));
     let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();
     if open.len() > INPUTS {
         lines.push(format!("  and {} more", open.len() - INPUTS));

@@ -86,6 +86,19 @@ impl PreparedRun {
         Ok(Self { config, system, plan, ports, scenario, tables, opened })
     }
 
+    /// Returns whether a setting or the scenario gives the variable at `port` a value.
+    #[must_use]
+    pub fn sets(&self, port: Port) -> bool {
+        let (holder, name) = (self.system.holder(port), self.system.name(port));
+        let is_meant = |setting: &str| {
+            let named = self.system.port(setting);
+            named.is_ok_and(|named| self.system.holder(named) == holder)
+                || name.starts_with(&format!("{setting}["))
+        };
+        self.config.settings.0.iter().any(|(setting, _, _)| is_meant(setting))
+            || self.scenario.drives.iter().any(|drive| drive.port() == holder)
+    }
+
     /// Initialises the FMUs, or restores them from the checkpoint `saved`, and creates the results
     /// file and the bus trace of the configuration.
     ///

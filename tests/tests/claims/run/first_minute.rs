@@ -46,6 +46,23 @@ fn the_only_free_output_and_input_of_a_unit_are_connected_and_reported() {
 }
 
 #[test]
+fn an_input_with_a_setting_or_a_signal_is_not_said_to_keep_its_start_value() {
+    let bench = Bench::new();
+    let [a, b] = ["a", "b"].map(|name| unit_fmu(&bench, name, "V", "m"));
+    let text = format!(
+        "[fmus]\na = '{a}'\nb = '{b}'\n[settings]\na.i_in = 7\n\
+         [[scenario.signal]]\nvariable = \"a.u\"\nconstant = 2\n"
+    );
+    let system = bench.write("system.toml", &text);
+    let list = printed(&bench.run(&[&system, "--stop-time", "0.1", "--set", "b.b_in=true"]));
+    for (input, is_open) in
+        [("a.u", false), ("a.i_in", false), ("b.b_in", false), ("b.u", true), ("a.b_in", true)]
+    {
+        assert_eq!(list.contains(&format!("\n  {input}: ")), is_open, "{input}: {list}");
+    }
+}
+
+#[test]
 fn no_connection_is_proposed_that_closes_a_loop_over_a_unit() {
     let bench = Bench::new();
     let (plant, controller) = (fmu("FrictionPendulum"), fmu("AsoController"));
