@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use results::{Column, ColumnKind, Selection, Table};
 
 use figure::{Figure, Ink, Panel, Series, rasterise};
@@ -46,6 +46,13 @@ pub(crate) fn plot_with_units(
     files::whole::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
 }
 
+/// Checks that a picture can have this number of curves.
+pub(crate) fn check_count(count: usize) -> anyhow::Result<()> {
+    ensure!(count > 0, "no variable to plot: expected a number, found texts only");
+    ensure!(count <= CURVES, "{count} variables to plot, expected at most {CURVES}: choose fewer");
+    Ok(())
+}
+
 /// Reads the curves of the selected variables.
 fn curves(
     results: &Path,
@@ -61,10 +68,7 @@ fn curves(
         let drawable = *position != table.time() && column.kind != ColumnKind::String;
         drawable || variables.contains(&column.name)
     });
-    if positions.len() > CURVES {
-        bail!("{} variables to plot, expected at most {CURVES}: choose fewer", positions.len());
-    }
-    ensure!(!positions.is_empty(), "{}: no variable to plot", results.display());
+    check_count(positions.len())?;
     let envelopes = table.envelopes(&positions)?;
     let curve = |(position, envelope): (usize, results::Envelope)| {
         let column = &table.columns()[position];

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmu_description::number;
+use fmu_description::{Kind, number};
 use fmu_import::CallLog;
 use master::{Coupling, Port, System, by_direct_dependencies};
 use results::{STANDARD_OUTPUT, Selection, is_stream};
@@ -209,7 +209,17 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     }
     let names: Vec<_> = ports.iter().map(|&port| system.name(port)).collect();
     let selection = Selection { include: results.plot.clone(), exclude: Vec::new() };
-    selection.choose(&names).context("plot").map(|_| ())
+    let chosen = selection.choose(&names).context("plot")?;
+    let is_text = |position: &usize| {
+        let kind = &system.variable(ports[*position]).kind;
+        matches!(kind, Kind::String(_) | Kind::Binary(_))
+    };
+    let (texts, numbers): (Vec<_>, Vec<_>) = chosen.into_iter().partition(is_text);
+    // A pattern selects only variables that can be drawn, a name selects any variable.
+    if let Some(text) = texts.into_iter().find(|text| results.plot.contains(&names[*text])) {
+        bail!("--plot: {} holds texts, expected numbers", names[text]);
+    }
+    plot::check_count(numbers.len()).context("--plot")
 }
 
 /// Lists the first [`LISTED`] connections and the number of further ones.

@@ -128,6 +128,24 @@ fn a_plot_shows_the_selected_variables_with_their_units() {
 }
 
 #[test]
+fn a_plot_that_cannot_be_drawn_is_refused_before_the_run() {
+    let bench = Bench::new();
+    let file = CFmu::well_behaved().write(bench.folder.path(), "slave");
+    let fmus: Vec<_> = (0..17).map(|k| format!("--fmu=a{k}={}", file.display())).collect();
+    let fmus: Vec<_> = fmus.iter().map(String::as_str).collect();
+    // Each has u, y, i_in and i_out.
+    for (names, part) in [
+        ("*.u,*.y,*.i_*", "68 variables to plot, expected at most 64"),
+        ("a0.u,a0.s_out", "a0.s_out holds texts, expected numbers"),
+        ("*.s_*", "no variable to plot"),
+    ] {
+        let more = ["--plot", names, "--out", "out", "--stop-time", "0.1"];
+        fails(&bench.run(&[&fmus[..], &more].concat()), 2, &[part]);
+        assert!(!bench.path("out").exists(), "{names}");
+    }
+}
+
+#[test]
 fn many_connections_are_counted_instead_of_listed() {
     let bench = Bench::new();
     let plant = fmu("FrictionPendulum");
