@@ -187,11 +187,13 @@ pub(super) struct TimeOptions {
 #[command(next_help_heading = "Results")]
 pub(super) struct ResultsOptions {
     /// Folder for all files [default: results/run]
+    ///
+    /// Files that a system.toml names keep their names in it, but for the checkpoint, which is not moved.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Results, .csv or .parquet; -: CSV on stdout
     ///
-    /// [default: results.csv in the folder of --out]
+    /// [default: the name of the system.toml, or results.csv, in the folder of --out]
     #[arg(long, value_name = "FILE")]
     results: Option<PathBuf>,
     /// Format of the results: csv or parquet
@@ -220,7 +222,7 @@ pub(super) struct ResultsOptions {
     plot: Vec<String>,
     /// File of the plot, .svg or .png
     ///
-    /// [default: plot.svg in the folder of --out]
+    /// [default: the name of the system.toml, or plot.svg, in the folder of --out]
     #[arg(long, value_name = "FILE")]
     plot_file: Option<PathBuf>,
     /// Write the frames of the CAN buses to this file
@@ -515,7 +517,11 @@ impl Options {
             }
             next_path(match (out, known) {
                 (None, Some(known)) => known.clone(),
-                (out, _) => out.unwrap_or(Path::new(OUT)).join(name),
+                (out, known) => {
+                    let known = known.as_deref().filter(|known| !is_stream(known));
+                    let name = known.and_then(Path::file_name).unwrap_or(name.as_ref());
+                    out.unwrap_or(Path::new(OUT)).join(name)
+                }
             })
         };
         let mut file = place(&self.results.results, &results.file, "results.csv");
@@ -533,8 +539,10 @@ impl Options {
         }
         results.file = Some(file);
         results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
-        let known = results.bus_trace.take().map(next_path);
-        results.bus_trace = self.results.bus_trace.clone().or(known);
+        let trace = &self.results.bus_trace;
+        if trace.is_some() || results.bus_trace.is_some() {
+            results.bus_trace = Some(place(trace, &results.bus_trace, "trace.log"));
+        }
         Ok(())
     }
 }

@@ -55,6 +55,16 @@ fn two_terminals_connect_their_members_and_a_frame_arrives_when_it_is_sent() {
     }
 }
 
+#[test]
+fn the_trace_of_the_file_goes_into_the_folder_of_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = node::write(folder.path());
+    let trace = "[results]\nbus-trace = \"elsewhere/frames.asc\"\n";
+    run(folder.path(), &format!("[fmus]\na = {fmu:?}\nb = {fmu:?}\n{trace}"), &[]);
+    assert!(folder.path().join("out/frames.asc").is_file());
+    assert!(!folder.path().join("elsewhere").exists());
+}
+
 /// A system structure connects terminals by their names, or the clocks and binaries that are their members.
 #[test]
 fn a_system_structure_connects_terminals_and_clocked_binaries() {

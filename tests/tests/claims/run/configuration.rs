@@ -142,6 +142,16 @@ fn an_explanation_says_what_was_chosen_and_why() {
 }
 
 #[test]
+fn the_folder_of_the_command_line_takes_the_files_of_the_file_with_their_names() {
+    let bench = Bench::new();
+    let results = "[results]\nfile = 'a/b.parquet'\nplot = ['plant.x_p']\nplot-file = 'c.png'\n";
+    bench.write("system.toml", &system_toml(&format!("{results}[experiment]\nstop-time = 0.01\n")));
+    let list = printed(&bench.run(&["system.toml", "--out", "out"]));
+    assert!(list.ends_with("out/b.parquet\nout/c.png\n"), "{list}");
+    assert!(!bench.path("a").exists() && !bench.path("c.png").exists());
+}
+
+#[test]
 fn an_option_replaces_an_fmu_of_the_file() {
     let bench = scenario();
     let text = bench.read("system.toml").replace("AsoController.fmu", "None.fmu");
