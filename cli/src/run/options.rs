@@ -538,6 +538,9 @@ impl Options {
             _ => {}
         }
         results.file = Some(file);
+        if self.results.plot_file.is_some() && results.plot.is_empty() {
+            bail!("--plot-file needs --plot NAMES");
+        }
         results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
         let trace = &self.results.bus_trace;
         if trace.is_some() || results.bus_trace.is_some() {

@@ -89,6 +89,7 @@ fn misuse_is_refused_with_the_expected_input() {
         (&["--plot", "plant.zz"], &["plot", "plant.zz"]),
         (&["--plot", "plant.x_p", "--plot-file", "a.pdf"], &["a.pdf", ".svg"]),
         (&["--plot", "plant.x_p", "--record-every", "never"], &["never"]),
+        (&["--plot-file", "a.svg"], &["--plot-file needs --plot NAMES"]),
         (&["--results", "a.xlsx"], &["a.xlsx", ".csv or .parquet"]),
         (&["--time-limit", "0"], &["--time-limit", "above 0"]),
         (&["--start-time", "5", "--stop-time", "4"], &["stop time", "4"]),
