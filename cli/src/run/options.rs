@@ -532,9 +532,7 @@ impl Options {
             Some("parquet") if is_stream(&file) => {
                 bail!("--format parquet: {} is no file, expected csv", file.display())
             }
-            Some(format) if !is_stream(&file) => {
-                file.set_extension(format);
-            }
+            Some(format) if !is_stream(&file) => file = with_format(file, format),
             _ => {}
         }
         results.file = Some(file);
@@ -548,6 +546,17 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// Returns `path` with the ending of a format: in place of that of another format, otherwise behind the name, of which
+/// another ending is a part, as in `k=1.5`.
+fn with_format(path: PathBuf, format: &str) -> PathBuf {
+    if ["csv", "parquet"].iter().any(|ending| has_ending(&path, ending)) {
+        return path.with_extension(format);
+    }
+    let mut name = path.into_os_string();
+    name.push(format!(".{format}"));
+    name.into()
 }
 
 /// Returns the path of a file that a run resumed at `time` writes, in the folder of the file `path` of the run before.
@@ -609,6 +618,18 @@ fn check_numbers(config: &Config) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_format_replaces_the_ending_of_another_format_only() {
+        for (path, format, expected) in [
+            ("out/k=1.5", "csv", "out/k=1.5.csv"),
+            ("out/k=1.5.csv", "csv", "out/k=1.5.csv"),
+            ("results.CSV", "parquet", "results.parquet"),
+            ("results", "parquet", "results.parquet"),
+        ] {
+            assert_eq!(with_format(PathBuf::from(path), format), Path::new(expected));
+        }
+    }
 
     #[test]
     fn a_resumed_run_replaces_only_the_time_of_a_former_one_and_writes_to_the_same_pipe() {
