@@ -8,6 +8,7 @@ use fmu_description::number::seconds;
 use report::{Comparison, Request, identity};
 
 use crate::outputs::check_identity;
+use crate::run::split_names;
 
 /// Largest number of names in a line about what was not compared.
 const LISTED: usize = 20;
@@ -29,8 +30,8 @@ pub(crate) struct Options {
     bus_trace: Option<PathBuf>,
     /// Show these variables only
     ///
-    /// By name or pattern (`plant.*`); may be repeated.
-    #[arg(long, value_name = "PATTERN", value_delimiter = ',')]
+    /// By name or pattern (`plant.*`), separated by commas; may be repeated.
+    #[arg(long, value_name = "PATTERN")]
     variables: Vec<String>,
     /// Read the rows from this time on, in s
     #[arg(long, value_name = "TIME", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
@@ -65,7 +66,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     let page = report::page(&Request {
         results: &options.results,
         against: options.against.as_deref(),
-        variables: &options.variables,
+        variables: &split_names(&options.variables),
         range: (options.from, options.to),
         units: &[],
         bus_trace: options.bus_trace.as_deref(),

@@ -25,7 +25,7 @@ use crate::plot;
 use facts::PlannedEntries;
 pub(crate) use interrupt::status as interrupted;
 use live::Live;
-pub(crate) use options::{AlgorithmOptions, Options, setting};
+pub(crate) use options::{AlgorithmOptions, Options, setting, split_names};
 use progress::Progress;
 
 /// Largest number of connections that are listed.

@@ -218,7 +218,7 @@ pub(super) struct ResultsOptions {
     /// Plot these variables
     ///
     /// By name or pattern, separated by commas; may be repeated.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES")]
     plot: Vec<String>,
     /// File of the plot, .svg or .png
     ///
@@ -314,6 +314,19 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err("expected the form NAME=VALUE".to_owned()),
     }
+}
+
+/// Splits lists of names at their commas, except within brackets, where commas belong to names such as `A[1,2]`.
+pub(crate) fn split_names(lists: &[String]) -> Vec<String> {
+    let mut names = Vec::new();
+    for list in lists {
+        let mut depth = 0_i32;
+        names.extend(list.split(|letter: char| {
+            depth += i32::from(letter == '[') - i32::from(letter == ']');
+            depth <= 0 && letter == ','
+        }));
+    }
+    names.into_iter().map(str::to_owned).collect()
 }
 
 /// Splits `from=to`; the error for another sign between them proposes the right form.
@@ -501,7 +514,7 @@ impl Options {
             results.exclude.clone_from(&self.results.exclude);
         }
         if !self.results.plot.is_empty() {
-            results.plot.clone_from(&self.results.plot);
+            results.plot = split_names(&self.results.plot);
         }
         put(&mut results.every, self.results.record_every);
         let out = self.results.out.as_deref();
@@ -618,6 +631,13 @@ fn check_numbers(config: &Config) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn commas_within_brackets_belong_to_names() {
+        let lists = ["plant.A[1,2],plant.x", "ctrl.K[*,1]", "a,,b"].map(str::to_owned);
+        let expected = ["plant.A[1,2]", "plant.x", "ctrl.K[*,1]", "a", "", "b"];
+        assert_eq!(split_names(&lists), expected);
+    }
 
     #[test]
     fn a_format_replaces_the_ending_of_another_format_only() {
