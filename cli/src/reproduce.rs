@@ -10,7 +10,7 @@ use results::Table;
 use toml::Spanned;
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
-use study::{AssemblyOptions, Config, Every, LoadedConfig, PreparedRun, RunEnd};
+use study::{AssemblyOptions, Config, Every, LoadedConfig, PreparedRun, Run, RunEnd};
 
 use crate::run::{AlgorithmOptions, advance, setting};
 use crate::scenario::Scenario;
@@ -63,30 +63,43 @@ pub(crate) struct Options {
 }
 
 /// Packs the FMUs, runs the experiment, writes results and figures, and compares with the claims;
-/// returns true if every claim that could be judged holds.
+/// returns true if every claim that could be judged holds and every file is written.
 pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     if options.record_every == Every::Never {
         bail!("--record-every never leaves nothing to draw, expected seconds or `step`");
     }
     let fmus = pack::folder_of_models(&options.dist)?;
-    let settings = settings(options);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let prepared =
-        PreparedRun::new(experiment(options, &fmus, &settings), &AssemblyOptions::default())?;
+    let loaded = experiment(options, &fmus, &settings(options));
+    let prepared = PreparedRun::new(loaded, &AssemblyOptions::default())?;
     let mut watch = Watch::new(&prepared.system)?;
     let mut run = prepared.start(None)?;
     let ended = advance(&mut run, |run| {
         watch.add(&mut run.simulation)?;
         Ok(ControlFlow::Continue(()))
     });
+    conclude(options, &mut run, &watch, ended).or_else(|error| {
+        eprintln!("error: {}", files::sentence(error.as_ref()));
+        Ok(false)
+    })
+}
+
+/// Completes the results of a run, writes its figures and its summary, and prints the claims; returns true if every
+/// claim that could be judged holds.
+fn conclude(
+    options: &Options,
+    run: &mut Run,
+    watch: &Watch,
+    ended: RunEnd,
+) -> anyhow::Result<bool> {
     run.finish()?;
     let lost = match ended {
         RunEnd::Failed(error) => Some(error.sentence()),
         RunEnd::ByFmu(name) => Some(format!("{name} requested the end of the simulation")),
         RunEnd::AtStop | RunEnd::Interrupted => None,
     };
-    let reached = run.simulation.time();
+    let (reached, settings) = (run.simulation.time(), settings(options));
     let claims = watch.claims(reached, lost.is_some());
     let certified = ControllerCertificate::of(run.simulation.system(), watch.fault_bound())?;
     let written = Summary {

@@ -142,6 +142,18 @@ fn claims_that_a_short_run_cannot_decide_are_left_open() {
     assert!(said(&output).contains("not judged"));
 }
 
+#[test]
+fn a_file_that_cannot_be_written_after_the_run_is_status_1_as_any_lost_output() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("summary.json")).unwrap();
+    let out = folder.path().display().to_string();
+    let fmus = folder.path().join("dist").display().to_string();
+    let output = run(&["reproduce", "--out", &out, "--dist", &fmus, "--stop-time", "0.1"]);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(said(&output).contains("summary.json: "), "{}", said(&output));
+    assert!(folder.path().join("results.csv").is_file());
+}
+
 /// Runs `run` on the packed FMUs with `more` arguments and expects a refusal.
 fn run_refuses(more: &[&str], parts: &[&str]) {
     let plant = dist().join("FrictionPendulum.fmu").display().to_string();
