@@ -130,8 +130,14 @@ fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()>
     let config = &loaded.config;
     let results = config.results.file.as_deref();
     let page = results.filter(|_| options.results.report).map(|file| file.with_extension("html"));
-    let outputs =
-        [("--log-calls", options.watching.log_calls.as_deref()), ("the report", page.as_deref())];
+    // A resumed run has another file, and no configuration that it could overwrite.
+    let beside = results.filter(|file| !is_stream(file)).unwrap_or(Path::new(live::FILE));
+    let repetition = options.watching.live.map(|_| beside.with_file_name(live::FILE));
+    let outputs = [
+        ("--log-calls", options.watching.log_calls.as_deref()),
+        ("the report", page.as_deref()),
+        ("the file of --live,", repetition.as_deref()),
+    ];
     let outputs = outputs.iter().filter_map(|(role, path)| Some((*role, (*path)?)));
     let source = loaded.source.as_ref().map(|source| ("the configuration", &*source.path));
     config.check_outputs(source.as_slice(), &outputs.collect::<Vec<_>>())?;

@@ -16,6 +16,8 @@ use study::{Error, RealTime, Run};
 use super::{interrupt, relative, run_command};
 use crate::logging;
 
+/// Name of the file that repeats the run, unless the run is resumed.
+pub(super) const FILE: &str = "live.toml";
 /// Largest number of signals on the page.
 const SIGNALS: usize = 500;
 /// Largest number of variables that can be set on the page.
@@ -76,7 +78,7 @@ impl Live {
             let name = format!("live-from-{time}.toml");
             (name, format!("{first} from its start, not from the checkpoint at t = {time} s."))
         } else {
-            ("live.toml".to_owned(), format!("{first}."))
+            (FILE.to_owned(), format!("{first}."))
         };
         let file = match results {
             Some(results) => results.with_file_name(file),

@@ -49,6 +49,9 @@ fn no_output_is_an_input() {
         fails(&ran, 2, &[&format!("--log-calls {output} would overwrite {role}")]);
     }
     assert_eq!(bench.read("system.toml"), toml);
+    let live = bench.write("live.toml", &toml);
+    let ran = bench.run(&[live.as_str(), "--live", "--results", "r.csv"]);
+    fails(&ran, 2, &["the file of --live,", "would overwrite the configuration", "live.toml"]);
     let twice = ["--results", "out/a.csv", "--log-calls", "out/../out/a.csv"];
     fs::create_dir(bench.path("out")).unwrap();
     fails(&bench.run(&[&short(&fmu)[..], &twice].concat()), 2, &["name the same file"]);
