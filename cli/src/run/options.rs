@@ -149,6 +149,7 @@ struct SystemOptions {
     ///
     /// For example `plant.F_c=20`; may be repeated.
     #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
+    #[arg(conflicts_with = "resume")]
     settings: Vec<(String, String)>,
     /// Load a shared library before the FMUs
     ///

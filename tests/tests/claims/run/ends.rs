@@ -154,6 +154,8 @@ fn bad_checkpoints_are_refused() {
     fs::write(bench.path("old"), b"aso-ftc-state-1\nof former times").unwrap();
     let parts = ["old: found a checkpoint of format 1, expected format 5", "from its start"];
     fails(&bench.run(&["--resume", "old"]), 2, &parts);
+    let setting = ["--resume", "state", "--set", "plant.F_c=20"];
+    fails(&bench.run(&setting), 2, &["--set", "--resume", "cannot be used with"]);
     let swapped = format!("controller={}", fmu("FrictionPendulum"));
     let output = bench.run(&["--resume", "state", "--fmu", &swapped]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
