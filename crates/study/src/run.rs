@@ -212,10 +212,12 @@ fn scenario(
     Ok(prepared.scenario)
 }
 
-/// If checkpoints are requested, checks before the run that all FMUs can save their state.
+/// If checkpoints are requested, checks before the run that they have a file, and that all FMUs can save their state.
 fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
-    if config.checkpoint.file.is_none() {
-        return Ok(());
+    let Some(path) = &config.checkpoint.file else { return Ok(()) };
+    if path.is_dir() {
+        let path = path.display();
+        return Err(Error::Invalid(format!("cannot write the checkpoint {path}: it is a folder")));
     }
     let unable = system.slaves.iter().find(|(_, slave)| {
         let flags = slave.description().co_simulation.as_ref();

@@ -109,6 +109,15 @@ fn an_fmu_that_cannot_save_its_state_is_named_before_the_run() {
     fails(&bench.run(&options[..2]), 0, &["stop time 1 s", "--stop-time"]);
 }
 
+#[test]
+fn a_folder_in_place_of_a_checkpoint_is_refused_before_the_run() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("states")).unwrap();
+    let output = bench.coupled(&["--stop-time", "0.1", "--checkpoint", "states"]);
+    fails(&output, 2, &["cannot write the checkpoint ", "states: it is a folder"]);
+    assert!(!bench.path("out").exists());
+}
+
 /// The FMU refuses steps beyond the stop time that it got.
 #[test]
 fn a_resumed_run_passes_the_first_stop_time_and_warns_if_the_new_one_is_later() {
