@@ -79,7 +79,9 @@ fn identifier(name: &str) -> anyhow::Result<String> {
 /// Returns the value of `fmu =` in the manifest: a git URL or a folder. Returns an error if it is not that of the crate
 /// fmu.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
-    if let Some(url) = source.filter(|source| source.contains("://") || source.contains('@')) {
+    let has_form_of_url = |source: &str| source.contains("://") || source.contains('@');
+    let is_url = |source: &&str| has_form_of_url(source) && !Path::new(source).is_dir();
+    if let Some(url) = source.filter(is_url) {
         return Ok(format!("{{ git = {} }}", quoted(url)));
     }
     let folder = match source {
@@ -143,5 +145,18 @@ mod tests {
         write(&target, &[("Cargo.toml", "[package]".to_owned())]).unwrap();
         assert_eq!(fs::read_to_string(target.join("Cargo.toml")).unwrap(), "[package]");
         assert_eq!(fs::read_dir(folder.path().join("models")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_with_an_at_sign_in_its_path_is_no_url() {
+        let folder = tempfile::tempdir().unwrap();
+        let source = folder.path().join("me@home");
+        fs::create_dir(&source).unwrap();
+        fs::write(source.join("Cargo.toml"), "[package]\nname = \"fmu\"\n").unwrap();
+        let source = source.display().to_string();
+        let path = format!("{{ path = {} }}", quoted(&source));
+        assert_eq!(dependency(Some(&source)).unwrap(), path);
+        let url = dependency(Some("git@example.org:fmu")).unwrap();
+        assert_eq!(url, "{ git = \"git@example.org:fmu\" }");
     }
 }
