@@ -5,7 +5,8 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io, process};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
+use results::is_stream;
 
 /// Bytes at the start of a file in which its identity is searched.
 const HEAD: u64 = 4096;
@@ -24,7 +25,7 @@ struct Staged {
 
 impl Outputs {
     /// Adds a file: creates its folder, and calls `write` with the temporary path for its content. Returns an error if
-    /// `path` is a folder or if the content cannot be written.
+    /// `path` is a folder, a pipe or a device, or if the content cannot be written.
     pub(crate) fn stage<E: Into<anyhow::Error>>(
         &mut self,
         path: &Path,
@@ -32,9 +33,7 @@ impl Outputs {
     ) -> anyhow::Result<()> {
         let partial = beside(path, "partial");
         let unwritten = || format!("cannot write {}", path.display());
-        if path.is_dir() {
-            bail!("cannot write {}: it is a folder", path.display());
-        }
+        check_kind(path)?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).with_context(unwritten)?;
         }
@@ -137,9 +136,18 @@ fn beside(path: &Path, mark: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// Checks that `path` is neither a folder nor a pipe or a device, which a file would replace.
+fn check_kind(path: &Path) -> anyhow::Result<()> {
+    let shown = path.display();
+    ensure!(!path.is_dir(), "cannot write {shown}: it is a folder");
+    ensure!(!is_stream(path), "cannot write {shown}: it is a pipe or a device, expected a file");
+    Ok(())
+}
+
 /// Checks that the output `path` may be overwritten: it does not exist, or `identity` is in its first [`HEAD`] bytes or
-/// in the design in an FMU. A folder or a file that cannot be read is an error.
+/// in the design in an FMU. A folder, a pipe, a device or a file that cannot be read is an error.
 pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> {
+    check_kind(path)?;
     let mut head = Vec::new();
     let file = match fs::File::open(path) {
         Ok(file) => file,
@@ -151,9 +159,6 @@ pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> 
             return if absent { Ok(()) } else { Err(error).with_context(what) };
         }
     };
-    if path.is_dir() {
-        bail!("cannot write {}: it is a folder", path.display());
-    }
     file.take(HEAD).read_to_end(&mut head)?;
     let head = String::from_utf8_lossy(&head);
     if head.contains(identity) || design_in_fmu(path).is_some_and(|text| text.contains(identity)) {
@@ -172,6 +177,20 @@ fn design_in_fmu(path: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn a_pipe_or_a_device_is_not_replaced_by_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("socket");
+        let _socket = std::os::unix::net::UnixListener::bind(&path).unwrap();
+        let staged = Outputs::default().stage(&path, |path| fs::write(path, "new"));
+        for error in [staged.unwrap_err(), check_identity(&path, "design").unwrap_err()] {
+            assert!(error.to_string().contains("it is a pipe or a device"), "{error}");
+        }
+        assert!(files::whole::write(&path, b"new").is_err());
+        assert!(is_stream(&path) && fs::read_dir(folder.path()).unwrap().count() == 1);
+    }
 
     #[test]
     fn the_second_name_that_a_killed_process_left_neither_empties_nor_replaces_a_file() {

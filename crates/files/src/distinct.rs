@@ -48,7 +48,7 @@ pub fn check_distinct(
 }
 
 /// Whether the path leads to a pipe or a device; false if nothing is there.
-fn is_stream(path: &Path) -> bool {
+pub(crate) fn is_stream(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io, process};
 
+use crate::distinct::is_stream;
+
 /// A written file under a temporary name. [`Pending::commit`] gives it its final name; dropping it without
 /// that removes the file.
 pub struct Pending {
@@ -43,11 +45,11 @@ impl Drop for Pending {
 }
 
 /// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed.
-/// Creates the folder if it is missing.
+/// Creates the folder if it is missing. A pipe or a device gets the bytes itself.
 ///
 /// # Errors
 ///
 /// [`io::Error`] if the folder or a file cannot be created, written or renamed.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    Pending::new(path, bytes)?.commit()
+    if is_stream(path) { fs::write(path, bytes) } else { Pending::new(path, bytes)?.commit() }
 }
