@@ -34,6 +34,7 @@ pub(crate) struct Options {
     /// Writes --out [default: NAME.toml], with the bandwidths that were chosen for the plant.
     #[arg(long)]
     #[arg(conflicts_with_all = ["report", "fmu", "kalman_fmu", "feedback_fmu", "worst_case", "json", "code", "compare"])]
+    #[arg(conflicts_with = "certificate_time")]
     init: bool,
     /// Further logs of the same plant, with --init
     #[arg(requires = "init", value_name = "LOG")]
@@ -120,7 +121,7 @@ pub(crate) struct Options {
     ///
     /// Writes one page, NAME-comparison.html or --report, and no design.
     #[arg(long, conflicts_with_all = ["out", "fmu", "kalman_fmu", "feedback_fmu", "worst_case", "c_code", "no_std"])]
-    #[arg(help_heading = "Computation")]
+    #[arg(conflicts_with_all = ["certificate_time", "gain_time"], help_heading = "Computation")]
     compare: bool,
     /// Time for proofs in s
     ///

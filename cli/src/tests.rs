@@ -80,3 +80,21 @@ fn the_reference_lists_each_verb() {
         assert!(page.contains(&format!("| `{name}` |")), "{name}");
     }
 }
+
+#[test]
+fn a_time_limit_that_would_have_no_effect_is_refused() {
+    let is_accepted = |more: &[&str]| {
+        let words = ["aso-ftc", "design", "plant.toml"].into_iter().chain(more.iter().copied());
+        Arguments::try_parse_from(words).is_ok()
+    };
+    for more in [&["--compare"][..], &["--init"], &["--init", "--gain-time=9"]] {
+        assert!(is_accepted(more), "{more:?}");
+    }
+    for (form, limit) in [
+        ("--compare", "--gain-time=9"),
+        ("--compare", "--certificate-time=9"),
+        ("--init", "--certificate-time=9"),
+    ] {
+        assert!(!is_accepted(&[form, limit]), "{form} {limit}");
+    }
+}
