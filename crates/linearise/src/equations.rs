@@ -8,7 +8,7 @@ use super::parts::{Part, Parts, State};
 use super::point::{NAME, all_settable, finite, initialise, nominals, row_name, settle};
 use super::{Linearise, LineariseError, directional};
 
-/// Relative steps of two-sided differences: the cube root of the machine epsilon.
+/// Relative steps of differences: the cube root of the machine epsilon, which is the best one of two-sided differences.
 const DIFFERENCE: f64 = 6e-6;
 
 /// The equations x' = f(t, x, u), y = h(t, x, u) of an FMU for model exchange.
@@ -37,6 +37,8 @@ pub struct PlantEquations {
     known_rows: Vec<(usize, usize)>,
     /// The typical sizes of `knowns`.
     scales: Vec<f64>,
+    /// The `min` and `max` of `knowns`.
+    limits: Vec<[f64; 2]>,
     has_directional_derivatives: bool,
     /// Whether the FMU can save its state, so that each trajectory starts from the state after initialisation.
     can_restore: bool,
@@ -116,6 +118,8 @@ impl PlantEquations {
             _ => state.part.scale(*x),
         });
         let scales = of_states.chain(parts.inputs.iter().map(|part| part.scale(0.0))).collect();
+        let known_parts = states.iter().map(|state| &state.part).chain(&parts.inputs);
+        let limits = known_parts.map(|part| [part.min, part.max]).collect();
         let indicators = vec![0.0; component.number_of_event_indicators()?];
         let count = states.len() + parts.outputs.len();
         let names = Names {
@@ -137,6 +141,7 @@ impl PlantEquations {
             unknown_rows,
             knowns,
             scales,
+            limits,
             has_directional_derivatives,
             can_restore,
             indicators: [indicators.clone(), indicators],
@@ -305,12 +310,12 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `column` to two-sided difference quotients by the known at `at`.
+    /// Sets `column` to difference quotients by the known at `at`, one-sided at its `min` or `max`.
     fn differences_by(&mut self, at: usize, x: &[f64], u: &[f64]) -> Result<(), LineariseError> {
         let n = x.len();
         let value = *x.get(at).unwrap_or_else(|| &u[at - n]);
         let step = DIFFERENCE * self.scales[at].max(value.abs());
-        let [low, high] = [value - step, value + step];
+        let [low, high] = ends(value, step, self.limits[at]);
         for (side, value) in [low, high].into_iter().enumerate() {
             self.change(at, n, value, x)?;
             let (rates, y) = self.values[side].split_at_mut(n);
@@ -338,6 +343,15 @@ impl PlantEquations {
         self.component.set_continuous_states(states)?;
         Ok(())
     }
+}
+
+/// Returns the ends of a difference quotient: `step` below and above `value`, or `value` itself on the side on which
+/// only the end is beyond its limit.
+fn ends(value: f64, step: f64, [min, max]: [f64; 2]) -> [f64; 2] {
+    let low = if value - step < min && value >= min { value } else { value - step };
+    let high = if value + step > max && value <= max { value } else { value + step };
+    // Without room on either side, the FMU decides.
+    if low < high { [low, high] } else { [value - step, value + step] }
 }
 
 /// Checks that all values are finite.

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use fmu_description::package::{Package, Unpacked};
 use fmu_import::{Fmu, Interface};
 use linearise::{Disagreement, Method};
-use linearise::{Linearisation, Linearise, LineariseError, linearise};
+use linearise::{Linearisation, Linearise, LineariseError, PlantEquations, linearise};
 use nalgebra::DMatrix;
 use tests::{dist, root, run};
 
@@ -242,6 +242,23 @@ fn a_fault_at_the_limit_of_its_range_is_perturbed_to_one_side_only() {
     let actual = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
     expect_close(&actual, &expected, 1e-5);
     expect_within_errors(&actual, &expected);
+}
+
+/// The leak is at its min, 0, below which the FMU refuses values; then the valve is at its max, 1, where
+/// level' = (1 - sqrt(level)) / 2.
+#[test]
+fn equations_at_the_limit_of_an_input_have_the_derivatives_by_hand() {
+    let (request, mut expected) = tank();
+    let fmu = changed("DrainedTank.fmu", without_derivatives);
+    let mut equations = PlantEquations::new(&fmu, &request).unwrap();
+    let mut jacobian = DMatrix::zeros(4, 5);
+    for (valve, by_level) in [(0.5, [-0.0625, 0.125]), (1.0, [-0.125, 0.25])] {
+        let (mut x, u) = ([4.0, 1.0], [1.0, valve, 0.0]);
+        equations.begin(0.0, &mut x, &u).unwrap();
+        equations.jacobian(0.0, &x, &u, &mut jacobian).unwrap();
+        [expected[(0, 0)], expected[(3, 0)]] = by_level;
+        assert!((&jacobian - &expected).amax() < 1e-8, "{jacobian}");
+    }
 }
 
 #[test]
