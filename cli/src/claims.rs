@@ -132,7 +132,8 @@ pub(crate) struct Claim {
     pub(crate) paper: &'static str,
     pub(crate) measured: f64,
     pub(crate) unit: &'static str,
-    /// `None` if the run ended too early to judge the claim; false if it failed or the pendulum fell before.
+    /// `None` if the part of the run that the claim is about is too short to judge it, or absent; false if the run
+    /// failed or the pendulum fell before.
     pub(crate) holds: Option<bool>,
 }
 
@@ -165,7 +166,8 @@ impl Measurement {
     /// Evaluates the claims. `end` is the time reached in s; `lost` is true if the run failed or an FMU ended it.
     pub(crate) fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
         let Self { before, after, .. } = self;
-        let is_whole = before.count > 0.0 && end >= before.to;
+        let is_measured = before.count > 1.0;
+        let is_whole = is_measured && end >= before.to;
         let settled = after.count > 1.0;
         let lost = lost || self.fell.is_some();
         let early = |statement: &str, paper, measured, unit, holds: bool| Claim {
@@ -184,7 +186,7 @@ impl Measurement {
         };
         let (cart, angle) = (before.x_p.amplitude(), before.theta.amplitude());
         let (rest, rest_angle) = (after.x_p.amplitude(), after.theta.amplitude());
-        let slides = f64::from(before.slides);
+        let slides = if is_measured { f64::from(before.slides) } else { f64::NAN };
         let (rms, spike) = (after.rms(), if settled { after.largest } else { f64::NAN });
         vec![
             early("limit cycle of the cart", "a limit cycle", cart, "m", cart > 0.01),
@@ -211,7 +213,7 @@ pub(crate) fn table(claims: &[Claim]) -> String {
         let holds = match claim.holds {
             Some(true) => "yes",
             Some(false) => "NO",
-            None => "not judged: the run ended before",
+            None => "not judged: too short",
         };
         let measured = if claim.measured.is_finite() {
             format!("{} {}", rounded(claim.measured, 4), claim.unit)

@@ -89,3 +89,15 @@ fn a_run_that_is_lost_or_falls_breaks_the_claims_after_the_activation() {
     samples[50_000].1[1] = 1.6;
     assert_eq!(verdicts(&samples, false), [YES, YES, YES, NO, NO, NO, NO]);
 }
+
+/// With a compensation from 0 s on there is no time before it.
+#[test]
+fn a_part_of_the_run_without_two_samples_is_not_judged() {
+    let mut measurement = Measurement::new(0.0, false);
+    for (time, values) in run(0.9e-3, 1.9e-3, 1.0, 0.001) {
+        measurement.add(time, values);
+    }
+    let claims = measurement.claims(100.0, false);
+    assert!(claims[..3].iter().all(|claim| claim.holds.is_none()), "{claims:?}");
+    assert!(claims[2].measured.is_nan() && claims[3].holds.is_some(), "{claims:?}");
+}
