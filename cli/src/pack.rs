@@ -202,10 +202,10 @@ fn file_stem(description: &ModelDescription) -> String {
 fn pack_crates(folders: &[PathBuf], packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
     let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
     let libraries = library::build(folders, packing.locked, &others)?;
-    let mut fmus = Vec::new();
+    let mut fmus: Vec<PackedFmu> = Vec::new();
     for (folder, library) in folders.iter().zip(&libraries) {
         for &version in packing.versions.list() {
-            let fmu = pack_version(folder, packing, library, version)
+            let fmu = pack_version(folder, packing, library, version, &fmus)
                 .with_context(|| format!("cannot pack {}", folder.display()))?;
             fmus.push(fmu);
         }
@@ -213,15 +213,22 @@ fn pack_crates(folders: &[PathBuf], packing: &PackOptions<'_>) -> anyhow::Result
     Ok(fmus)
 }
 
+/// Packs a crate for a version of FMI. It is an error if one of the FMUs `before` has the same path.
 fn pack_version(
     folder: &Path,
     packing: &PackOptions<'_>,
     library: &library::Library,
     version: Version,
+    before: &[PackedFmu],
 ) -> anyhow::Result<PackedFmu> {
     let resources = folder.join("resources");
     let (xml, description) =
         fmu_import::described_as(&library.file, &resources, &library.package.name, version)?;
+    let path = packing.out.join(format!("{}.fmu", file_stem(&description)));
+    if before.iter().any(|fmu| fmu.path == path) {
+        let path = path.display();
+        bail!("{path} is the FMU of another of these crates; --out names another folder");
+    }
     let mut package = Package::new(xml).for_version(version);
     let libraries = match packing.binaries {
         Some(folder) => binaries::collect(folder, &description)?,
@@ -243,7 +250,6 @@ fn pack_version(
         add_terminals(&mut package, folder, &description)?;
     }
     licenses::add(&mut package, library)?;
-    let path = packing.out.join(format!("{}.fmu", file_stem(&description)));
     package.write(&path)?;
     #[cfg(feature = "sbom")]
     if packing.sbom {

@@ -204,6 +204,16 @@ fn states_the_terminals_of_the_author(folder: &Path) {
 }
 
 #[test]
+fn two_crates_with_a_model_of_one_name_do_not_write_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let table = "examples/lookup-table";
+    let output = tests::run(&["pack", table, table, "--out", &out]);
+    assert_eq!(output.status.code(), Some(2), "{}", message(&output));
+    assert!(message(&output).contains("LookupTable.fmu is the FMU of another of these crates"));
+}
+
+#[test]
 fn another_table_gives_the_same_library_other_variables() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().display().to_string();
