@@ -78,10 +78,15 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     write(&out, &page.html)
 }
 
-/// Prints the largest difference relative to the range, or that there is none, and what was not compared.
+/// Prints the largest difference relative to the range, that there is none, or that the runs have no time in common;
+/// and what was not compared.
 fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
-    if let Some(largest) = comparison.differences.first().filter(|_| !comparison.is_equal()) {
+    if comparison.rows == 0 {
+        println!("nothing was compared with {there}: the two runs have no time in common");
+    } else if let Some(largest) =
+        comparison.differences.first().filter(|_| !comparison.is_equal())
+    {
         println!(
             "largest difference to {there}, relative to the range: {}, {:.6e} at t = {} s ({:.3e} of the range)",
             largest.name,

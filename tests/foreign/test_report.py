@@ -216,6 +216,13 @@ def test_what_is_not_compared_is_named_on_the_terminal(aso_ftc, write):
     assert "not compared: texts: mode" in said and said.count("not compared") == 1
 
 
+def test_runs_without_a_common_time_are_not_said_to_be_equal(aso_ftc, write):
+    results = pd.DataFrame({"time": [0.0, 1.0], "x": [0.0, 1.0]})
+    _, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", results + 5))
+    assert "nothing was compared with" in said and "no difference" not in said
+    assert "not compared: 2 rows of" in said
+
+
 def test_times_that_decrease_are_an_error_with_the_line(aso_ftc, tmp_path):
     file = tmp_path / "own.csv"
     file.write_text("time,a\n0,1\n2,2\n1,3\n3,4\n", encoding="utf-8")
