@@ -28,13 +28,17 @@ pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
     let others = [beside(), built_in().map(|root| root.join(DIST))].into_iter().flatten();
     let others = others.map(|folder| folder.join(name));
     let mut paths = std::iter::once(packed.clone()).chain(others);
-    paths.find(|path| path.is_file()).with_context(|| {
-        let packed = packed.display();
-        let which = if name == FILTER { " fmu-kalman" } else { "" };
-        format!(
-            "there is no {packed}: name another FMU, or write this one by `aso-ftc pack{which}`"
-        )
-    })
+    paths.find(|path| path.is_file()).with_context(|| missing(&packed))
+}
+
+/// Returns the sentence for an FMU that is not packed. No option names another Kalman filter.
+fn missing(packed: &Path) -> String {
+    let advice = if packed.ends_with(FILTER) {
+        "write it by `aso-ftc pack fmu-kalman` in a clone"
+    } else {
+        "name another FMU, or write this one by `aso-ftc pack`"
+    };
+    format!("there is no {}: {advice}", packed.display())
 }
 
 /// Returns the clone of this project that the current folder is in or, failing that, the one that the
@@ -78,4 +82,16 @@ pub(crate) fn beside() -> Option<PathBuf> {
     let parent = command.parent()?;
     let has_fmus = |folder: &PathBuf| FMUS.iter().all(|(_, name)| folder.join(name).is_file());
     BESIDE.map(|folder| parent.join(folder)).into_iter().find(has_fmus)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_fmu_is_proposed_only_where_an_option_names_it() {
+        let of = |name: &str| missing(&Path::new(DIST).join(name));
+        assert!(of(FMUS[0].1).contains("name another FMU, or write this one by `aso-ftc pack`"));
+        assert!(of(FILTER).ends_with(": write it by `aso-ftc pack fmu-kalman` in a clone"));
+    }
 }
