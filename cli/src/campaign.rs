@@ -25,9 +25,11 @@ pub(crate) struct Options {
     ///
     /// It is for `aso-ftc run`.
     #[arg(long, value_name = "RUN", help_heading = "Results")]
+    #[arg(conflicts_with_all = ["report", "out", "workers", "scheduler", "live", "check"])]
     show: Option<u64>,
     /// Only write the page of the results
     #[arg(long, value_name = "FILE", help_heading = "Results")]
+    #[arg(conflicts_with_all = ["out", "workers", "scheduler", "live", "check"])]
     report: Option<PathBuf>,
     /// Number of local processes [default: all processors]
     #[arg(long, value_name = "N", help_heading = "Runs")]

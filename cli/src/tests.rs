@@ -98,3 +98,18 @@ fn a_time_limit_that_would_have_no_effect_is_refused() {
         assert!(!is_accepted(&[form, limit]), "{form} {limit}");
     }
 }
+
+#[test]
+fn a_campaign_that_only_shows_its_results_takes_no_option_of_runs() {
+    let is_accepted = |more: &str| {
+        let words = ["aso-ftc", "campaign", "results/a"].into_iter().chain(more.split(' '));
+        Arguments::try_parse_from(words).is_ok()
+    };
+    for form in ["--show=3", "--report=a.html"] {
+        assert!(is_accepted(form), "{form}");
+        for other in ["--out=b", "--workers=2", "--scheduler=c", "--live", "--check"] {
+            assert!(is_accepted(other) && !is_accepted(&format!("{form} {other}")), "{other}");
+        }
+    }
+    assert!(!is_accepted("--show=3 --report=a.html"));
+}
