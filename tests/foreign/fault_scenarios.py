@@ -32,7 +32,7 @@ VARYING = re.compile(
 )
 TEMPORARY = re.compile(r"^\.(?=.*\.tmp$)|\.\d+\.(partial|old|tmp)")
 # The first bytes of a checkpoint; a checksum and the content, with absolute paths, follow.
-CHECKPOINT = b"aso-ftc-state-5\n"
+CHECKPOINT = b"aso-ftc-state-6\n"
 SUMMED = len(CHECKPOINT) + 4
 
 # Answers a call of cargo or rustc from the files of an earlier call with the same arguments.

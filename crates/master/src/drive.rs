@@ -385,6 +385,14 @@ impl Drives {
         self.all.iter().map(state).collect()
     }
 
+    /// Whether the drives have the same faults as those in `state`; their memories may differ.
+    pub(crate) fn has_faults_of(&self, state: &[DriveState]) -> bool {
+        self.all.iter().zip(state).all(|(drive, saved)| match (&drive.faults, &saved.faults) {
+            (Some(faults), Some(saved)) => faults.has_faults_of(saved),
+            (faults, saved) => faults.is_none() && saved.is_none(),
+        })
+    }
+
     /// Restores the state of a checkpoint, at a communication point.
     ///
     /// # Errors

@@ -229,6 +229,12 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
+    /// Whether both have the same faults in the same windows; their memories may differ.
+    pub(crate) fn has_faults_of(&self, other: &Self) -> bool {
+        let mut pairs = self.stages.iter().zip(&other.stages);
+        self.len() == other.len() && pairs.all(|(stage, other)| stage.is_same_fault(other))
+    }
+
     /// Takes over the memory of the faults of `earlier`; returns false, and changes nothing, if they are
     /// not the first faults of this chain.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{self, Config, Every};
 
 /// Magic bytes of this version of the format; a CRC-32 of the rest (four bytes) follows.
-const MAGIC: &[u8; 16] = b"aso-ftc-state-5\n";
+const MAGIC: &[u8; 16] = b"aso-ftc-state-6\n";
 /// Magic bytes common to all versions of the format.
 const KIND: &[u8] = b"aso-ftc-state-";
 /// Number of bytes of the magic bytes and the checksum.

@@ -14,7 +14,7 @@ use crate::error::{SystemError, call, contradiction};
 use crate::exchange::Values;
 use crate::fault::FaultChain;
 use crate::step_control::Controller;
-use crate::system::System;
+use crate::system::{Connection, System};
 use slave::Slave;
 
 pub(super) use origin::Origin;
@@ -26,6 +26,8 @@ const FIRST_SLOT: usize = 3;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     origin: Origin,
+    /// The names of everything to which the state of the master belongs, see [`Simulation::parts`].
+    parts: Vec<String>,
     time: f64,
     /// The latest end in s of a step that was attempted.
     attempted: f64,
@@ -143,6 +145,7 @@ impl Simulation {
         self.engine.exchange.save(&mut values);
         Ok(Checkpoint {
             origin: self.origin.clone(),
+            parts: self.parts(),
             time,
             attempted: self.attempted,
             count: self.engine.grid.count,
@@ -218,7 +221,25 @@ impl Simulation {
         Ok(())
     }
 
-    /// Returns an error if slaves, connections or the number of faults differ from the checkpoint.
+    /// Names everything to which the state of the master belongs, in the order of the state: connections, faults on
+    /// connections, driven variables.
+    fn parts(&self) -> Vec<String> {
+        let (system, exchange) = (&self.engine.system, &self.engine.exchange);
+        let connections = system.connections.iter().map(|connection| {
+            let [from, to] = [connection.from, connection.to].map(|port| system.name(port));
+            format!("the connection of {from} to {to}")
+        });
+        let is_faulty = |connection: &&Connection| {
+            exchange.is_faulty() && exchange.fault(connection.to).is_some()
+        };
+        let faults = system.connections.iter().filter(is_faulty);
+        let faults = faults.map(|connection| format!("a fault of {}", system.name(connection.to)));
+        let drives = self.engine.drives.iter().map(|drive| system.name(drive.port()));
+        let drives = drives.map(|name| format!("the driven variable {name}"));
+        connections.chain(faults).chain(drives).collect()
+    }
+
+    /// Returns an error if slaves, connections, faults or driven variables differ from the checkpoint.
     fn expect_same_system(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         let slaves = self.engine.system.slaves.iter();
         let present = slaves.map(|(name, slave)| [name, &slave.description().guid]);
@@ -231,15 +252,27 @@ impl Simulation {
                 present.map(list).collect::<Vec<_>>().join(", ")
             )));
         }
+        let (present, saved) = (self.parts(), &checkpoint.parts);
+        let mut positions = 0..present.len().max(saved.len());
+        if let Some(position) = positions.find(|&k| present.get(k) != saved.get(k)) {
+            let [saved, present] = [saved, &present]
+                .map(|parts| parts.get(position).map_or("nothing", String::as_str));
+            return Err(contradiction(format!(
+                "the checkpoint has {saved} in place of {present}, expected the same connections, faults and driven \
+                 variables in the same order"
+            )));
+        }
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
-        let same = values.has_shape_of(&checkpoint.values)
-            && self.engine.exchange.faults().count() == checkpoint.faults.len();
+        let mut faults = self.engine.exchange.faults().zip(&checkpoint.faults);
+        let same = faults.all(|(fault, saved)| fault.has_faults_of(saved))
+            && self.engine.drives.has_faults_of(&checkpoint.drives)
+            && values.has_shape_of(&checkpoint.values);
         if same {
             return Ok(());
         }
         Err(contradiction(
-            "the checkpoint was taken with other connections or faults on connections, expected the same ones",
+            "the checkpoint was taken with other faults or signal types of connections, expected the same ones",
         ))
     }
 }

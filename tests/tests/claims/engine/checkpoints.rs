@@ -8,7 +8,7 @@ use master::{
     Algorithm, Checkpoint, Coupling, Extrapolation, Method, Simulation, StepControl, System,
 };
 use study::scenario::{Scenario, Setup};
-use tests::linear::{ABLE, Abilities};
+use tests::linear::{ABLE, Abilities, Block};
 use tests::network::Network;
 use tests::problems;
 
@@ -151,6 +151,59 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
     // Settings that do not affect the state may differ.
     assert_eq!(resume(&Algorithm { jobs: 2, ..base() }, &until(2.0)), None);
+}
+
+/// Returns the error of a run of the second input and scenario that is resumed from a checkpoint of the first ones. The
+/// inputs of `a` have the numbers 0 to 2; the one given is connected to `b.y0`.
+fn resumed(first: (usize, &str), second: (usize, &str)) -> Option<String> {
+    let algorithm = Algorithm::new(0.25);
+    let new = |(input, text): (usize, &str)| {
+        let receiver = Block::new(&[&[0.0]], &[&[1.0; 3]], &[&[1.0]], &[&[0.0; 3]], &[0.0]);
+        let sender = Block::new(&[&[0.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[1.0]);
+        let links = vec![((1, 0), (0, input))];
+        let network = Network { blocks: vec![receiver, sender], links };
+        let system = network.system(ABLE, &Arc::default());
+        let scenario = prepared(text, &system);
+        (system, scenario)
+    };
+    let (system, scenario) = new(first);
+    let mut run = Simulation::with_scenario(system, &algorithm, &until(1.0), scenario).unwrap();
+    run.step().unwrap();
+    let checkpoint = run.checkpoint().unwrap();
+    let (system, scenario) = new(second);
+    let run = Simulation::resume(system, &algorithm, &until(1.0), scenario, &checkpoint);
+    run.err().map(|error| error.to_string())
+}
+
+#[test]
+fn a_checkpoint_of_other_connections_faults_or_driven_variables_is_refused_by_name() {
+    let of = |saved: &str, present: &str| {
+        let rule = "the same connections, faults and driven variables in the same order";
+        Some(format!("the checkpoint has {saved} in place of {present}, expected {rule}"))
+    };
+    let signal = |input: &str| {
+        format!("[[scenario.signal]]\nvariable = \"a.{input}\"\nconstant = 1\n")
+    };
+    let (one, two) = (signal("u1"), signal("u2"));
+    let expected = of("the driven variable a.u1", "the driven variable a.u2");
+    assert_eq!(resumed((0, &one), (0, &two)), expected);
+    let both = format!("{one}{two}");
+    assert_eq!(resumed((0, &both), (0, &one)), of("the driven variable a.u2", "nothing"));
+    let expected = of("the connection of b.y0 to a.u0", "the connection of b.y0 to a.u1");
+    assert_eq!(resumed((0, ""), (1, "")), expected);
+    let fault = |input: &str, kind: &str| {
+        format!("[[scenario.fault]]\nconnection = \"a.{input}\"\n{kind}\n")
+    };
+    let bias = fault("u0", "bias = { value = 1 }");
+    assert_eq!(resumed((0, &bias), (0, "")), of("a fault of a.u0", "nothing"));
+    let other = "the checkpoint was taken with other faults or signal types of connections, expected the same ones";
+    let larger = fault("u0", "bias = { value = 2 }");
+    assert_eq!(resumed((0, &bias), (0, &larger)), Some(other.to_owned()));
+    let [stuck, gain] = ["stuck = {}", "gain = { factor = 2 }"]
+        .map(|kind| format!("{one}{}", fault("u1", kind)));
+    assert_eq!(resumed((0, &stuck), (0, &gain)), Some(other.to_owned()));
+    // The signal itself may have another future.
+    assert_eq!(resumed((0, &one), (0, &one.replace("= 1", "= 2"))), None);
 }
 
 #[test]

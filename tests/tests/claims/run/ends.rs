@@ -161,7 +161,7 @@ fn bad_checkpoints_are_refused() {
     let refused = "resume: the checkpoint was taken with step 0.001 s; --step 0.002 s is not";
     fails(&bench.run(&other), 2, &[refused]);
     fs::write(bench.path("old"), b"aso-ftc-state-1\nof former times").unwrap();
-    let parts = ["old: found a checkpoint of format 1, expected format 5", "from its start"];
+    let parts = ["old: found a checkpoint of format 1, expected format 6", "from its start"];
     fails(&bench.run(&["--resume", "old"]), 2, &parts);
     let setting = ["--resume", "state", "--set", "plant.F_c=20"];
     fails(&bench.run(&setting), 2, &["--set", "--resume", "cannot be used with"]);
