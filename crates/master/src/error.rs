@@ -238,7 +238,7 @@ pub enum SystemError {
     #[error("the checkpoint was taken with {name} {saved}; {name} {requested} is not possible")]
     Resume {
         /// Name of the setting.
-        name: &'static str,
+        name: String,
         /// Its value in the run of the checkpoint.
         saved: String,
         /// Its value now.

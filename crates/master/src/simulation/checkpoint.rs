@@ -176,7 +176,7 @@ impl Simulation {
         checkpoint: &Checkpoint,
     ) -> Result<Self, SystemError> {
         let origin = &checkpoint.origin;
-        origin.expect(&system, algorithm, experiment)?;
+        origin.expect(&Origin::new(&system, algorithm, experiment))?;
         let first_experiment = Experiment { stop_time: origin.stop_time, ..*experiment };
         let stop = experiment.stop_time;
         let mut simulation = Self::start(system, algorithm, &first_experiment, stop, scenario)?;
@@ -189,8 +189,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if slaves, connections, faults or driven variables differ from the checkpoint, or
-    /// if an FMU refuses its state.
+    /// Returns an error if slaves, connections, faults, driven variables, start time or algorithm differ from
+    /// the checkpoint, or if an FMU refuses its state.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         self.expect_same_system(checkpoint)?;
         let states = checkpoint.slaves.iter();
@@ -239,8 +239,10 @@ impl Simulation {
         connections.chain(faults).chain(drives).collect()
     }
 
-    /// Returns an error if slaves, connections, faults or driven variables differ from the checkpoint.
+    /// Returns an error if slaves, connections, faults, driven variables, start time or algorithm differ from the
+    /// checkpoint.
     fn expect_same_system(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
+        checkpoint.origin.expect(&self.origin)?;
         let slaves = self.engine.system.slaves.iter();
         let present = slaves.map(|(name, slave)| [name, &slave.description().guid]);
         let saved = checkpoint.slaves.iter().map(|(name, guid, _)| [name, guid]);

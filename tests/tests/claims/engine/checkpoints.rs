@@ -149,6 +149,10 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     let later = fmu_description::Experiment { start_time: 0.5, ..until(1.0) };
     let message = resume(&base(), &later).unwrap();
     assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
+    let mut other =
+        Simulation::new(system(), &Algorithm { step: 0.02, ..base() }, &until(1.0)).unwrap();
+    let message = other.restore(&checkpoint).unwrap_err().to_string();
+    assert!(message.ends_with("step 0.01 s; step 0.02 s is not possible"), "{message}");
     // Settings that do not affect the state may differ.
     assert_eq!(resume(&Algorithm { jobs: 2, ..base() }, &until(2.0)), None);
 }

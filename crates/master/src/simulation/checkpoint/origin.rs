@@ -29,17 +29,14 @@ impl Origin {
         }
     }
 
-    /// Returns an error if a setting differs. Settings that the checkpoint does not have are not compared.
-    pub(in crate::simulation) fn expect(
-        &self,
-        system: &System,
-        algorithm: &Algorithm,
-        experiment: &Experiment,
-    ) -> Result<(), SystemError> {
-        for (name, requested) in settings(system, algorithm, experiment) {
+    /// Returns an error if a setting of a `requested` run differs. Settings that the checkpoint does not have are not
+    /// compared.
+    pub(in crate::simulation) fn expect(&self, requested: &Self) -> Result<(), SystemError> {
+        for (name, requested) in &requested.settings {
             let known = self.settings.iter().find(|(known, _)| known == name);
-            if let Some((_, saved)) = known.filter(|(_, saved)| *saved != requested) {
-                return Err(SystemError::Resume { name, saved: saved.clone(), requested });
+            if let Some((_, saved)) = known.filter(|(_, saved)| saved != requested) {
+                let [name, saved, requested] = [name, saved, requested].map(String::clone);
+                return Err(SystemError::Resume { name, saved, requested });
             }
         }
         Ok(())
