@@ -163,8 +163,8 @@ impl System {
     ///
     /// Returns an error if the variable does not exist, if the standard allows nobody to set it, if `text`
     /// is not a value of its type, if the number of values is neither 1 nor the number of elements, for an
-    /// array of Strings, or if the FMU refuses a structural parameter or loses a connected or set element
-    /// by it.
+    /// array of Strings, if a structural parameter is neither an integer nor a Boolean, or if the FMU refuses it or
+    /// loses a connected or set element by it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
         let elements = match self.named(name)? {
             Named::One(port) => return self.set_port(port, text),
@@ -201,8 +201,8 @@ impl System {
         port.is_ok_and(|port| self.variable(port).causality == Causality::StructuralParameter)
     }
 
-    /// Sets a structural parameter now. Arrays of the slave change their sizes; ports move with their
-    /// names.
+    /// Sets a structural parameter now; an error if it is neither an integer nor a Boolean. Arrays of the slave change
+    /// their sizes; ports move with their names.
     pub(super) fn configure(
         &mut self,
         port: Port,
@@ -212,7 +212,13 @@ impl System {
         let number = match value {
             Value::Integer(value) => *value,
             Value::Boolean(value) => i64::from(*value),
-            _ => 0,
+            _ => {
+                return Err(SystemError::Role {
+                    name: self.name(port),
+                    actual: format!("a structural parameter of type {}", self.type_name(port)),
+                    expected: "an integer or a Boolean, as no other one can be set".to_owned(),
+                });
+            }
         };
         let name = self.name(port);
         let description = self.slaves[port.slave].1.description();

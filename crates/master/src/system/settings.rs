@@ -25,7 +25,8 @@ impl System {
     /// # Errors
     ///
     /// Returns an error if `text` is not a value of the variable's type, if the standard allows nobody to
-    /// set the variable, or if the FMU refuses the value of a structural parameter.
+    /// set the variable, or if a structural parameter is neither an integer nor a Boolean or the FMU refuses
+    /// its value.
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
         let value = self.value(port, text)?;
         self.set_port_value(port, value, text)
@@ -35,8 +36,8 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Returns an error if the standard allows nobody to set the variable, or if the FMU refuses the value of
-    /// a structural parameter.
+    /// Returns an error if the standard allows nobody to set the variable, or if a structural parameter is
+    /// neither an integer nor a Boolean or the FMU refuses its value.
     pub fn set_port_value(
         &mut self,
         port: Port,

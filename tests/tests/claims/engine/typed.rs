@@ -39,6 +39,18 @@ fn boxed() -> Box<Typed> {
     Box::new(Typed { description, real: 1.0, integer: 1, boolean: 1, text })
 }
 
+/// The same slave with these variables of FMI 3.0.
+fn of_fmi_3(variables: &str) -> Box<Typed> {
+    let xml = format!(
+        r#"<fmiModelDescription fmiVersion="3.0" modelName="Typed" instantiationToken="typed">
+        <CoSimulation modelIdentifier="T"/><ModelVariables>{variables}</ModelVariables><ModelStructure/>
+        </fmiModelDescription>"#
+    );
+    let mut slave = boxed();
+    slave.description = ModelDescription::parse(&xml).unwrap();
+    slave
+}
+
 /// Three of these slaves in a circle, with each type connected.
 pub(crate) fn ring() -> System {
     let mut system = System::default();
@@ -58,6 +70,17 @@ fn a_name_in_use_is_refused_and_keeps_its_slave() {
     let mut system = ring();
     assert!(system.add("a", boxed()).is_err());
     assert_eq!((system.slave("a").unwrap(), system.slaves.len()), (0, 3));
+}
+
+#[test]
+fn a_structural_parameter_that_is_a_real_is_refused_and_not_set_to_zero() {
+    let mut system = System::default();
+    let variables = r#"<Float64 name="scale" valueReference="0" causality="structuralParameter" start="1"/>"#;
+    system.add("a", of_fmi_3(variables)).unwrap();
+    let message = system.set("a.scale", "2.5").unwrap_err().to_string();
+    let expected = "a.scale is a structural parameter of type Float64, expected an integer or a Boolean, \
+                    as no other one can be set";
+    assert_eq!(message, expected);
 }
 
 impl Slave for Typed {
