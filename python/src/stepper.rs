@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use master::Checkpoint;
+use master::signal::reached;
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt as _;
@@ -124,9 +125,7 @@ impl Stepper {
         if time.is_nan() {
             return Err(PyValueError::new_err("time is nan, expected a number"));
         }
-        // A time counts as reached when it differs by rounding only.
-        let end = time - 1e-9 * time.abs().max(1e-9);
-        self.advance(py, |_, reached| reached >= end)
+        self.advance(py, |_, now| reached(now, time))
     }
 
     /// Reads variables by name.

@@ -31,6 +31,23 @@ def test_several_steps_and_a_time_are_reached(paper):
         assert "plant.x_p" in simulation.names()
 
 
+class Clock:
+    """Its output is the time."""
+
+    outputs = ("t",)
+
+    def step(self, t, dt, inputs):
+        return {"t": t + dt}
+
+
+def test_a_time_in_seconds_since_1970_is_reached_by_its_own_steps():
+    # A relative difference of 1e-9 is 1.7 s there.
+    start = 1.7e9
+    with af.System().add("clock", Clock()).simulation(start_time=start, stop_time=start + 10, step=0.25) as simulation:
+        assert simulation.run_until(start + 1) == 4 and simulation["clock.t"] == start + 1
+        assert simulation.run_until(start + 1.25) == 1
+
+
 ALGORITHMS = [
     {},
     {"method": "jacobi", "extrapolation": "quadratic"},

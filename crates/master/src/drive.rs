@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{SystemError, call, contradiction};
 use crate::fault::FaultChain;
-use crate::signal::{Cursor, Sample, Signal, earliest, near, reached};
+use crate::signal::{Cursor, Sample, Signal, earliest, near, reached, rounding};
 use crate::system::{Port, System};
 use fmu_description::Version;
 use slave::ValueType;
@@ -12,7 +12,7 @@ use slave::ValueType;
 /// Returns a time before `time`, in s, and before all times that are equal to it up to rounding ([`near`]): the start
 /// of a search for breaks at `time`.
 pub(crate) fn just_before(time: f64) -> f64 {
-    time - (1e-8 * time.abs()).max(f64::MIN_POSITIVE)
+    time - (10.0 * rounding(time)).max(f64::MIN_POSITIVE)
 }
 
 /// Signals and faults that act on a system during a run.

@@ -14,8 +14,8 @@ use slave::Value;
 use crate::signal::{Sample, reached};
 use stage::Stage;
 
-/// The time interval in which a fault acts: `from <= t < until`, in s. Times that differ by at most
-/// 1e-9 (relative) are equal.
+/// The time interval in which a fault acts: `from <= t < until`, in s. Times are equal as in
+/// [`crate::signal::reached`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     /// Start time in s.

@@ -10,15 +10,26 @@ use serde::{Deserialize, Serialize};
 
 /// Relative difference below which two times are equal; as in FMPy (Python's `math.isclose`).
 const SAME: f64 = 1e-9;
+/// Largest difference in s of two equal times: seconds since 1970 differ by less than a relative 1e-9.
+const MOST: f64 = 1e-6;
+
+/// Returns the largest difference in s of a time that is equal to `time` up to rounding.
+pub(crate) fn rounding(time: f64) -> f64 {
+    let size = time.abs();
+    (SAME * size).min(MOST).max(4.0 * f64::EPSILON * size)
+}
 
 /// Whether two times are equal up to rounding.
 pub(crate) fn near(one: f64, other: f64) -> bool {
     let difference = (one - other).abs();
-    difference == 0.0 || difference.is_finite() && difference <= SAME * one.abs().max(other.abs())
+    let rounding = rounding(one.abs().max(other.abs()));
+    difference == 0.0 || difference.is_finite() && difference <= rounding
 }
 
-/// Whether `time` is at or after `moment`, up to rounding.
-pub(crate) fn reached(time: f64, moment: f64) -> bool {
+/// Whether `time` is at or after `moment`, both in s. Two times are equal if they differ by at most a relative 1e-9 and
+/// at most 1 us, or by a few units in the last place.
+#[must_use]
+pub fn reached(time: f64, moment: f64) -> bool {
     time >= moment || near(time, moment)
 }
 

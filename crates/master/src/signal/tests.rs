@@ -86,6 +86,25 @@ fn held_values_start_at_their_time() {
     assert_eq!(breaks(&signal, -1.0), [1.0, 3.0]);
 }
 
+/// Such times differ by less than a relative 1e-9.
+#[test]
+fn points_in_seconds_since_1970_are_apart() {
+    let epoch = 1.7e9;
+    let points = [(epoch, 1.0), (epoch + 1.0, 3.0), (epoch + 2.0, 2.0)];
+    let line = track(&points, Interpolation::Line);
+    assert_at(&line, epoch, 1.0, 2.0);
+    assert_at(&line, epoch + 0.5, 2.0, 2.0);
+    assert_at(&line, epoch + 1.5, 2.5, -1.0);
+    assert!(breaks(&line, epoch - 1.0).is_empty());
+    let hold = track(&points, Interpolation::Hold);
+    assert_eq!([0.5, 1.0, 1.5].map(|time| hold.value(epoch + time)), [1.0, 3.0, 3.0]);
+    assert_eq!(breaks(&hold, epoch - 1.0), [epoch + 1.0, epoch + 2.0]);
+    // One unit in the last place is rounding.
+    assert_eq!(hold.value((epoch + 1.0).next_down()), 3.0);
+    let ticks = track(&points, Interpolation::Points);
+    assert_eq!([0.5, 1.0].map(|time| ticks.value(epoch + time)), [0.0, 3.0]);
+}
+
 #[test]
 fn a_single_point_is_a_constant() {
     for between in [Interpolation::Line, Interpolation::Hold] {

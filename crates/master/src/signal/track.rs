@@ -27,7 +27,8 @@ pub enum Interpolation {
 /// * If a time occurs more than once, the signal jumps; its value there is the last one.
 /// * A held value starts at its time.
 /// * The ticks of a clock are points: the value between them is 0.
-/// * Times with a relative difference of at most 1e-9 are equal.
+/// * Times with a relative difference of at most 1e-9 are equal, unless they differ by more than 1 us; FMPy has no such
+///   limit.
 ///
 /// The values equal FMPy's to the last bit. The derivatives at a point differ: FMPy returns the
 /// slope of the line before the point, this crate the slope of the line after it.
