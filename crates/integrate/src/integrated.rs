@@ -246,3 +246,6 @@ fn failed(what: String) -> CallError {
     let failure = Failure::InvalidAnswer(what);
     CallError { function: INTEGRATION, failure, messages: Vec::new() }
 }
+
+#[cfg(test)]
+mod tests;

@@ -146,17 +146,16 @@ impl Stepper {
         if !self.has_slope {
             derivative(time, &self.start, &mut self.slope)?;
         }
+        let least = 16.0 * f64::EPSILON * time.abs().max(f64::MIN_POSITIVE / f64::EPSILON);
         if self.memory.size <= 0.0 {
-            self.memory.size = self.first_size(derivative, time, limit - time)?;
+            self.memory.size = self.first_size(derivative, time, limit - time)?.max(least);
         }
         let (mut rejected, mut linearised, mut cause) = (false, false, None);
         loop {
             let room = limit - time;
             let is_last = self.memory.size * STRETCH >= room;
             let size = if is_last { room } else { self.memory.size };
-            if !is_last
-                && size < 16.0 * f64::EPSILON * time.abs().max(f64::MIN_POSITIVE / f64::EPSILON)
-            {
+            if !is_last && size < least {
                 let (state, is_finite) = self.worst();
                 return Err(StepError::Size { size, state, is_finite, cause });
             }

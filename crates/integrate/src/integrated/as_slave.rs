@@ -3,9 +3,11 @@
 use fmu_description::{Experiment, ModelDescription};
 use slave::{CallError, CallSink, Events, Slave, StepResult};
 
+use super::step::rounding;
 use super::{Integrated, Mode, TOLERANCE, failed};
 
-/// Largest difference between the start of a step and the end of the last one, relative to the step.
+/// Largest difference between the start of a step and the end of the last one, relative to the step. It may also be
+/// rounding, or an event that is later than the end by rounding.
 const GAP: f64 = 1e-6;
 
 impl Integrated {
@@ -162,7 +164,8 @@ impl Slave for Integrated {
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         let last = self.point.time;
-        if !(size >= 0.0 && (time - last).abs() <= GAP * size.max(f64::EPSILON * last.abs())) {
+        let gap = (GAP * size).max(2.0 * rounding(last, size));
+        if !(size >= 0.0 && (time - last).abs() <= gap) {
             return Err(failed(format!(
                 "cannot step from {time} s over {size} s: the last step ended at {last} s"
             )));

@@ -11,6 +11,8 @@ use super::{Integrated, Mode, failed};
 const EVENTS: u32 = 100_000;
 /// Difference of times that counts as rounding, relative to the time and the step.
 const ROUNDING: f64 = 1e-12;
+/// Largest difference in s that counts as rounding: what is integrated over it is lost.
+const MOST: f64 = 1e-6;
 /// Width to which a state event is located, relative to the step of the integrator.
 const WIDTH: f64 = 1e-12;
 
@@ -46,6 +48,11 @@ impl Search {
     }
 }
 
+/// Returns the difference in s that counts as rounding at `time` after a step of `size` s.
+pub(super) fn rounding(time: f64, size: f64) -> f64 {
+    (ROUNDING * size.max(time.abs())).min(MOST).max(4.0 * f64::EPSILON * time.abs())
+}
+
 /// Returns the index of the first event indicator whose sign differs: z > 0 or z <= 0.
 fn changed(before: &[f64], after: &[f64]) -> Option<usize> {
     before.iter().zip(after).position(|(before, after)| (*before > 0.0) != (*after > 0.0))
@@ -60,7 +67,7 @@ impl Integrated {
         never_back: bool,
     ) -> Result<StepResult, CallError> {
         let start = self.point.time;
-        let rounding = ROUNDING * (end - start).max(end.abs());
+        let rounding = rounding(end, end - start);
         self.inputs.prepare();
         self.stepper.forget_slope();
         let mut events = 0;

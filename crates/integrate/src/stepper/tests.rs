@@ -99,3 +99,21 @@ fn a_state_without_a_derivative_ends_the_run_by_its_name() {
     );
     assert!((time - 0.5).abs() < 1e-9, "{time}");
 }
+
+/// The first step of 1e-6 s that is chosen for such states is less than four units in the last place of the time.
+#[test]
+fn states_at_rest_at_zero_are_integrated_in_seconds_since_1970() {
+    let mut stepper = Stepper::new(Method::Automatic, Scale::new(1e-6, 1e-8, vec![1.0]));
+    let mut derivative = |_: f64, _: &[f64], slope: &mut [f64]| {
+        slope[0] = 0.0;
+        Ok(())
+    };
+    let (mut time, end) = (1.7e9, 1.7e9 + 1.0);
+    while time < end {
+        time = match stepper.advance(&mut derivative, &[0.0], time, end) {
+            Ok(reached) => reached,
+            Err(error) => panic!("{error:?}"),
+        };
+    }
+    assert!(stepper.end()[0].abs() < 1e-15);
+}

@@ -273,7 +273,7 @@ impl Instants {
     /// Records that the step of `slave`, of `size` s, has ended at an event at `end` s. The recorded time is a little
     /// earlier, because the communication point may be less than `end` by rounding.
     pub(crate) fn record_event(&mut self, slave: usize, end: f64, size: f64) {
-        self.pending[slave] = end - ROUNDING * size;
+        self.pending[slave] = end - (ROUNDING * size).max(4.0 * f64::EPSILON * end.abs());
     }
 
     /// Forgets the events of a step that is repeated.
