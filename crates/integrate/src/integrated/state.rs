@@ -69,6 +69,9 @@ impl Integrated {
             return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&fmu_state)?;
+        // An event may have changed the nominal values.
+        let scale = self.scale()?;
+        self.stepper.set_scale(scale);
         // In a temporary slot after those of the master.
         let slot = self.saved.len();
         self.saved.push(saved);

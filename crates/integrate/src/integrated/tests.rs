@@ -76,6 +76,16 @@ impl Slave for Timer {
     fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
         Err(absent("fmi2DoStep"))
     }
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        Ok([self.time, self.x, self.events].map(f64::to_le_bytes).concat())
+    }
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Done {
+        let values = [&mut self.time, &mut self.x, &mut self.events];
+        for (value, bytes) in values.into_iter().zip(bytes.chunks_exact(8)) {
+            *value = f64::from_le_bytes(bytes.try_into().unwrap());
+        }
+        Ok(())
+    }
 }
 
 impl ModelExchange for Timer {
@@ -101,6 +111,11 @@ impl ModelExchange for Timer {
     fn get_event_indicators(&mut self, _: &mut [f64]) -> Done {
         Ok(())
     }
+    /// The first event changes the nominal value.
+    fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Done {
+        nominals[0] = if self.events > 0.0 { 1e3 } else { 1.0 };
+        Ok(())
+    }
     fn completed_integrator_step(&mut self, _: bool) -> Result<CompletedStep, CallError> {
         Ok(CompletedStep::default())
     }
@@ -109,7 +124,8 @@ impl ModelExchange for Timer {
     }
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         self.events += f64::from(u8::from(self.time >= self.next()));
-        Ok(EventInfo { next_event_time: Some(self.next()), ..EventInfo::default() })
+        let next_event_time = Some(self.next());
+        Ok(EventInfo { nominals_changed: true, next_event_time, ..EventInfo::default() })
     }
     fn enter_continuous_time_mode(&mut self) -> Done {
         Ok(())
@@ -131,4 +147,15 @@ fn an_event_that_is_later_than_the_end_of_a_step_by_rounding_belongs_to_this_ste
     let [x, events] = steps(&mut timer(|_| 1.0, 1e3, [0.01, 1.6e-10]), 1e3, 1e-4, 500);
     assert!((x - 0.05).abs() < 1e-8, "{x}");
     assert!((events - 5.0).abs() < 0.5, "{events}");
+}
+
+/// The nominal value is a tolerance, on which the size of the steps depends.
+#[test]
+fn a_restored_state_goes_on_with_its_nominal_values_bit_by_bit() {
+    let new = || timer(f64::cos, 0.0, [0.25, 0.0]);
+    let (mut first, mut second) = (new(), new());
+    steps(&mut first, 0.0, 0.5, 1);
+    second.deserialize_state(&first.serialize_state().unwrap()).unwrap();
+    let ends = [first, second].map(|mut slave| steps(&mut slave, 0.5, 0.5, 3)[0].to_bits());
+    assert_eq!(ends[0], ends[1]);
 }
