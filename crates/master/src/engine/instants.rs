@@ -325,3 +325,6 @@ fn with_events<T>(
         instance.events().ok_or_else(|| absent("fmi3EnterEventMode")).and_then(action)
     })
 }
+
+#[cfg(test)]
+mod tests;

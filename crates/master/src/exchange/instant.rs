@@ -186,15 +186,20 @@ impl Reals {
         instance.get_real(&port_map.outputs, &mut self.trace.latest[port_map.output_range.clone()])
     }
 
-    /// Sets the inputs of a slave to their values at `time`, if one differs from the value set last; returns whether.
+    /// Sets the inputs of a slave to their values at `time`, if one differs from the value set last or has a derivative;
+    /// returns whether.
     fn set_now(
         &mut self,
         slave: usize,
         instance: &mut dyn Slave,
         time: f64,
     ) -> Result<bool, CallError> {
-        let range = self.layout.port_maps[slave].input_range.clone();
-        let mut changed = false;
+        let port_map = &self.layout.port_maps[slave];
+        let range = port_map.input_range.clone();
+        // An input with a derivative has moved since it was set.
+        let derivatives = &mut self.input_derivatives[port_map.input_derivative_range.clone()];
+        let mut changed = derivatives.iter().any(|derivative| *derivative != 0.0);
+        derivatives.fill(0.0);
         for k in range.clone() {
             let value = self.value_at(self.layout.sources[k] as usize, time);
             let mut value = self.layout.factors[k] * value + self.layout.offsets[k];

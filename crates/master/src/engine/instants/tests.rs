@@ -1,0 +1,99 @@
+//! Instants of a slave that samples its input.
+
+use fmu_description::{Experiment, ModelDescription};
+use slave::{CallError, EventInfo, Events, Slave, StepResult, Value};
+
+use crate::{Algorithm, Extrapolation, Method, Simulation, System};
+
+type Done = Result<(), CallError>;
+
+/// The time in s of the event.
+const EVENT: f64 = 1.5;
+
+/// The output y is the time, but at most 1. If `samples`, the event copies the input u to the output z.
+struct Sampler {
+    description: ModelDescription,
+    samples: bool,
+    time: f64,
+    u: f64,
+    slope: f64,
+    z: f64,
+}
+
+fn sampler(samples: bool) -> Box<Sampler> {
+    let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sampler" guid="sampler">
+        <CoSimulation modelIdentifier="S" canHandleVariableCommunicationStepSize="true"
+        canInterpolateInputs="true"/><ModelVariables>
+        <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+        <ScalarVariable name="z" valueReference="1" causality="output" variability="discrete"><Real/>
+        </ScalarVariable>
+        <ScalarVariable name="u" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
+        </ModelVariables><ModelStructure><Outputs><Unknown index="1" dependencies=""/>
+        <Unknown index="2" dependencies=""/></Outputs></ModelStructure></fmiModelDescription>"#;
+    let description = ModelDescription::parse(xml).unwrap();
+    Box::new(Sampler { description, samples, time: 0.0, u: 0.0, slope: 0.0, z: 0.0 })
+}
+
+impl Slave for Sampler {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Done {
+        for (value, &reference) in values.iter_mut().zip(references) {
+            *value = [self.time.min(1.0), self.z, self.u][reference as usize];
+        }
+        Ok(())
+    }
+    fn set_real(&mut self, _: &[u32], values: &[f64]) -> Done {
+        (self.u, self.slope) = (values[0], 0.0);
+        Ok(())
+    }
+    fn set_input_derivatives(&mut self, _: &[u32], _: &[i32], values: &[f64]) -> Done {
+        self.slope = values[0];
+        Ok(())
+    }
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
+        (self.u, self.time) = (self.u + self.slope * size, time + size);
+        let happens = self.samples && time < EVENT && self.time >= EVENT;
+        Ok(if happens { StepResult::Event { reached: self.time } } else { StepResult::Whole })
+    }
+    fn hand_over_events(&mut self, _: bool) -> Result<bool, CallError> {
+        Ok(self.samples)
+    }
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        if self.samples { Some(self) } else { None }
+    }
+}
+
+impl Events for Sampler {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        Ok((self.time < EVENT).then_some(EVENT))
+    }
+    fn enter_event_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        self.z = self.u;
+        Ok(EventInfo::default())
+    }
+    fn leave_event_mode(&mut self) -> Done {
+        Ok(())
+    }
+}
+
+/// The line through the values 0.5 and 1 before the step is at 1.5 at its end, where y is still 1.
+#[test]
+fn an_instant_sees_the_value_of_an_input_and_not_its_extrapolation() {
+    let mut system = System::default();
+    system.add("p", sampler(false)).unwrap();
+    system.add("q", sampler(true)).unwrap();
+    system.connect("p.y", "q.u").unwrap();
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Linear, 0.5);
+    let experiment = Experiment { stop_time: Some(2.0), ..Experiment::default() };
+    let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    let port = simulation.system().port("q.z").unwrap();
+    assert_eq!(simulation.system().get_value(port).unwrap(), Value::Real(1.0));
+}
