@@ -253,10 +253,10 @@ impl Algorithm {
         }
         let several = self.multiples.iter().any(|&multiple| multiple != 1);
         let plain = self.control == StepControl::Fixed && self.coupling == Coupling::Once;
-        if several && !(plain && self.events.is_empty()) {
+        if several && !(plain && self.events.is_empty() && !self.rollback) {
             return Err(contradiction(
                 "FMUs with multiples of the communication step need fixed steps, made once, without events: \
-                 step-control fixed, coupling once",
+                 step-control fixed, coupling once, no rollback",
             ));
         }
         if self.control == StepControl::Energy && self.bonds.is_empty() {

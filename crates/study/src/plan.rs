@@ -137,7 +137,7 @@ fn propose_algorithm(
 
 /// Fills in the steps that the system structure proposes. If no communication step is stated, it is the base step,
 /// otherwise the smallest step proposed for an FMU. FMUs step every several communication steps if the request states
-/// neither such multiples nor step control, iteration or events, and if no algebraic loop is to be iterated.
+/// neither such multiples nor step control, iteration, rollback or events, and if no algebraic loop is to be iterated.
 fn propose_steps(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -154,6 +154,7 @@ fn propose_steps(
     }
     let allows_multiples = request.step_control.is_none_or(|control| control == StepControl::Fixed)
         && request.coupling.is_none_or(|coupling| coupling == Coupling::Once)
+        && request.rollback != Some(true)
         && request.next_event.is_empty()
         && request.crossing.is_empty()
         && (request.coupling.is_some()

@@ -35,3 +35,12 @@ fn a_slave_that_steps_at_the_same_time_is_read_at_the_start_of_its_step() {
     let begins = (0..12).map(|count| 1.0 + 2.0 * f64::from(count / 4));
     assert_eq!(inputs(Method::Jacobi), begins.collect::<Vec<_>>());
 }
+
+/// A slave that ends a step of several communication steps early would be asked for the same step for ever.
+#[test]
+fn multiples_of_steps_that_are_repeated_are_refused() {
+    let (system, _) = system([f64::sin; 2], whole);
+    let algorithm = Algorithm { multiples: vec![4, 1], rollback: true, ..Algorithm::new(0.25) };
+    let message = Simulation::new(system, &algorithm, &until(1.0)).err().unwrap().to_string();
+    assert!(message.ends_with("step-control fixed, coupling once, no rollback"), "{message}");
+}
