@@ -72,12 +72,16 @@ pub(crate) fn is_rigid(slave: &dyn Slave) -> bool {
     flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
 }
 
-/// Checks that the stop time, in s, is finite and later than the start time.
+/// Checks that start and stop time, in s, are finite, and that the stop time is the later one.
 ///
 /// # Errors
 ///
-/// Returns [`SystemError::Time`] if it is not.
+/// Returns [`SystemError::Time`] if they are not.
 pub fn check_stop_time(start: f64, stop: f64) -> Result<(), SystemError> {
+    if !start.is_finite() {
+        let (what, rule) = ("the start time", "a finite number".to_owned());
+        return Err(SystemError::Time { what, value: start, rule });
+    }
     if stop > start && stop.is_finite() {
         return Ok(());
     }
@@ -100,9 +104,8 @@ impl Grid {
             let (what, rule) = ("the communication step", "more than 0".to_owned());
             return Err(SystemError::Time { what, value: step, rule });
         }
-        if let Some(stop) = stop {
-            check_stop_time(start, stop)?;
-        }
+        // Without a stop time, the run may end at any time.
+        check_stop_time(start, stop.unwrap_or(f64::MAX))?;
         let points = (start, start + step);
         let mut grid = Self { start, stop, step, count: 0, points, time: start };
         let early = stop.and_then(|stop| grid.last_whole_step(system, multiples, stop));

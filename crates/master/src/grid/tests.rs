@@ -72,6 +72,17 @@ fn no_step_ends_beyond_the_stop_time_and_the_last_one_ends_at_it() {
 }
 
 #[test]
+fn a_start_time_that_is_no_finite_number_is_refused() {
+    for (start, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
+        for stop in [None, Some(1.0)] {
+            let grid = Grid::new(&System::default(), 0.1, &[], start, stop);
+            let message = grid.err().unwrap().to_string();
+            assert_eq!(message, format!("the start time is {text} s, expected a finite number"));
+        }
+    }
+}
+
+#[test]
 fn a_run_that_goes_on_after_a_shorter_last_step_returns_to_the_grid() {
     let mut first = grid(0.1, 0.0, 1.05);
     while !first.is_finished() {
