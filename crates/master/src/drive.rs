@@ -25,6 +25,19 @@ pub struct Scenario {
     pub faults: Vec<(Port, FaultChain)>,
 }
 
+impl Scenario {
+    /// Limits the faults of Integers to the range of their inputs.
+    pub(crate) fn limit_faults(&mut self, system: &System) {
+        for (input, faults) in &mut self.faults {
+            let version = system.slaves[input.slave].1.description().version();
+            let kind = DriveKind::of(&system.variable(*input).kind, version, false);
+            if let DriveKind::Integer { least, largest } = kind {
+                faults.limit_integers(least, largest);
+            }
+        }
+    }
+}
+
 /// Type of a driven variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {

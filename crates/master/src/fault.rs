@@ -138,6 +138,8 @@ pub enum FaultError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FaultChain {
     stages: Vec<Stage>,
+    /// The smallest and the largest value of the input, if it is an Integer of a system.
+    range: Option<(i64, i64)>,
 }
 
 impl FaultChain {
@@ -152,7 +154,12 @@ impl FaultChain {
             .into_iter()
             .map(|(window, fault)| Stage::new(window, fault, step))
             .collect::<Result<_, _>>()?;
-        Ok(Self { stages })
+        Ok(Self { stages, range: None })
+    }
+
+    /// Limits the results of [`FaultChain::apply_integer`] to the range of the input.
+    pub(crate) fn limit_integers(&mut self, least: i64, largest: i64) {
+        self.range = Some((least, largest));
     }
 
     /// Returns the disturbed value at `time`, in s. `time` is not before the last commit.
@@ -175,20 +182,21 @@ impl FaultChain {
         self.stages.iter().fold(derivatives, |derivatives, stage| stage.apply(time, derivatives))
     }
 
-    /// As [`FaultChain::apply`], for Integers; the result is rounded. The result for a value of 32 bits
-    /// is limited to the range of 32 bits, any other to the range of 64 bits.
+    /// As [`FaultChain::apply`], for Integers; the result is rounded, and in a simulation limited to the range of the
+    /// input. Otherwise the result for a value of 32 bits is limited to the range of 32 bits, any other to the range of
+    /// 64 bits.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i64) -> i64 {
         let real = slave::to_real(value);
         let faulty = self.apply(time, real);
         if faulty.total_cmp(&real).is_eq() {
-            value
-        } else if i32::try_from(value).is_ok() {
-            (faulty.round() as i32).into()
-        } else {
-            faulty.round() as i64
+            return value;
         }
+        let narrow = i32::try_from(value).is_ok();
+        let range = if narrow { (i32::MIN.into(), i32::MAX.into()) } else { (i64::MIN, i64::MAX) };
+        let (least, largest) = self.range.unwrap_or(range);
+        (faulty.round() as i64).clamp(least, largest)
     }
 
     /// As [`FaultChain::apply`], for Booleans: 0 is false, as in the C interface.

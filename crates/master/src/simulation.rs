@@ -92,6 +92,7 @@ impl Simulation {
         let order = by_direct_dependencies(&system);
         system.discrete = algorithm.discrete.iter().copied().collect();
         system.hand_over_events(algorithm.repeats(), experiment.start_time)?;
+        scenario.limit_faults(&system);
         initialise(&mut system, experiment, &mut scenario)?;
         let (instants, ending) = first_instant(&mut system, &mut scenario, algorithm, experiment)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);

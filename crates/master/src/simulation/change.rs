@@ -34,6 +34,7 @@ impl Simulation {
     /// has changed, or if a fault has no connection or is on a String, a binary or a clock.
     pub fn change_scenario(&mut self, mut scenario: Scenario) -> Result<(), SystemError> {
         let engine = &mut self.engine;
+        scenario.limit_faults(&engine.system);
         let present = engine.exchange.faults().count();
         let mut inherited = 0;
         let mut same = scenario.drives.inherit(&engine.drives);

@@ -1,7 +1,10 @@
 //! A slave with variables of all types, which allocates nothing.
 
 use fmu_description::ModelDescription;
-use master::{CallError, Slave, StepResult, System};
+use master::fault::{Fault, FaultChain, Window};
+use master::{Algorithm, CallError, Scenario, Simulation, Slave, StepResult, System, Value};
+
+use crate::engine::until;
 
 type Done = Result<(), CallError>;
 
@@ -81,6 +84,27 @@ fn a_structural_parameter_that_is_a_real_is_refused_and_not_set_to_zero() {
     let expected = "a.scale is a structural parameter of type Float64, expected an integer or a Boolean, \
                     as no other one can be set";
     assert_eq!(message, expected);
+}
+
+/// The value at which it sticks, and 1 for the step.
+#[test]
+fn a_fault_of_an_integer_of_64_bits_has_values_beyond_32_bits() {
+    let variables = r#"<Int64 name="in" valueReference="0" causality="input" start="0"/>
+        <Int64 name="out" valueReference="1" causality="output"/>"#;
+    let mut system = System::default();
+    system.add("a", of_fmi_3(variables)).unwrap();
+    system.add("b", of_fmi_3(variables)).unwrap();
+    system.connect("a.out", "b.in").unwrap();
+    let (input, output) = (system.port("b.in").unwrap(), system.port("b.out").unwrap());
+    let fault = (Window { from: 0.0, until: None }, Fault::Stuck(Some(5e9)));
+    let faults = vec![(input, FaultChain::new(vec![fault], 1.0).unwrap())];
+    let scenario = Scenario { faults, ..Scenario::default() };
+    let algorithm = Algorithm::new(1.0);
+    let run = Simulation::with_scenario(system, &algorithm, &until(1.0), scenario);
+    let mut simulation = run.unwrap();
+    simulation.step().unwrap();
+    let value = simulation.system().get_value(output).unwrap();
+    assert_eq!(value, Value::Integer(5_000_000_001));
 }
 
 impl Slave for Typed {
