@@ -77,6 +77,8 @@ pub struct Drive {
     written: Option<Sample>,
     /// The sample that was the last one at the last commit.
     accepted: Option<Sample>,
+    /// The time in s of the last commit.
+    committed: Option<f64>,
 }
 
 impl Drive {
@@ -87,8 +89,20 @@ impl Drive {
         let DriveSource { signal, start, texts } = source;
         let cursor = Cursor::default();
         let faults = None;
-        let (written, accepted) = (None, None);
-        Self { port, reference, kind, signal, start, texts, faults, cursor, written, accepted }
+        let (written, accepted, committed) = (None, None, None);
+        Self {
+            port,
+            reference,
+            kind,
+            signal,
+            start,
+            texts,
+            faults,
+            cursor,
+            written,
+            accepted,
+            committed,
+        }
     }
 
     /// Returns the port of the variable.
@@ -139,9 +153,30 @@ impl Drive {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
     }
 
-    /// Whether the drive starts at `time`, in s, or its signal or a fault on it jumps or has a kink there.
+    /// Whether the drive starts at `time`, in s, or its signal or a fault on it jumps or has a kink there; for a clock,
+    /// also whether this has happened since the last commit.
     pub(crate) fn breaks_at(&self, time: f64) -> bool {
-        self.next_break(just_before(time)).is_some_and(|next| near(next, time))
+        match (self.kind, self.committed) {
+            (DriveKind::Clock, Some(last)) => self.break_between(last, time).is_some(),
+            _ => self.next_break(just_before(time)).is_some_and(|next| near(next, time)),
+        }
+    }
+
+    /// Whether a clock ticks at `time`, in s, or has done so since the last commit, in a step that could not end there.
+    fn ticks(&mut self, time: f64) -> bool {
+        let mut after = self.committed.unwrap_or(just_before(time));
+        while let Some(next) = self.break_between(after, time) {
+            if self.sample(next).is_some_and(|sample| sample.value != 0.0) {
+                return true;
+            }
+            after = next;
+        }
+        false
+    }
+
+    /// Returns the first break after `after` and not after `time`, all in s.
+    fn break_between(&self, after: f64, time: f64) -> Option<f64> {
+        self.next_break(after).filter(|next| reached(time, *next))
     }
 
     fn next_break(&self, after: f64) -> Option<f64> {
@@ -167,6 +202,7 @@ pub struct DriveSource {
 pub struct DriveState {
     faults: Option<FaultChain>,
     accepted: Option<Sample>,
+    committed: Option<f64>,
 }
 
 /// All driven variables of a system. Only the constructor allocates.
@@ -252,8 +288,8 @@ impl Drives {
         self.write_to(system, time, |_| true)
     }
 
-    /// Makes those driven clocks of `slave` tick, in event mode, whose signal jumps to another value than 0 at `time`,
-    /// in s, or starts with one.
+    /// Makes those driven clocks of `slave` tick, in event mode, whose signal has jumped to another value than 0 since the
+    /// last commit or jumps to one at `time`, in s, or starts with one.
     pub(crate) fn tick(
         &mut self,
         system: &mut System,
@@ -264,7 +300,8 @@ impl Drives {
             |drive: &&mut Drive| drive.kind == DriveKind::Clock && drive.port.slave == slave;
         for drive in self.all.iter_mut().filter(is_clock_of_slave) {
             let Some(sample) = drive.sample(time) else { continue };
-            if sample.value != 0.0 && (drive.written.is_none() || drive.breaks_at(time)) {
+            let starts = drive.written.is_none() && sample.value != 0.0;
+            if starts || drive.ticks(time) {
                 let clock = [drive.reference];
                 system.perform(slave, time, |instance| instance.set_boolean(&clock, &[1]))?;
             }
@@ -359,7 +396,7 @@ impl Drives {
     #[inline]
     pub fn commit(&mut self, time: f64) {
         for drive in &mut self.all {
-            drive.accepted = drive.written;
+            (drive.accepted, drive.committed) = (drive.written, Some(time));
             let value = drive.undisturbed(time).map(|sample| sample.value);
             if let (Some(faults), Some(value)) = (&mut drive.faults, value) {
                 faults.commit(time, value);
@@ -382,6 +419,7 @@ impl Drives {
                 return false;
             };
             (new.written, new.accepted) = (old.written, old.accepted);
+            new.committed = old.committed;
             match (&mut new.faults, &old.faults) {
                 (_, None) => true,
                 (Some(new), Some(old)) => new.inherit(old),
@@ -393,8 +431,11 @@ impl Drives {
     /// Returns the state of all drives for a checkpoint, in their order.
     #[must_use]
     pub fn state(&self) -> Vec<DriveState> {
-        let state =
-            |drive: &Drive| DriveState { faults: drive.faults.clone(), accepted: drive.accepted };
+        let state = |drive: &Drive| DriveState {
+            faults: drive.faults.clone(),
+            accepted: drive.accepted,
+            committed: drive.committed,
+        };
         self.all.iter().map(state).collect()
     }
 
@@ -418,8 +459,8 @@ impl Drives {
                 "the checkpoint is of {actual} driven variables, expected {expected} as in the scenario"
             )));
         }
-        for (drive, DriveState { faults, accepted }) in self.all.iter_mut().zip(state) {
-            drive.faults = faults;
+        for (drive, DriveState { faults, accepted, committed }) in self.all.iter_mut().zip(state) {
+            (drive.faults, drive.committed) = (faults, committed);
             drive.cursor = Cursor::default();
             (drive.written, drive.accepted) = (accepted, accepted);
         }

@@ -1,16 +1,19 @@
-//! Instants of a slave that samples its input.
+//! Instants of a slave that samples its input and counts ticks.
 
 use fmu_description::{Experiment, ModelDescription};
 use slave::{CallError, EventInfo, Events, Slave, StepResult, Value};
 
-use crate::{Algorithm, Extrapolation, Method, Simulation, System};
+use crate::drive::{Drive, DriveKind, DriveSource, Drives};
+use crate::signal::{Interpolation, Signal, Track};
+use crate::{Algorithm, Extrapolation, Method, Scenario, Simulation, System};
 
 type Done = Result<(), CallError>;
 
 /// The time in s of the event.
 const EVENT: f64 = 1.5;
 
-/// The output y is the time, but at most 1. If `samples`, the event copies the input u to the output z.
+/// The output y is the time, but at most 1. If `samples`, the event copies the input u to the output z. The output n is
+/// the number of ticks.
 struct Sampler {
     description: ModelDescription,
     samples: bool,
@@ -18,20 +21,22 @@ struct Sampler {
     u: f64,
     slope: f64,
     z: f64,
+    n: f64,
 }
 
 fn sampler(samples: bool) -> Box<Sampler> {
     let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sampler" guid="sampler">
-        <CoSimulation modelIdentifier="S" canHandleVariableCommunicationStepSize="true"
-        canInterpolateInputs="true"/><ModelVariables>
+        <CoSimulation modelIdentifier="S" canInterpolateInputs="true"/><ModelVariables>
         <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
         <ScalarVariable name="z" valueReference="1" causality="output" variability="discrete"><Real/>
         </ScalarVariable>
         <ScalarVariable name="u" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
+        <ScalarVariable name="n" valueReference="3" causality="output"><Real/></ScalarVariable>
         </ModelVariables><ModelStructure><Outputs><Unknown index="1" dependencies=""/>
-        <Unknown index="2" dependencies=""/></Outputs></ModelStructure></fmiModelDescription>"#;
+        <Unknown index="2" dependencies=""/><Unknown index="4" dependencies=""/></Outputs>
+        </ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
-    Box::new(Sampler { description, samples, time: 0.0, u: 0.0, slope: 0.0, z: 0.0 })
+    Box::new(Sampler { description, samples, time: 0.0, u: 0.0, slope: 0.0, z: 0.0, n: 0.0 })
 }
 
 impl Slave for Sampler {
@@ -40,12 +45,16 @@ impl Slave for Sampler {
     }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Done {
         for (value, &reference) in values.iter_mut().zip(references) {
-            *value = [self.time.min(1.0), self.z, self.u][reference as usize];
+            *value = [self.time.min(1.0), self.z, self.u, self.n][reference as usize];
         }
         Ok(())
     }
     fn set_real(&mut self, _: &[u32], values: &[f64]) -> Done {
         (self.u, self.slope) = (values[0], 0.0);
+        Ok(())
+    }
+    fn set_boolean(&mut self, _: &[u32], _: &[i32]) -> Done {
+        self.n += 1.0;
         Ok(())
     }
     fn set_input_derivatives(&mut self, _: &[u32], _: &[i32], values: &[f64]) -> Done {
@@ -96,4 +105,27 @@ fn an_instant_sees_the_value_of_an_input_and_not_its_extrapolation() {
     }
     let port = simulation.system().port("q.z").unwrap();
     assert_eq!(simulation.system().get_value(port).unwrap(), Value::Real(1.0));
+}
+
+/// Ticks at 0.1 and 1.2 s, and steps of 0.5 s only.
+#[test]
+fn a_tick_within_a_step_that_cannot_end_there_comes_at_its_end() {
+    let mut system = System::default();
+    system.add("q", sampler(true)).unwrap();
+    let times = [0.1, 1.2];
+    let track = Track::new(times.into(), [1.0; 2].into(), Interpolation::Points).unwrap();
+    let (signal, start) = (Signal::Track(track), f64::NEG_INFINITY);
+    let source = DriveSource { signal, start, texts: Vec::new() };
+    let clock = Drive::new(system.port("q.u").unwrap(), 2, DriveKind::Clock, source);
+    let scenario = Scenario { drives: Drives::new(vec![clock]), faults: Vec::new() };
+    let experiment = Experiment { stop_time: Some(2.0), ..Experiment::default() };
+    let algorithm = Algorithm::new(0.5);
+    let run = Simulation::with_scenario(system, &algorithm, &experiment, scenario);
+    let mut simulation = run.unwrap();
+    let ticks = simulation.system().port("q.n").unwrap();
+    for expected in [1.0, 1.0, 2.0, 2.0] {
+        simulation.step().unwrap();
+        let actual = simulation.system().get_value(ticks).unwrap();
+        assert_eq!(actual, Value::Real(expected), "{}", simulation.time());
+    }
 }
