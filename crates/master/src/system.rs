@@ -10,6 +10,7 @@ mod units;
 use std::collections::{HashMap, HashSet};
 
 use fmu_description::{Causality, ModelDescription, ScalarVariable};
+use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;
 pub use access::read_value;
@@ -17,7 +18,7 @@ use fmu_description::similar::nearest;
 use slave::{CallError, Slave, Transformation, Value};
 
 /// A variable of a slave: position of the slave, and position of the variable in its description.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Port {
     /// Position of the slave in [`System::slaves`].
     pub slave: usize,
@@ -61,7 +62,7 @@ pub struct System {
     pub(crate) events: Vec<bool>,
     observer: Option<EventObserver>,
     /// Values of inputs that were set last by [`System::set_value`], by the variable that holds the value.
-    input_values: HashMap<Port, Value>,
+    pub(crate) input_values: HashMap<Port, Value>,
     /// Number of values that [`System::set_value`] has set at inputs.
     pub(crate) changes: u64,
 }

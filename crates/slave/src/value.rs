@@ -3,12 +3,13 @@
 use std::fmt;
 
 use fmu_description::{IntegerType, Kind, SimpleType, Version};
+use serde::{Deserialize, Serialize};
 
 /// Relative tolerance of [`Value::is_near`] for Reals.
 const TOLERANCE: f64 = 1e-9;
 
 /// A value of one of the base types of FMI; an Enumeration is an Integer.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Value {
     /// Real.
     Real(f64),

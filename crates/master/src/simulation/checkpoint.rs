@@ -14,8 +14,8 @@ use crate::error::{SystemError, call, contradiction};
 use crate::exchange::Values;
 use crate::fault::FaultChain;
 use crate::step_control::Controller;
-use crate::system::{Connection, System};
-use slave::Slave;
+use crate::system::{Connection, Port, System};
+use slave::{Slave, Value};
 
 pub(super) use origin::Origin;
 
@@ -40,6 +40,8 @@ pub struct Checkpoint {
     values: Values,
     faults: Vec<FaultChain>,
     drives: Vec<DriveState>,
+    /// Values of inputs that were set last by [`System::set_value`].
+    inputs: Vec<(Port, Value)>,
     /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
     pending: Vec<f64>,
     /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
@@ -143,6 +145,9 @@ impl Simulation {
         }
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
+        let inputs = self.engine.system.input_values.iter();
+        let mut inputs: Vec<_> = inputs.map(|(port, value)| (*port, value.clone())).collect();
+        inputs.sort_unstable_by_key(|(port, _)| (port.slave, port.variable));
         Ok(Checkpoint {
             origin: self.origin.clone(),
             parts: self.parts(),
@@ -155,6 +160,7 @@ impl Simulation {
             values,
             faults: self.engine.exchange.faults().map(|fault| fault.clone()).collect(),
             drives: self.engine.drives.state(),
+            inputs,
             pending: self.engine.instants.pending.clone(),
             slaves,
             ended: self.ended,
@@ -209,6 +215,8 @@ impl Simulation {
         self.engine.drives.restore(checkpoint.drives.clone())?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
         let (system, time) = (&mut self.engine.system, checkpoint.time);
+        system.input_values = checkpoint.inputs.iter().cloned().collect();
+        system.changes += 1;
         self.engine.instants.restore(system, &checkpoint.pending, time)?;
         self.attempted = checkpoint.attempted;
         self.ended = checkpoint.ended;

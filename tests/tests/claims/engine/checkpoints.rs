@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use master::algorithm::PowerBond;
 use master::{
-    Algorithm, Checkpoint, Coupling, Extrapolation, Method, Simulation, StepControl, System,
+    Algorithm, Checkpoint, Coupling, Extrapolation, Method, Simulation, StepControl, System, Value,
 };
 use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Abilities, Block};
@@ -208,6 +208,23 @@ fn a_checkpoint_of_other_connections_faults_or_driven_variables_is_refused_by_na
     assert_eq!(resumed((0, &stuck), (0, &gain)), Some(other.to_owned()));
     // The signal itself may have another future.
     assert_eq!(resumed((0, &one), (0, &one.replace("= 1", "= 2"))), None);
+}
+
+#[test]
+fn a_restored_run_shows_the_inputs_that_its_state_has() {
+    let block = Block::new(&[&[0.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
+    let system = Network { blocks: vec![block], links: Vec::new() }.system(ABLE, &Arc::default());
+    let mut run = Simulation::new(system, &Algorithm::new(0.25), &until(1.0)).unwrap();
+    let input = run.system().port("a.u0").unwrap();
+    let mut readout = run.readout(&[input]);
+    run.system().set_value(input, &Value::Real(3.0)).unwrap();
+    run.step().unwrap();
+    let checkpoint = run.checkpoint().unwrap();
+    run.system().set_value(input, &Value::Real(5.0)).unwrap();
+    run.restore(&checkpoint).unwrap();
+    run.read(&mut readout).unwrap();
+    let actual = run.system().get_value(input).unwrap();
+    assert_eq!((actual, readout.reals[0]), (Value::Real(3.0), 3.0));
 }
 
 #[test]
