@@ -31,9 +31,8 @@ pub(crate) fn start(verbose: u8, json: bool) {
         _ => LevelFilter::TRACE,
     };
     let text = tracing_subscriber::fmt::layer().with_writer(|| StandardError);
-    let filter = Targets::new()
-        .with_default(level)
-        .with_target(RESULTS_FILE, level.max(LevelFilter::INFO));
+    let filter =
+        Targets::new().with_default(level).with_target(RESULTS_FILE, level.max(LevelFilter::INFO));
     let registry = tracing_subscriber::registry().with(filter).with(Collector);
     // Fails at a second call.
     let _ = if json {

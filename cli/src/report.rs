@@ -84,8 +84,7 @@ fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
     if comparison.rows == 0 {
         println!("nothing was compared with {there}: the two runs have no time in common");
-    } else if let Some(largest) =
-        comparison.differences.first().filter(|_| !comparison.is_equal())
+    } else if let Some(largest) = comparison.differences.first().filter(|_| !comparison.is_equal())
     {
         println!(
             "largest difference to {there}, relative to the range: {}, {:.6e} at t = {} s ({:.3e} of the range)",

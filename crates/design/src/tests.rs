@@ -679,7 +679,8 @@ fn report_within(
 
 #[test]
 fn the_bound_of_the_rate_of_a_fault_is_per_second() {
-    let fault = "[[faults]]\nname = \"f\"\nactuator = \"u1\"\nbound = 2\nrate_bound = 0.5\nstep = 1\n";
+    let fault =
+        "[[faults]]\nname = \"f\"\nactuator = \"u1\"\nbound = 2\nrate_bound = 0.5\nstep = 1\n";
     let text = MASS.replace("actuator_faults = \"all\"\n", "") + fault;
     let limits = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
     let notes = |file: &PlantFile<'_>| {

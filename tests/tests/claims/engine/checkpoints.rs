@@ -185,9 +185,8 @@ fn a_checkpoint_of_other_connections_faults_or_driven_variables_is_refused_by_na
         let rule = "the same connections, faults and driven variables in the same order";
         Some(format!("the checkpoint has {saved} in place of {present}, expected {rule}"))
     };
-    let signal = |input: &str| {
-        format!("[[scenario.signal]]\nvariable = \"a.{input}\"\nconstant = 1\n")
-    };
+    let signal =
+        |input: &str| format!("[[scenario.signal]]\nvariable = \"a.{input}\"\nconstant = 1\n");
     let (one, two) = (signal("u1"), signal("u2"));
     let expected = of("the driven variable a.u1", "the driven variable a.u2");
     assert_eq!(resumed((0, &one), (0, &two)), expected);
@@ -203,8 +202,8 @@ fn a_checkpoint_of_other_connections_faults_or_driven_variables_is_refused_by_na
     let other = "the checkpoint was taken with other faults or signal types of connections, expected the same ones";
     let larger = fault("u0", "bias = { value = 2 }");
     assert_eq!(resumed((0, &bias), (0, &larger)), Some(other.to_owned()));
-    let [stuck, gain] = ["stuck = {}", "gain = { factor = 2 }"]
-        .map(|kind| format!("{one}{}", fault("u1", kind)));
+    let [stuck, gain] =
+        ["stuck = {}", "gain = { factor = 2 }"].map(|kind| format!("{one}{}", fault("u1", kind)));
     assert_eq!(resumed((0, &stuck), (0, &gain)), Some(other.to_owned()));
     // The signal itself may have another future.
     assert_eq!(resumed((0, &one), (0, &one.replace("= 1", "= 2"))), None);

@@ -78,7 +78,8 @@ fn a_name_in_use_is_refused_and_keeps_its_slave() {
 #[test]
 fn a_structural_parameter_that_is_a_real_is_refused_and_not_set_to_zero() {
     let mut system = System::default();
-    let variables = r#"<Float64 name="scale" valueReference="0" causality="structuralParameter" start="1"/>"#;
+    let variables =
+        r#"<Float64 name="scale" valueReference="0" causality="structuralParameter" start="1"/>"#;
     system.add("a", of_fmi_3(variables)).unwrap();
     let message = system.set("a.scale", "2.5").unwrap_err().to_string();
     let expected = "a.scale is a structural parameter of type Float64, expected an integer or a Boolean, \
