@@ -23,7 +23,8 @@ pub struct Unit {
     pub display_units: Vec<DisplayUnit>,
 }
 
-/// `BaseUnit`: exponents of the base units, and `base = factor * unit + offset`.
+/// `BaseUnit`: exponents of the base units, and `base = factor * unit + offset`, without the offset for a
+/// [difference](crate::RealType::is_relative).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaseUnit {
     /// Exponent of the kilogram.
@@ -73,7 +74,8 @@ impl BaseUnit {
     }
 
     /// Returns factor and offset of the conversion from this unit to `other`,
-    /// `value_in_other = factor * value + offset`; `None` if the exponents differ.
+    /// `value_in_other = factor * value + offset`; `None` if the exponents differ. A
+    /// [difference](crate::RealType::is_relative) is converted by the factor alone.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
         let factor = self.factor / other.factor;
@@ -82,7 +84,8 @@ impl BaseUnit {
     }
 }
 
-/// `DisplayUnit`: `display = factor * unit + offset`. The conversion of a [`BaseUnit`] starts from the unit, too.
+/// `DisplayUnit`: `display = factor * unit + offset`, without the offset for a
+/// [difference](crate::RealType::is_relative). The conversion of a [`BaseUnit`] starts from the unit, too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// `name`, unique within its unit.

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::words::spelt;
 use super::{NativeType, Version};
+use crate::hash_form::{is_default, numbered};
 
 /// `SimpleType` of `TypeDefinitions`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -238,6 +239,19 @@ pub struct RealType {
     pub derivative: Option<u32>,
     /// `reinit`: an event may change this continuous state.
     pub reinit: bool,
+    /// `relativeQuantity`, see [`RealType::is_relative`]; `None` means false.
+    // The numbers up to 8 are those of `ScalarVariable`, whose fields follow in the form.
+    #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<9, _, _>")]
+    pub relative_quantity: Option<bool>,
+}
+
+impl RealType {
+    /// Whether the values are differences, such as a rise of temperature: `relativeQuantity` is true. The conversion of a
+    /// difference to another unit has no offset: 5 K are 5 degC (FMI 2.0.5, section 2.2.3; FMI 3.0.2, section 2.4.4).
+    #[must_use]
+    pub fn is_relative(&self) -> bool {
+        self.relative_quantity == Some(true)
+    }
 }
 
 /// Attributes of an integer type or an `Enumeration`. The numbers can hold every integer type of

@@ -321,11 +321,12 @@ fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// Adds quantity, units, limits and nominal value; `text` formats numbers.
+/// Adds quantity, units, `relativeQuantity`, limits and nominal value; `text` formats numbers.
 fn real_limits<'a>(tag: Tag<'a>, real: &RealType, text: fn(f64) -> String) -> Tag<'a> {
     tag.maybe("quantity", real.quantity.as_ref())
         .maybe("unit", real.unit.as_ref())
         .maybe("displayUnit", real.display_unit.as_ref())
+        .maybe("relativeQuantity", real.relative_quantity.as_ref())
         .maybe("min", real.min.map(text).as_ref())
         .maybe("max", real.max.map(text).as_ref())
         .maybe("nominal", real.nominal.map(text).as_ref())

@@ -91,6 +91,7 @@ fn types() -> Vec<SimpleType> {
         min: Some(-10.0),
         max: Some(10.0),
         nominal: Some(0.1),
+        relative_quantity: Some(true),
         ..RealType::default()
     };
     let count = IntegerType { min: Some(0), max: Some(i32::MAX.into()), ..IntegerType::default() };
@@ -149,6 +150,7 @@ fn state() -> ScalarVariable {
         start: Some(0.25),
         derivative: None,
         reinit: true,
+        relative_quantity: Some(false),
     });
     ScalarVariable {
         initial: Some(Initial::Exact),

@@ -254,6 +254,11 @@ impl<'a> Node<'a> {
         })
     }
 
+    /// Reads a flag as [`Node::flag`] does; `None` if it is missing.
+    pub(super) fn optional_flag(&self, name: &'static str) -> Option<bool> {
+        self.has(name).then(|| self.flag(name))
+    }
+
     /// Parses an `xs:boolean`; warns of another case.
     fn parse_boolean(&self, name: &'static str, text: &str) -> Option<bool> {
         let value = match text {

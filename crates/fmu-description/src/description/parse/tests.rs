@@ -102,6 +102,21 @@ fn a_variable_gets_the_attributes_of_its_declared_type() {
 }
 
 #[test]
+fn a_variable_is_relative_if_it_or_its_declared_type_says_so() {
+    let relative = |attributes: &str| {
+        let variable = format!(
+            r#"<ScalarVariable name="x" valueReference="0"><Real {attributes}/></ScalarVariable>"#
+        );
+        let xml = with(&variable, "").replace(r#"min="0""#, r#"min="0" relativeQuantity="true""#);
+        ModelDescription::parse(xml).unwrap().variables[0].kind.as_real().unwrap().is_relative()
+    };
+    assert!(!relative(""));
+    assert!(relative(r#"relativeQuantity="1""#));
+    assert!(relative(r#"declaredType="Length""#));
+    assert!(!relative(r#"declaredType="Length" relativeQuantity="false""#));
+}
+
+#[test]
 fn no_dependencies_and_unknown_dependencies_are_distinguished() {
     let structure = r#"<Outputs><Unknown index="1"/><Unknown index="1" dependencies=""/>
         <Unknown index="1" dependencies="1 &#9; 1" dependenciesKind="fixed constant"/></Outputs>"#;

@@ -261,6 +261,7 @@ fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
         min: element.number("min")?.or(defaults.min),
         max: element.number("max")?.or(defaults.max),
         nominal: element.number("nominal")?.or(defaults.nominal),
+        relative_quantity: element.optional_flag("relativeQuantity").or(defaults.relative_quantity),
         ..RealType::default()
     })
 }

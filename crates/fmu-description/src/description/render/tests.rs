@@ -106,6 +106,17 @@ fn the_content_guid_depends_on_everything_but_the_guid() {
     assert_ne!(changed.content_guid(), guid);
 }
 
+/// The ten other attributes are absent: one zero each.
+#[test]
+fn the_serialized_form_of_a_real_has_relative_quantity_only_if_it_is_stated() {
+    let form = |relative_quantity| {
+        let real = RealType { relative_quantity, ..RealType::default() };
+        postcard::to_stdvec(&real).unwrap()
+    };
+    assert_eq!(form(None), [0_u8; 10]);
+    assert_eq!(form(Some(true))[10..], [9_u8, 1, 1]);
+}
+
 /// Computed with `hashlib.sha256` of Python: the length of "2.0", the text, and 20 zeros for all
 /// fields that are absent or empty.
 #[test]

@@ -103,6 +103,7 @@ fn real(element: Node<'_>, precision: Precision, defaults: Option<&RealType>) ->
         min: round(element.bound("min", defaults.min)?),
         max: round(element.bound("max", defaults.max)?),
         nominal: round(element.number("nominal")?).or(defaults.nominal),
+        relative_quantity: element.optional_flag("relativeQuantity").or(defaults.relative_quantity),
         ..RealType::default()
     })
 }
@@ -132,7 +133,7 @@ fn binary(element: Node<'_>, defaults: &BinaryType) -> BinaryType {
 fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
     let has_defaults = defaults.is_some();
     let defaults = defaults.cloned().unwrap_or_default();
-    let flag = |name, default| if element.has(name) { element.flag(name) } else { default };
+    let flag = |name, default| element.optional_flag(name).unwrap_or(default);
     let interval_decimal = element.number("intervalDecimal")?.or(defaults.interval_decimal);
     let stated = element.word("intervalVariability", &INTERVALS);
     let interval_variability = match stated {

@@ -112,8 +112,7 @@ fn variable(element: Node<'_>, mut kind: Kind, types: &Types<'_>) -> Result<Scal
         dimensions: element.children_named("Dimension").map(dimension).collect::<Result<_, _>>()?,
         start_elements,
         can_handle_multiple_set_per_time_instant: element
-            .has("canHandleMultipleSetPerTimeInstant")
-            .then(|| element.flag("canHandleMultipleSetPerTimeInstant")),
+            .optional_flag("canHandleMultipleSetPerTimeInstant"),
         intermediate_update: element.flag("intermediateUpdate"),
         previous: reference(element, "previous")?,
         clocks: clocks(element)?,

@@ -123,6 +123,22 @@ fn types_units_and_the_experiment_are_read() {
 }
 
 #[test]
+fn a_difference_is_relative_by_its_declared_type() {
+    let relative = |xml: &str| {
+        let description = read(xml);
+        ["phi1", "tau1"].map(|name| {
+            let variable = description.variable(name).unwrap();
+            variable.kind.as_real().unwrap().is_relative()
+        })
+    };
+    assert_eq!(relative(COUPLING), [false, false]);
+    let typed = COUPLING.replace("<RealType ", "<RealType relativeQuantity=\"true\" ");
+    assert_eq!(relative(&typed), [true, false]);
+    let stated = typed.replace("\"Angle\" start", "\"Angle\" relativeQuantity=\"0\" start");
+    assert_eq!(relative(&stated), [false, false]);
+}
+
+#[test]
 fn the_implementation_decides_between_the_interfaces() {
     let flags = read(COUPLING).co_simulation.unwrap();
     assert_eq!(flags.model_identifier, "My_Coupling");

@@ -296,6 +296,19 @@ fn a_clock_has_the_attributes_of_its_declared_type() {
 }
 
 #[test]
+fn a_float32_is_relative_by_its_declared_type_and_so_is_its_alias() {
+    let types = r#"<Float32Type name="Rise" unit="K" relativeQuantity="true"/>"#;
+    let variables = r#"<Float32 name="x" valueReference="1" declaredType="Rise"><Alias name="y"/>
+        </Float32>
+        <Float32 name="z" valueReference="2" declaredType="Rise" relativeQuantity="false"/>"#;
+    let (description, warnings) = ModelDescription::read(around(types, variables, "")).unwrap();
+    assert_eq!(warnings, []);
+    let reals = description.variables.iter().filter_map(|variable| variable.kind.as_real());
+    let relative: Vec<bool> = reals.map(RealType::is_relative).collect();
+    assert_eq!(relative, [false, true, true, false]);
+}
+
+#[test]
 fn defects_with_a_clear_meaning_are_warnings_that_name_them() {
     for (variables, structure, expected) in [
         (
