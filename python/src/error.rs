@@ -149,6 +149,10 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             let exception = named("Unit", to).text("unit", to_unit);
             exception.text("source", from).text("source_unit", from_unit)
         }
+        E::Relative { relative, relative_unit, absolute, absolute_unit } => {
+            let exception = named("Relative", relative).text("unit", relative_unit);
+            exception.text("absolute", absolute).text("absolute_unit", absolute_unit)
+        }
         E::Size { from, from_size, to, to_size, element } => {
             let exception = named("Size", to).text("size", to_size).text("element", &**element);
             exception.text("source", from).text("source_size", from_size)

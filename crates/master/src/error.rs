@@ -75,6 +75,21 @@ pub enum SystemError {
         /// Its unit.
         to_unit: String,
     },
+    /// Only one end of a connection is a difference, and an offset separates their units.
+    #[error(
+        "{relative} in {relative_unit} is a difference (relativeQuantity) and {absolute} in \
+         {absolute_unit} is not: state factor and offset of the connection"
+    )]
+    Relative {
+        /// The end that is a difference.
+        relative: String,
+        /// Its unit.
+        relative_unit: String,
+        /// The other end.
+        absolute: String,
+        /// Its unit.
+        absolute_unit: String,
+    },
     /// The two ends of a connection have different sizes.
     #[error(
         "{from} is {from_size} and {to} is {to_size}: arrays of different sizes are connected by \

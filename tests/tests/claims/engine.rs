@@ -19,6 +19,7 @@ mod puppet;
 mod scenario;
 mod stepping;
 mod typed;
+mod units;
 
 use fmu_description::Experiment;
 

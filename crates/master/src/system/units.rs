@@ -1,5 +1,6 @@
 //! Conversion between units of the same base.
 
+use fmu_description::RealType;
 use fmu_description::unit::BaseUnit;
 
 use super::{Port, System};
@@ -24,7 +25,8 @@ impl System {
 
     /// Returns factor and offset of the conversion between the units of two variables; `None` if the units have the same
     /// name (their definitions are not compared), if values are equal in both, or if a variable has no unit that its
-    /// description defines. An error if the units cannot be converted.
+    /// description defines. The conversion of differences (`relativeQuantity`) has no offset. An error if the units
+    /// cannot be converted, or if they differ by an offset and only one of the variables is a difference.
     pub(super) fn conversion(
         &self,
         from: Port,
@@ -37,7 +39,8 @@ impl System {
             return Ok(None);
         }
         let both = source.1.zip(target.1);
-        let Some(conversion) = both.and_then(|(source, target)| source.conversion(&target)) else {
+        let conversion = both.and_then(|(source, target)| source.conversion(&target));
+        let Some((factor, offset)) = conversion else {
             return Err(SystemError::Unit {
                 from: self.name(from),
                 from_unit: source.0.clone(),
@@ -45,7 +48,21 @@ impl System {
                 to_unit: target.0.clone(),
             });
         };
-        Ok(Some(conversion).filter(|conversion| *conversion != (1.0, 0.0)))
+        let is_relative =
+            |port: Port| self.variable(port).kind.as_real().is_some_and(RealType::is_relative);
+        let from_is_relative = is_relative(from);
+        if from_is_relative != is_relative(to) && offset != 0.0 {
+            let (from, to) = ((self.name(from), source.0), (self.name(to), target.0));
+            let (relative, absolute) = if from_is_relative { (from, to) } else { (to, from) };
+            return Err(SystemError::Relative {
+                relative: relative.0,
+                relative_unit: relative.1.clone(),
+                absolute: absolute.0,
+                absolute_unit: absolute.1.clone(),
+            });
+        }
+        let offset = if from_is_relative { 0.0 } else { offset };
+        Ok(Some((factor, offset)).filter(|conversion| *conversion != (1.0, 0.0)))
     }
 }
 
