@@ -1,7 +1,7 @@
 //! Conversion of stated values to the units of the variables.
 
 use fmu_description::unit::{BaseUnit, Unit};
-use fmu_description::{ModelDescription, ScalarVariable};
+use fmu_description::{ModelDescription, RealType, ScalarVariable};
 
 use super::Reason;
 
@@ -27,8 +27,8 @@ impl Conversion {
     }
 
     /// Returns the conversion from the unit `stated` to the unit of `variable`, called `name`; the
-    /// identity if no unit is stated. Returns an error if the variable has no unit, or if the units are unknown or
-    /// measure different quantities.
+    /// identity if no unit is stated. It has no offset if the variable is a difference (`relativeQuantity`). Returns an
+    /// error if the variable has no unit, or if the units are unknown or measure different quantities.
     pub(super) fn find(
         stated: Option<&str>,
         name: &str,
@@ -47,7 +47,8 @@ impl Conversion {
         let source = base_of(stated, description)?;
         match source.conversion(&target) {
             Some((factor, offset)) if factor.is_finite() && factor != 0.0 && offset.is_finite() => {
-                Ok(Self { factor, offset })
+                let is_relative = variable.kind.as_real().is_some_and(RealType::is_relative);
+                Ok(Self { factor, offset: if is_relative { 0.0 } else { offset } })
             }
             _ => Err(Reason::Dimension { name, stated: stated.to_owned(), unit: unit.to_owned() }),
         }

@@ -234,6 +234,15 @@ fn the_unit_of_a_value_is_converted_to_that_of_a_float32() {
 }
 
 #[test]
+fn a_difference_of_5_kelvin_is_one_of_5_degrees_celsius() {
+    let (mut system, calls) = of_fmi_3();
+    let text = r#"scenario.set = [{ variable = "fmu.rise", at = 0, value = 5, unit = "K" }]"#;
+    let mut prepared = scenario(text).resolve(&system, &setup(here())).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.0).unwrap();
+    assert_eq!(take(&calls), ["real [5] [5.0]"]);
+}
+
+#[test]
 fn a_variable_and_its_alias_are_driven_as_one() {
     let (mut system, calls) = of_fmi_3();
     let text = r#"

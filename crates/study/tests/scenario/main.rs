@@ -127,7 +127,7 @@ fn system() -> (System, Calls, Calls) {
     (system, plant_told, ctrl_told)
 }
 
-/// An FMU of FMI 3.0, called fmu, with inputs of several widths.
+/// An FMU of FMI 3.0, called fmu, with inputs of several widths, and one that is a difference of temperatures.
 fn of_fmi_3() -> (System, Calls) {
     let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="Listener" instantiationToken="t">
         <CoSimulation modelIdentifier="L"/>
@@ -139,7 +139,8 @@ fn of_fmi_3() -> (System, Calls) {
         <Int64 name="wide" valueReference="3" causality="input" start="0"/>
         <Float32 name="single" valueReference="4" causality="input" unit="m" start="0">
         <Alias name="also single"/></Float32>
-        </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        <Float64 name="rise" valueReference="5" causality="input" unit="degC" relativeQuantity="true"
+        start="0"/></ModelVariables><ModelStructure/></fmiModelDescription>"#;
     let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
     let mut system = System::default();
     system.add("fmu", Box::new(Listener { description, calls: calls.clone() })).unwrap();
