@@ -15,6 +15,8 @@ const SAME_FACTOR: f64 = 1e-6;
 pub(super) struct Measure {
     /// The unit: its name and its definition.
     pub(super) unit: Option<(String, Option<BaseUnit>)>,
+    /// Whether the values are differences (`relativeQuantity`), which have no offset; `None` if no FMU says so.
+    pub(super) relative: Option<bool>,
     /// Items of the enumeration.
     pub(super) items: Option<Vec<(String, i32)>>,
 }
@@ -34,14 +36,14 @@ impl Measure {
     pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
-        Measure { unit: Some((name.to_owned(), base)), items: None }
+        Measure { unit: Some((name.to_owned(), base)), ..Measure::default() }
     }
 
     /// Creates the measure of an enumeration, defined by the first of `scopes` that has its name.
     pub(super) fn enumeration(name: &str, scopes: &[&Definitions]) -> Self {
         let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
         let items = all.find(|known| known.name == name).map(|known| known.items.clone());
-        Measure { unit: None, items }
+        Measure { items, ..Measure::default() }
     }
 
     /// Creates the measure of a variable from the description of its FMU.
@@ -52,7 +54,7 @@ impl Measure {
                     let known = description.units.iter().find(|unit| unit.name == *name);
                     (name.clone(), known.and_then(|unit| unit.base))
                 });
-                Measure { unit, items: None }
+                Measure { unit, relative: Some(real.is_relative()), items: None }
             }
             Kind::Enumeration(kind) => {
                 let declared = kind.declared_type.as_ref();
@@ -60,7 +62,7 @@ impl Measure {
                     .types
                     .iter()
                     .find(|declared_type| Some(&declared_type.name) == declared);
-                Measure { unit: None, items: known.map(items_of) }
+                Measure { items: known.map(items_of), ..Measure::default() }
             }
             _ => Measure::default(),
         }
@@ -68,7 +70,11 @@ impl Measure {
 
     /// Fills missing fields from `other`.
     pub(super) fn or(self, other: Measure) -> Self {
-        Measure { unit: self.unit.or(other.unit), items: self.items.or(other.items) }
+        Measure {
+            unit: self.unit.or(other.unit),
+            relative: self.relative.or(other.relative),
+            items: self.items.or(other.items),
+        }
     }
 
     fn name(&self) -> &str {
@@ -77,11 +83,12 @@ impl Measure {
 }
 
 /// Returns factor and offset that convert values from the unit of `from` to the unit of `to`; both
-/// units satisfy `base = factor * unit + offset`.
+/// units satisfy `base = factor * unit + offset`, without the offset for differences.
 ///
 /// The result is (1, 0) if one side has no unit. For units of the same name it is (1, 0), too, unless both
 /// are defined, measure the same quantity and differ in factor or offset. For units of different names it is
-/// `None` if a definition is missing, and an error sentence if they measure different quantities.
+/// `None` if a definition is missing, and an error sentence if they measure different quantities, or if they differ by
+/// an offset and only one side is a difference.
 pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
     const SAME: (f64, f64) = (1.0, 0.0);
     let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {
@@ -99,7 +106,18 @@ pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>
         };
     };
     let nearly_one = (factor - 1.0).abs() < SAME_FACTOR && offset.abs() < SAME_FACTOR;
-    Ok(Some(if same_name && nearly_one { SAME } else { (factor, offset) }))
+    match (from.relative, to.relative) {
+        _ if same_name && nearly_one => Ok(Some(SAME)),
+        (Some(one), Some(other)) if one != other && offset != 0.0 => {
+            let (one, other) = if one { (from_name, to_name) } else { (to_name, from_name) };
+            Err(format!(
+                "the value in {one} is a difference (relativeQuantity) and the one in {other} is \
+                 not: state suppressUnitConversion and a LinearTransformation"
+            ))
+        }
+        (one, other) if one.or(other) == Some(true) => Ok(Some((factor, 0.0))),
+        _ => Ok(Some((factor, offset))),
+    }
 }
 
 /// The composed conversion along a path of connections, and the unit or enumeration at its end.
@@ -118,8 +136,8 @@ impl ConversionChain {
     }
 
     /// Appends a connection to a connector with the measure `there`: first the unit conversion, unless
-    /// it is suppressed, then the transformation. Returns an error sentence if the units measure different
-    /// quantities, if an enumeration lacks an item, or if transformations of different types follow each other.
+    /// it is suppressed, then the transformation. Returns an error sentence if the units cannot be
+    /// converted, if an enumeration lacks an item, or if transformations of different types follow each other.
     pub(super) fn append(
         self,
         conversion: &Conversion,
@@ -145,8 +163,13 @@ impl ConversionChain {
         }
         // After a suppressed conversion, the values are not in the unit of the source.
         let unit = if conversion.suppress_units { None } else { self.measure.unit };
+        let relative = match stated {
+            // A difference from an operating point becomes a value.
+            Some(Stated::Linear { offset, .. }) if *offset != 0.0 => None,
+            _ => self.measure.relative,
+        };
         let items = if stated.is_some() { None } else { self.measure.items };
-        let measure = there.or(Measure { unit, items });
+        let measure = there.or(Measure { unit, relative, items });
         Ok(ConversionChain { measure, transformation, warnings })
     }
 }

@@ -58,6 +58,56 @@ fn units_of_different_quantities_are_refused_and_undefined_ones_are_left_alone_w
     );
 }
 
+/// A Real that is a difference.
+fn difference(unit: &str) -> String {
+    format!(r#"{} relativeQuantity="true""#, real(unit))
+}
+
+/// 5 K are 5 degC, and 5 mm are 0.005 m.
+#[test]
+fn differences_are_converted_without_offset_on_the_way_too() {
+    for (unit, other, expected) in [
+        ("K", "degC", "a.y -> b.u"),
+        ("degC", "K", "a.y -> b.u"),
+        ("mm", "m", "a.y -> b.u * 0.001 + 0.0"),
+    ] {
+        let actual = connected(&difference(unit), &difference(other), "", "");
+        assert_eq!(actual.unwrap(), [expected], "{unit} {other}");
+    }
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("y output {}", difference("K")));
+    bench.fmu("b.fmu", &format!("u input {}", difference("K")));
+    let units = r#"<ssd:Units><ssc:Unit name="degC"><ssc:BaseUnit K="1" offset="273.15"/></ssc:Unit></ssd:Units>"#;
+    let inner = system(
+        "inner",
+        "out output <ssc:Real unit=\"degC\"/>",
+        &component("a", "a.fmu", "y output", ""),
+        &connection("a.y", "out", "", ""),
+    );
+    let elements = inner + &component("b", "b.fmu", "u input", "");
+    let opened =
+        bench.open(&root(&elements, &connection("inner.out", "b.u", "", "")), units).unwrap();
+    assert_eq!(links(&opened.assembly), ["inner.a.y -> b.u"]);
+    assert_eq!(opened.warnings, [""; 0]);
+}
+
+#[test]
+fn a_difference_is_connected_to_another_value_if_no_offset_separates_their_units() {
+    for (from, to) in [(difference("K"), real("degC")), (real("degC"), difference("K"))] {
+        assert_eq!(
+            connected(&from, &to, "", "").unwrap_err(),
+            "from a.y to b.u: the value in K is a difference (relativeQuantity) and the one in \
+             degC is not: state suppressUnitConversion and a LinearTransformation"
+        );
+    }
+    let linear = r#"<ssc:LinearTransformation offset="20"/>"#;
+    let suppressed = r#"suppressUnitConversion="true""#;
+    let actual = connected(&difference("K"), &real("degC"), linear, suppressed).unwrap();
+    assert_eq!(actual, ["a.y -> b.u * 1.0 + 20.0"]);
+    let actual = connected(&difference("mm"), &real("m"), "", "").unwrap();
+    assert_eq!(actual, ["a.y -> b.u * 0.001 + 0.0"]);
+}
+
 #[test]
 fn the_unit_that_a_connector_states_is_taken_before_that_of_the_fmu() {
     let bench = Bench::new();
@@ -197,6 +247,16 @@ fn an_inline_parameter_set_uses_the_definitions_of_the_enclosing_file() {
     let component = crate::bench::component("c", "a.fmu", "", &item);
     let opened = bench.open(&root(&component, ""), enumerations).unwrap();
     assert_eq!(first_setting(&opened), (7.0, &[][..]));
+}
+
+#[test]
+fn a_parameter_of_5_kelvin_sets_a_difference_of_5_degrees_celsius() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("p parameter {}", difference("degC")));
+    let component = component("c", "a.fmu", "", &set("p", r#"<ssv:Real value="5" unit="K"/>"#));
+    let units = r#"<ssd:Units><ssc:Unit name="K"><ssc:BaseUnit K="1"/></ssc:Unit></ssd:Units>"#;
+    let opened = bench.open(&root(&component, ""), units).unwrap();
+    assert_eq!(first_setting(&opened), (5.0, &[][..]));
 }
 
 #[test]
