@@ -10,7 +10,7 @@ use syn::{Error, Expr, Field, Ident, LitStr, Result, Token, parenthesized, token
 /// The names of all attributes, for messages.
 const KNOWN: &str = "input, output, parameter, tunable, calculated_parameter, local, constant, skip, \
     state, derivative_of, reinit, start, exact, approximate, discrete, min, max, nominal, unit, \
-    display_unit, quantity, enumeration, name, depends, initially, derivatives";
+    display_unit, relative_quantity, quantity, enumeration, name, depends, initially, derivatives";
 
 /// The role of a variable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -130,7 +130,7 @@ impl Attributes {
             return Ok(());
         }
         match text.as_str() {
-            "state" | "reinit" | "exact" | "approximate" | "discrete" => {
+            "state" | "reinit" | "exact" | "approximate" | "discrete" | "relative_quantity" => {
                 self.flags.push(name.clone());
             }
             "start" | "min" | "max" | "nominal" => {

@@ -112,6 +112,9 @@ fn check_attributes(variable: &Variable<'_>) -> Vec<Error> {
             require(is_real, text.span(), "only a variable of type f64 or f32 has a unit");
         }
     }
+    if let Some(span) = attributes.flag("relative_quantity") {
+        require(is_real, span, "only a variable of type f64 or f32 is a relative quantity");
+    }
     for (name, value) in attributes.values.iter().filter(|(name, _)| name != "start") {
         let fits = if name == "nominal" { is_real } else { is_number };
         require(fits, name.span(), &format!("`{name}` does not fit the type of the field"));

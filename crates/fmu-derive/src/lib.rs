@@ -61,6 +61,7 @@ use syn::{DeriveInput, ItemImpl, parse_macro_input};
 /// | `discrete` | an `f64` or `f32` that changes at events and communication points only |
 /// | `min = A`, `max = B`, `nominal = C` | limits and typical magnitude |
 /// | `unit = "m/s"`, `display_unit = "km/h"`, `quantity = "Velocity"` | the unit, as `Variable::unit` takes it |
+/// | `relative_quantity` | an `f64` or `f32` that is a difference, as `Variable::relative_quantity` makes it |
 /// | `enumeration("Mode", off = 0, manual = 1)` | the items of an Enumeration |
 /// | `name = "T_room"` | the name of the variable, if it differs from the name of the field |
 ///

@@ -175,6 +175,9 @@ fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStrea
     if attributes.flag("reinit").is_some() {
         calls.extend(quote!(.reinit()));
     }
+    if attributes.flag("relative_quantity").is_some() {
+        calls.extend(quote!(.relative_quantity()));
+    }
     for (name, text) in attributes.texts.iter().filter(|(name, _)| name != "name") {
         calls.extend(quote_spanned!(text.span()=> .#name(#text)));
     }

@@ -37,6 +37,7 @@ fn each_mistake_has_its_message() {
         ("#[fmu(input, exact)] h: f64", "states how it starts"),
         ("#[fmu(calculated_parameter, start = 1)] h: f64", "no start value"),
         ("#[fmu(output, unit = \"m\")] n: i32", "only a variable of type f64 or f32 has a unit"),
+        ("#[fmu(output, relative_quantity)] n: i32", "f64 or f32 is a relative quantity"),
         ("#[fmu(output, min = 0)] b: bool", "`min` does not fit the type"),
         ("#[fmu(parameter, min = 1.5, max = -1)] h: f64", "`min` is above `max`"),
         ("#[fmu(parameter, nominal = 0)] h: f64", "`nominal` must be above 0"),

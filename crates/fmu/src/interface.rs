@@ -223,6 +223,7 @@ pub(crate) fn real(number: Number) -> RealType {
         min: number.min,
         max: number.max,
         nominal: number.nominal,
+        relative_quantity: number.relative_quantity.then_some(true),
         ..RealType::default()
     }
 }

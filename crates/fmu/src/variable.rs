@@ -62,6 +62,7 @@ impl Enumeration {
 pub(crate) struct Number {
     pub(crate) unit: Option<String>,
     pub(crate) display_unit: Option<String>,
+    pub(crate) relative_quantity: bool,
     pub(crate) quantity: Option<String>,
     pub(crate) min: Option<f64>,
     pub(crate) max: Option<f64>,
@@ -398,6 +399,14 @@ impl<M> Variable<M> {
     #[must_use]
     pub fn display_unit(mut self, unit: impl Into<String>) -> Self {
         self.declaration.number.display_unit = Some(unit.into());
+        self
+    }
+
+    /// Makes a Real a difference, such as a rise of temperature, which has no offset in another unit: 5 K are shown as
+    /// 5 degC (`relativeQuantity`).
+    #[must_use]
+    pub fn relative_quantity(mut self) -> Self {
+        self.declaration.number.relative_quantity = true;
         self
     }
 

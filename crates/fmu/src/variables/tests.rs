@@ -5,7 +5,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::{Failure, Log, Model, Simulation, Variables};
-use fmu_description::{Causality, DependencyKind, Initial, Kind, ModelDescription, Variability};
+use fmu_description::{
+    Causality, DependencyKind, Initial, Kind, ModelDescription, RealType, Variability,
+};
 
 /// Every kind of variable.
 #[derive(Clone, Variables, Serialize, Deserialize)]
@@ -161,14 +163,24 @@ fn arrays_of_states_are_integrated() {
 struct Displayed {
     #[fmu(output, unit = "K", display_unit = "degC")]
     temperature: f64,
+    #[fmu(output, unit = "K", display_unit = "degC", relative_quantity)]
+    rise: f64,
     #[fmu(output, unit = "m/s", display_unit = "km/h")]
     speed: f64,
     #[fmu(output, unit = "m/s", display_unit = "m/min")]
-    rise: f64,
+    ascent: f64,
 }
 
 #[fmu::model]
 impl Model for Displayed {}
+
+#[test]
+fn only_a_field_that_says_so_is_relative() {
+    let description = crate::describe::<Displayed>(Path::new("")).unwrap();
+    let reals = description.variables.iter().map(|variable| (&variable.name, &variable.kind));
+    let relative = reals.filter(|(_, kind)| kind.as_real().is_some_and(RealType::is_relative));
+    assert_eq!(relative.map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["rise"]);
+}
 
 #[test]
 fn a_display_unit_has_the_conversion_from_the_unit() {
