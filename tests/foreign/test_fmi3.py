@@ -68,6 +68,9 @@ def test_the_ball_returns_early_at_its_bounces_and_rises_as_high(archives):
     whole = simulate(path, "CoSimulation")
     height = whole.dtype.names[1]
     assert abs(stops[height][-1] - whole[height][-1]) < 1e-6
+    bounces = sorted({float(time) for time in stops["time"]} - {float(time) for time in whole["time"]})
+    fall = (2 / 9.81) ** 0.5
+    assert bounces == pytest.approx([fall, fall * (1 + 1.4), fall * (1 + 1.4 + 0.98), fall * (1 + 1.4 + 0.98 + 0.686)], abs=1e-6)
 
 
 def test_the_plant_returns_early_where_the_cart_stops_or_breaks_away_and_moves_as_without_events(archives):
