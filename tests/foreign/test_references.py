@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
+from scipy.linalg import solve_continuous_are
 
 from conftest import ROOT
 from design_loop import packed_plant
@@ -34,12 +35,13 @@ KINDS = {
     "current": "sample_time = 0.1\n",
     "prediction": 'sample_time = 0.1\nestimator = "prediction"\n',
 }
+FEEDBACK = [-1.0, -1.2, -1.4, -1.6, -1.8]
 ACTIONS = {"integral": "", "feedforward": "integral = false", "both": "feedforward = true"}
 
 
 def plant_file(kind, sensor, action):
     """A plant of three states with two references and an actuator fault; perhaps with a sensor fault."""
-    feedback = [-1.0, -1.2, -1.4] + ([-1.6, -1.8] if action != "feedforward" else [])
+    feedback = FEEDBACK[:3] if action == "feedforward" else FEEDBACK
     observer = [-4.0, -4.5, -5.0, -5.5] + ([-6.0, -6.5, -7.0, -7.5] if sensor else [])
     return (
         f"A = {A}\nB = {B}\nC = {C}\n{KINDS[kind]}{'filter = [20, 21, 22]' if sensor else ''}\n"
@@ -77,12 +79,12 @@ def case(request, aso_ftc, tmp_path_factory):
 
 
 def test_the_loop_is_stable_and_has_the_requested_eigenvalues(case):
-    loop, design, report, _, _ = case
+    loop, design, report, _, action = case
     eigenvalues = np.linalg.eigvals(loop.matrices()[0])
     period = design.get("sample_time")
     assert (abs(eigenvalues) < 1 if period else eigenvalues.real < 0).all()
-    for required in report["feedback"]["required"]:
-        assert np.abs(eigenvalues - complex(*required)).min() < 1e-6
+    for required in FEEDBACK[:3] if action == "feedforward" else FEEDBACK:
+        assert np.abs(eigenvalues - (np.exp(required * period) if period else required)).min() < 1e-6
     assert all(check["holds"] for check in report["checks"])
 
 
@@ -358,11 +360,17 @@ def test_the_requirement_of_the_feedback_is_for_states_and_integrals(aso_ftc, tm
 
 
 def test_weights_region_and_norm_design_the_extended_feedback(aso_ftc, tmp_path):
-    for at, feedback in enumerate(
+    a, b = np.array([[0.0, 1, 0], [-2, -3, 0], [-1, 0, 0]]), np.array([[0.0], [1], [0]])
+    regulator = -10 * b.T @ solve_continuous_are(a, b, np.diag([1.0, 1, 4]), np.array([[0.1]]))
+    sector = np.tan(np.radians(50))
+    for at, (feedback, is_met) in enumerate(
         [
-            "feedback.Q = [1, 1, 4]\nfeedback.R = [0.1]",
-            "feedback.region = { decay = 1, sector = 50, disc = { center = -5, radius = 4.5 } }",
-            "feedback.h_infinity = 20\nfeedback.region = { decay = 0.8 }",
+            ("feedback.Q = [1, 1, 4]\nfeedback.R = [0.1]", lambda k, _: k == pytest.approx(regulator, rel=1e-7)),
+            (
+                "feedback.region = { decay = 1, sector = 50, disc = { center = -5, radius = 4.5 } }",
+                lambda _, v: (v.real < -1).all() and (abs(v + 5) < 4.5).all() and (abs(v.imag) < -sector * v.real).all(),
+            ),
+            ("feedback.h_infinity = 20\nfeedback.region = { decay = 0.8 }", lambda _, v: (v.real < -0.8).all()),
         ]
     ):
         folder = tmp_path / str(at)
@@ -371,5 +379,7 @@ def test_weights_region_and_norm_design_the_extended_feedback(aso_ftc, tmp_path)
         design, report = designed(aso_ftc, folder, text)
         loop = TrackingLoop(([[0, 1], [-2, -3]], [[0], [1]], [[1, 0], [0, 1]], [[0], [1]], np.zeros((2, 1))), design)
         assert (np.linalg.eigvals(loop.matrices()[0]).real < -0.1).all()
+        k = np.hstack([loop.design["K_x"], loop.design["K_i"]])
+        assert is_met(k, np.linalg.eigvals(a + b @ k))
         assert np.allclose(loop.constant()[0, :1], 1, atol=1e-9)
         assert len(report["feedback"]["eigenvalues"]) == 3
