@@ -210,13 +210,11 @@ def test_limits_can_be_changed_during_the_run_and_must_be_in_order(controller, t
 def test_the_initial_command_of_a_limited_actuator_depends_on_its_limits_too(controller, tmp_path):
     sizes = (2, 2, 2, 2)
     fmu = fmu_with(controller, random_design(sizes, [[-0.5, 0.6], [-0.2, 1.5]]), tmp_path)
-    for unknown in fmu.description.initialUnknowns:
-        names = {variable.name for variable in unknown.dependencies}
-        for j, name in enumerate(vector("u", 2)):
-            limits = {f"u_min[{j + 1}]", f"u_max[{j + 1}]"}
-            if unknown.variable.name == name:
-                assert limits <= names and f"K_x[{j + 1},1]" in names
-                assert not any(other.startswith(f"K_x[{2 - j},") for other in names)
+    unknowns = {unknown.variable.name: unknown.dependencies for unknown in fmu.description.initialUnknowns}
+    for j, name in enumerate(vector("u", 2)):
+        names = {variable.name for variable in unknowns[name]}
+        assert {f"u_min[{j + 1}]", f"u_max[{j + 1}]", f"K_x[{j + 1},1]"} <= names
+        assert not any(other.startswith(f"K_x[{2 - j},") for other in names)
     with begun(fmu, sizes, [9.0, 9.0, 9.0, 9.0], [0.0, 0.0]) as instance:
         assert {tuple(instance.get("u[1]", "u[2]"))} <= {
             (a, b) for a in (-0.5, 0.6) for b in (-0.2, 1.5)

@@ -107,7 +107,9 @@ def test_random_cases_and_worst_case_are_those_of_the_equations(designed):
 
 def test_effects_of_parameters_are_the_changes_of_the_peak(designed):
     _, report, design, _ = designed("parameters = { J = 0.01, k = 0.01, R = 0.01 }\n")
-    for one in report["robustness"]["tolerance"]["parameters"]:
+    parameters = report["robustness"]["tolerance"]["parameters"]
+    assert {one["name"] for one in parameters} == {"J", "k", "R"}
+    for one in parameters:
         low, high = (peak(design, *servo(**{one["name"]: limit})) for limit in one["limits"])
         assert one["effects"] == pytest.approx([(high - low) / 2] * 2, rel=0.02)
 

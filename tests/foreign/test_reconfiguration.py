@@ -216,6 +216,7 @@ def test_without_exact_allocation_the_feedback_is_designed_again_and_keeps_what_
     done = designed(aso_ftc, tmp_path, SMALL)
     report, design = json.loads(done.stdout), tomllib.loads((tmp_path / "design.toml").read_text())
     a, b = matrix(design, "A"), matrix(design, "B")
+    assert [entry["gone"] for entry in design["reconfigurations"]] == ["u1", "u2"]
     for at, entry in enumerate(design["reconfigurations"]):
         outcome = report["reconfiguration"]["without"][at]["outcome"]
         k_x, k_s = matrix(entry, "K_x"), matrix(entry, "K_s")

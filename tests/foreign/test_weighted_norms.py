@@ -154,6 +154,7 @@ def test_the_norm_of_a_sampled_observer_with_weights_is_that_of_a_frequency_swee
     assert norm["norm"] == pytest.approx(peak(transfer), rel=1e-3)
     assert 0.4 * norm["norm"] < norm["lower_bound"] < norm["norm"]
     z = np.exp(1j * frequencies[::100] * period)
+    assert {weight["signal"] for weight in norm["weights"]} == {"f_u1", "noise of y1", "noise of y2"}
     for weight in norm["weights"]:
         stated = np.polyval(weight["numerator"], z) / np.polyval(weight["denominator"], z)
         expected = formula(LOW if weight["signal"] == "f_u1" else COLOURED, frequencies[::100], period)
