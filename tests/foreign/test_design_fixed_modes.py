@@ -1,10 +1,14 @@
 """Plants that are only stabilisable or detectable, compared with scipy's Riccati solvers and eigenvalues."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
+
+from design_oracle import Matrices
+from test_design_wanted import feedback_gain, observer_gain
 
 PERIOD = 0.1
 
@@ -164,6 +168,9 @@ def test_regions_and_norms_are_met_where_the_fixed_modes_are_inside(aso_ftc, tmp
         assert (eigenvalues.real < -decay).all() and np.abs(eigenvalues + 4).min() < 1e-9
         assert sampled or (np.abs(eigenvalues + 10) < 8).all()
     assert sum("keeps its eigenvalue" in warning for warning in report["warnings"]) == 2
+    if norm and not sampled:
+        design = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+        assert feedback_gain(design) <= 40 and observer_gain(design) <= 40
 
 
 PLANT = """A = [[1, 0], [0, -2]]
