@@ -299,29 +299,29 @@ def test_a_measurement_that_schedules_moves_the_references_too(design, change):
 
 
 @pytest.mark.parametrize(
-    "replacements, parts",
+    "old, new, parts",
     [
         # K_i grows with the inertia: half of the way the product with L_w is above 2.
         (
-            [("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")],
+            "B = [[0], [0.25]]",
+            "B = [[0], [0.0005]]",
             ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "],
         ),
         (
-            [("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')],
+            "[schedule]",
+            '[estimation]\nlaw = "sliding-mode"\n\n[schedule]',
             ["with `schedule` the law is one of augmented, proportional-integral, fast-adaptive, learning; found \"sliding-mode\""],
         ),
         (
-            [("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")],
+            "A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]",
+            "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]",
             ["no integral action exists for r_angle", "schedule with inertia = 4"],
         ),
     ],
 )
-def test_a_schedule_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, replacements, parts):
-    text = DRIVE
-    for old, new in replacements[:1]:
-        assert old in text, old
-        text = text.replace(old, new)
-    (tmp_path / "drive.toml").write_text(text, encoding="utf-8")
+def test_a_schedule_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, old, new, parts):
+    assert old in DRIVE, old
+    (tmp_path / "drive.toml").write_text(DRIVE.replace(old, new), encoding="utf-8")
     done = aso_ftc("design", tmp_path / "drive.toml", "--out", tmp_path / "design.toml")
     assert done.returncode == 2 and done.stderr.count("error:") == 1, done
     assert "drive.toml:" in done.stderr, done.stderr
