@@ -271,7 +271,9 @@ fn maps_show_every_eigenvalue_inside_the_frame_required_around_actual() {
                 for (x, y) in &reached {
                     assert!((66.0..=426.0).contains(x) && (10.0..=322.0).contains(y), "{x} {y}");
                 }
-                for (x, y) in signs(map, "sign ink-1") {
+                let required = signs(map, "sign ink-1");
+                assert_eq!(required.len(), system.required.len(), "{id}{plane}");
+                for (x, y) in required {
                     let near = |place: &(f64, f64)| (place.0 - x).hypot(place.1 - y) < 1.0;
                     assert!(reached.iter().any(near), "{id}: nothing near the required {x} {y}");
                 }
@@ -295,10 +297,11 @@ fn the_stability_boundary_is_between_stable_and_unstable_eigenvalues() {
     let circle = map.descendants().find(|node| node.has_tag_name("circle")).unwrap();
     let [x, y, radius] =
         ["cx", "cy", "r"].map(|name| circle.attribute(name).unwrap().parse::<f64>().unwrap());
-    let distances = signs(map, "sign ink-2");
-    let distances = distances.iter().map(|sign| (sign.0 - x).hypot(sign.1 - y) / radius);
+    let crosses = signs(map, "sign ink-2");
     let expected = hostile().observer.eigenvalues;
-    for (distance, pole) in distances.zip(expected) {
+    assert_eq!(crosses.len(), expected.len());
+    for (cross, pole) in crosses.iter().zip(expected) {
+        let distance = (cross.0 - x).hypot(cross.1 - y) / radius;
         assert!((distance - pole[0].hypot(pole[1])).abs() < 2e-3);
     }
 }

@@ -69,6 +69,7 @@ fn the_summary_certifies_the_design_by_theorem_1() {
     let mut observer: Vec<_> =
         design["observer_eigenvalues"].as_array().unwrap().iter().map(real).collect();
     observer.sort_by(f64::total_cmp);
+    assert_eq!(observer.len(), 5);
     for (actual, required) in observer.iter().zip([-3000.0, -2100.0, -1800.0, -1500.0, -1200.0]) {
         assert!((actual / required - 1.0).abs() < 1e-6, "{actual} {required}");
     }
@@ -118,7 +119,9 @@ fn the_shipped_design_is_what_the_design_command_computes() {
                 .map(|entry| entry.as_float().unwrap())
                 .collect()
         };
-        for (one, other) in numbers(&computed).iter().zip(numbers(&shipped)) {
+        let (computed, shipped) = (numbers(&computed), numbers(&shipped));
+        assert_eq!(computed.len(), shipped.len(), "{name}");
+        for (one, other) in computed.iter().zip(shipped) {
             assert!((one - other).abs() <= 1e-8 * other.abs(), "{name}: {one} {other}");
         }
     }
