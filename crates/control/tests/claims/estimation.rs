@@ -89,7 +89,8 @@ fn a_zero_in_the_right_half_plane_or_on_its_border_is_named() {
 
 #[test]
 fn its_zeros_are_the_invariant_zeros() {
-    for (p, q) in [(1, 1), (2, 2), (2, 1), (3, 2)] {
+    // With as many measurements as faults there are n - q zeros, with more of them none in general.
+    for (p, q, count) in [(1, 1, 3), (2, 2, 2), (2, 1, 0), (3, 2, 0)] {
         let a = integers(4, 4, |i, j| (3 * i + 5 * j * j + i * j) % 7 - 3)
             - DMatrix::identity(4, 4) * 9.0;
         let f_a = integers(4, q, |i, j| (2 * i + 3 * j + 2) % 5 - 1);
@@ -102,6 +103,7 @@ fn its_zeros_are_the_invariant_zeros() {
             Err(Error::UnstableZeros { zeros }) => zeros,
             Err(error) => panic!("{error}"),
         };
+        assert_eq!((computed.len(), expected.len()), (count, count), "{p} {q}");
         for zero in &computed {
             let distance = expected.iter().map(|other| (other - zero).norm()).fold(9.0, f64::min);
             assert!(distance < 1e-9, "{p} {q}: {zero} of {expected:?}");
