@@ -169,6 +169,7 @@ fn an_event_at_the_end_of_a_step_is_handled_there() {
         let received = row.iter().find(|(name, _)| name == "b.received").unwrap().1;
         assert_eq!(received, (time / 0.001 + 1e-3).floor(), "{time}");
     }
+    assert_eq!(outcome.last("b.received"), 200.0);
 }
 
 #[test]
@@ -351,7 +352,7 @@ fn an_input_that_jumps_between_two_communication_points_jumps_there() {
 
 #[test]
 fn a_discrete_real_is_held_under_every_extrapolation() {
-    // A signal that jumps to its step number in each step: what a receiver gets is one of its values.
+    // A signal that jumps to the square of its step number in each step: what a receiver gets is one of its values.
     for extrapolation in [
         Extrapolation::Hold,
         Extrapolation::Limited,
@@ -371,6 +372,7 @@ fn a_discrete_real_is_held_under_every_extrapolation() {
                 let received = value(&mut simulation, "r.u");
                 assert_eq!(received, received.round(), "{extrapolation:?} {method:?}");
             }
+            assert!(value(&mut simulation, "r.u") >= 25.0, "{extrapolation:?} {method:?}");
         }
     }
 }
