@@ -148,7 +148,7 @@ fn a_loop_without_solution_ends_a_run_with_stated_coupling() {
 /// It is a function of time alone, so a whole step and two halves agree, and doubling is not
 /// affected.
 #[test]
-fn every_step_control_ends_a_run_that_cannot_advance_with_a_reason() {
+fn embedded_and_increment_control_end_a_run_that_cannot_advance_with_a_reason() {
     for control in [StepControl::Embedded, StepControl::Increment] {
         let noise = |time: f64| 1e6 * (1e12 * time).sin();
         let (system, _) = puppet::system([noise, noise], puppet::whole);
