@@ -76,9 +76,9 @@ pub struct Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FaultChannel {
-    /// The fault.
+    /// The index of the estimate of the fault.
     pub estimate: usize,
-    /// The estimate of the rate of a ramp.
+    /// The index of the estimate of its rate, for a ramp.
     pub rate: Option<usize>,
 }
 

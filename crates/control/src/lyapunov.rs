@@ -223,8 +223,7 @@ pub(crate) fn sizes(p: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(p.nrows(), p.ncols(), size)
 }
 
-/// The largest entry of |remainder| relative to the same entry of `terms`; entries for which that is zero are left
-/// out. Infinite if an entry of either is not finite.
+/// The largest `|remainder[i,j]| / terms[i,j]` with `terms[i,j]` > 0; infinite if an entry of either is not finite.
 pub(crate) fn relative(remainder: &DMatrix<f64>, terms: &DMatrix<f64>) -> f64 {
     if !remainder.iter().chain(terms).all(|entry| entry.is_finite()) {
         return f64::INFINITY;

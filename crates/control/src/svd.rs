@@ -129,7 +129,7 @@ impl ComplexSvd {
         self.real.values.iter().step_by(self.repeats).copied().collect()
     }
 
-    /// Number of singular values above `tolerance` times the largest.
+    /// Number of singular values above `tolerance` times the largest; one copy of a value above it suffices.
     pub(crate) fn rank(&self, tolerance: f64) -> usize {
         self.real.rank(tolerance).div_ceil(self.repeats)
     }

@@ -55,7 +55,7 @@ impl Requirements {
         (0..k).map(|at| self.poles.get(at).copied().unwrap_or(last)).collect()
     }
 
-    /// The decay rate of the fastest pole, in rad per unit of time.
+    /// The decay rate of the fastest pole, which is its corner frequency in rad per unit of time.
     pub(super) fn fastest(&self, domain: Domain) -> f64 {
         let rate = |pole: &f64| match domain {
             Domain::Continuous => -pole,

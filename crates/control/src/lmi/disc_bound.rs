@@ -209,7 +209,7 @@ mod tests {
         let (center, radius) = (-6.0, 4.0);
         let mut cases = random_deviations(4, 300, 7);
         cases.push(vec![1.0, 0.0, 0.999, 0.0]);
-        // Near the zeros -2 and -3, and the far end.
+        // The near end -2, beside the zeros -2 and -3, and the far end -10.
         cases.push(vec![1.0, 1.0, 1.0, 0.0]);
         // Beside zeros that are slow for the disc, -2 and -3, the bound is far below.
         for (numerator, gap) in

@@ -206,7 +206,8 @@ impl Chart {
         self.centres.iter().zip(&self.normals).map(direction).collect()
     }
 
-    /// The gradient with respect to the local coordinates t of `directions`.
+    /// The gradient with respect to the local coordinates t of `directions`: for each w, with the gradient `of_w`,
+    /// N' (I - w w') `of_w` / |w0 + N t|.
     fn gradient(
         &self,
         problem: &AssignableSubspaces,
@@ -224,11 +225,11 @@ impl Chart {
                 let columns = m.columns(column, count).into_owned();
                 DVector::from_column_slice(columns.as_slice())
             };
-            let mut slope = space.states.tr_mul(&stacked(of_v));
+            let mut of_w = space.states.tr_mul(&stacked(of_v));
             if let Some(of_g) = &of_g {
-                slope += space.responses.tr_mul(&stacked(of_g));
+                of_w += space.responses.tr_mul(&stacked(of_g));
             }
-            let tangential = &slope - w * w.dot(&slope);
+            let tangential = &of_w - w * w.dot(&of_w);
             let length = (1.0 + t.rows(first, free).norm_squared()).sqrt();
             gradient.rows_mut(first, free).copy_from(&(normals.tr_mul(&tangential) / length));
             column += count;

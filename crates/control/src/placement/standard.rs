@@ -24,9 +24,8 @@ const EIGEN_ITERATIONS: usize = 1000;
 /// vectors. A result that is not finite is None.
 ///
 /// Both methods enlarge the determinant of the eigenvectors of length one; the first changes one of them at a
-/// time, the second two. The result depends on the start, which is that of scipy: for each eigenvalue the sum
-/// of the basis of its subspace that Householder reflections give. So the figures are those that scipy reaches,
-/// up to rounding.
+/// time, the second two. The result depends on the start. It is scipy's, for each eigenvalue the sum of the basis
+/// of its subspace from Householder reflections, so that the results are scipy's up to rounding.
 ///
 /// # Errors
 ///

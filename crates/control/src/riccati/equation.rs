@@ -55,8 +55,8 @@ impl RiccatiEquation {
         self.relative_residual(p, &p.abs(), 0.0)
     }
 
-    /// [`Self::entrywise_residual`] without the rounding errors of entries that are zero in theory: |P| as in
-    /// [`lyapunov::Solution::residual`], each sum at least [`FLOOR`] times the largest one.
+    /// [`Self::entrywise_residual`], but with [`sizes`] for |P| and each sum at least [`FLOOR`] times the largest one:
+    /// rounding errors of entries that are zero in theory do not count.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         self.relative_residual(p, &sizes(p), FLOOR)
     }

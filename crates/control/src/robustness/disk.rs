@@ -198,8 +198,8 @@ impl Largest {
         Ok(())
     }
 
-    /// Evaluates the bound at a frequency and stores it if it is the largest; returns it, or a higher one that is at
-    /// most `enough`.
+    /// Returns the bound at a frequency, and stores it if it is the largest. Its search ends as soon as it is at most
+    /// `enough`, as in [`scaled_norm_above`].
     fn evaluate(
         &mut self,
         gain: &DMatrix<Complex<f64>>,
