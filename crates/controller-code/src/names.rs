@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_a_name_gets_is_not_that_of_another_name() {
+    fn a_repeated_name_gets_a_number_that_is_free() {
         assert_eq!(fields(["a", "a_2", "A"].into_iter()), ["a", "a_2", "A_3"]);
     }
 

@@ -140,7 +140,7 @@ pub struct Signals<'a, N> {
     pub command: &'a mut [N],
     /// The estimate of the states as values.
     pub x_value: &'a mut [N],
-    /// The estimate of the faults as values.
+    /// The estimate of the faults as values; faults have no operating point.
     pub f_value: &'a mut [N],
     /// The estimate of the states for the next sample.
     pub next_x_hat: &'a mut [N],

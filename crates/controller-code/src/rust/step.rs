@@ -474,11 +474,11 @@ impl Controller {{
         let Some(detection) = &self.controller.detection else { return };
         let tests = match detection.method {
             Method::Cusum => {
-                "outcomes.cumulate(&mut self.tests, &self.residual, &DRIFT, self.sample);"
+                "outcomes.test_sums(&mut self.tests, &self.residual, &DRIFT, self.sample);"
             }
             Method::Window => {
                 "let mut sums = Sums { sums: &mut self.sums, residuals: &self.residual };
-        outcomes.widen(&mut self.tests, &mut sums, &COUNTS, &LENGTHS, self.sample);"
+        outcomes.test_windows(&mut self.tests, &mut sums, &COUNTS, &LENGTHS, self.sample);"
             }
         };
         let fields = self.fields_of_tests().into_iter();

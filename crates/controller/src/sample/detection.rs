@@ -195,7 +195,7 @@ pub struct Outcomes<'a, N, const TESTS: usize> {
 impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
     /// Tests the residuals of a sample by cumulative sums, one residual for each test.
     #[inline(always)]
-    pub fn cumulate(
+    pub fn test_sums(
         &mut self,
         tests: &mut [Cumulative<N>; TESTS],
         residuals: &[N],
@@ -210,9 +210,9 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
     }
 
     /// Tests the residuals of a sample by windows. `counts`: the number of residuals of each test; `lengths`: the
-    /// samples of its window; `sums`: one sum for each residual.
+    /// samples of its window; `sums`: one sum for each residual, and the residuals.
     #[inline(always)]
-    pub fn widen(
+    pub fn test_windows(
         &mut self,
         windows: &mut [Window; TESTS],
         sums: &mut Sums<'_, N>,
