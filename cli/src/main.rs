@@ -125,8 +125,8 @@ fn main() -> ExitCode {
 fn perform(verb: Command) -> u8 {
     let outcome = match verb {
         Command::Reproduce(options) => reproduce::reproduce(&options),
-        Command::Pack(options) => pack::pack(&options),
-        Command::New(options) => new::new(&options),
+        Command::Pack(options) => pack::pack(&options).map(|()| true),
+        Command::New(options) => new::new(&options).map(|()| true),
         Command::Run(options) => return run::run(&options),
         Command::Campaign(options) => return campaign::campaign(&options),
         Command::Design(options) => design::design(&options),

@@ -30,8 +30,8 @@ pub(crate) struct Options {
     fmu: Option<String>,
 }
 
-/// Writes the crate completely or not at all; returns true. An existing folder is an error.
-pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
+/// Writes the crate completely or not at all. An existing folder is an error.
+pub(crate) fn new(options: &Options) -> anyhow::Result<()> {
     let model = identifier(&options.name)?;
     let folder = options.path.clone().unwrap_or_else(|| PathBuf::from(&options.name));
     if folder.symlink_metadata().is_ok() {
@@ -49,7 +49,7 @@ pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     ];
     write(&folder, &files).with_context(|| format!("cannot write {}", folder.display()))?;
     println!("{}", folder.display());
-    Ok(true)
+    Ok(())
 }
 
 /// Returns the name of the model: the name of the crate in camel case. Returns an error if that is no C identifier or

@@ -96,9 +96,8 @@ impl Versions {
     }
 }
 
-/// Builds and packs the crates stated or, without one, the models of the clone; prints the files written and returns
-/// true.
-pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
+/// Builds and packs the crates stated or, without one, the models of the clone; prints the files written.
+pub(crate) fn pack(options: &Options) -> anyhow::Result<()> {
     if options.sbom && !cfg!(feature = "sbom") {
         bail!(
             "--sbom: this aso-ftc is built without bills of materials; \
@@ -116,7 +115,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         println!("{}", fmu.path.display());
     }
     if !options.crates.is_empty() {
-        return Ok(true);
+        return Ok(());
     }
     let root = models::clone()?;
     let fmus = pack_models(&root, &packing)?;
@@ -132,7 +131,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         let fmus: Vec<_> = fmus.into_iter().filter(of_version).collect();
         println!("{}", ssp::write(&fmus, &options.out)?.display());
     }
-    Ok(true)
+    Ok(())
 }
 
 /// Options of packing.
