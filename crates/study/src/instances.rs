@@ -73,11 +73,8 @@ pub(crate) fn instantiate(
         };
         system.add(name, slave)?;
     }
-    let unused = config.solver.0.iter();
-    let unused = unused
-        .map(|(name, _)| name)
-        .find(|name| !integrated.iter().any(|solver| solver.0 == **name));
-    if let Some(name) = unused {
+    let mut solvers = config.solver.0.iter().map(|(name, _)| name);
+    if let Some(name) = solvers.find(|name| !integrated.iter().any(|(fmu, _)| fmu == *name)) {
         return Err(Error::Invalid(format!(
             "solver.{name}: {name} runs by co-simulation, with a solver of its own; the interface \
              model-exchange would let the master integrate it"

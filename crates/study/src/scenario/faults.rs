@@ -7,9 +7,7 @@ use super::convert::Conversion;
 use super::literal::fits_integer;
 use super::resolve::{Resolver, Target, at, finite, kinds, only, positive, require};
 use super::signals::{conversion, unfit};
-use super::{
-    Delay, Dropout, FaultEntry, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
-};
+use super::{Delay, Dropout, FaultEntry, Literal, Noise, Reason, Saturation, ScenarioError};
 use master::Port;
 use master::fault::{Fault, FaultChain, LossPattern, NoiseDistribution, RandomSeries, Window};
 
@@ -142,7 +140,10 @@ impl EntryConverter<'_> {
         of!(stuck => Fault::Stuck(self.value(stuck.value.as_ref(), unit)?));
         of!(dropout => self.dropout(dropout, unit)?);
         of!(delay => self.delay(delay, unit)?);
-        of!(quantisation => levels(quantisation, unit)?);
+        of!(quantisation => Fault::Quantisation {
+            step: unit.relative(positive("step", quantisation.step)?).abs(),
+            offset: unit.absolute(finite("offset", quantisation.offset)?),
+        });
         of!(saturation => self.saturation(saturation, unit)?);
         of!(noise => self.noise(noise, unit)?);
         of!(inversion => Fault::Inversion);
@@ -253,10 +254,4 @@ impl EntryConverter<'_> {
         };
         Ok(Fault::Noise { spread, draw: self.random_series(noise.seed, noise.every)? })
     }
-}
-
-fn levels(quantisation: &Quantisation, unit: Conversion) -> Result<Fault, Reason> {
-    let step = unit.relative(positive("step", quantisation.step)?).abs();
-    let offset = unit.absolute(finite("offset", quantisation.offset)?);
-    Ok(Fault::Quantisation { step, offset })
 }
