@@ -382,6 +382,7 @@ impl Mode {
         let equations = Equations::<f64>::new(design, mode);
         for (j, actuator) in design.actuators.iter().enumerate() {
             if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
+                // -0 + x has the bits of x.
                 let stuck = if self.gone != 0 { self.stuck_part(design, j) } else { -0.0 };
                 let command = equations.free_command(j, equations.estimate(z), inputs, stuck);
                 mode.lower |= u64::from(command < low) << j;

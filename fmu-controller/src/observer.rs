@@ -173,7 +173,7 @@ impl Observer {
     /// If a channel reaches or leaves a limit, the part is halved until that instant is known to 2^-20 of it. A channel
     /// that reaches and leaves a limit before the middle of a part, or between its middle and its end, is not detected.
     ///
-    /// Calls `follow` for each part in which the mode stays, with z at its start and the mode.
+    /// Calls `follow` for each part in which the mode stays.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],

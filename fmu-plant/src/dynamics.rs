@@ -46,7 +46,7 @@ impl Force {
         self.slope == 0.0 && self.curvature == 0.0
     }
 
-    /// Whether no coefficient is infinite or not a number.
+    /// Whether all coefficients are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         [self.value, self.slope, self.curvature, self.start].iter().all(|part| part.is_finite())

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::Estimation;
 use crate::robustness::Verdict;
 
-/// The laws on one plant, all for the same requirement.
+/// A comparison of the laws that estimate faults, on one plant and for the same requirement.
 #[derive(Serialize)]
 pub struct Comparison {
     /// Name of the plant file.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::robustness::Number;
 use crate::{OrReason, or_reason};
 
-/// The controllers without actuators.
+/// The controllers for actuators that are gone.
 #[derive(Serialize, JsonSchema)]
 pub struct ReconfigurationReport {
     /// An actuator counts as gone after its estimated loss of effectiveness has been above the first number for the

@@ -91,7 +91,8 @@ fn clocks_of(description: &ModelDescription) -> Vec<u32> {
 /// A model-exchange instance that is integrated from one communication point to the next.
 ///
 /// The description is that of the FMU, with an element `CoSimulation` that states what this slave offers:
-/// steps of any size, inputs with derivatives up to order 3, event mode, and FMU states if the FMU has them.
+/// steps of any size, inputs with derivatives up to order 3, event mode, and FMU states and directional derivatives if
+/// the FMU has them.
 ///
 /// The relative tolerance is that of `setup_experiment` if it is finite and above zero, otherwise 1e-6; the absolute
 /// tolerance of a state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets

@@ -215,8 +215,8 @@ pub enum Error {
     },
 }
 
-/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in any
-/// folder.
+/// Returns the text that marks a page as the report of a results file with the name of `results`, in any folder: a
+/// later report may replace the page.
 #[must_use]
 pub fn identity(results: &Path) -> String {
     format!("aso-ftc report of {}", name(results))

@@ -50,7 +50,7 @@ pub struct Due {
 }
 
 impl Due {
-    /// Creates the decision for a grid from `start` in s.
+    /// Creates the decision by `decimation`, whose instants start at `start` in s.
     #[must_use]
     pub fn new(decimation: Decimation, start: f64) -> Self {
         Self { decimation, start, next: 0.0, points: 0 }

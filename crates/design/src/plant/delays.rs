@@ -65,8 +65,8 @@ pub(crate) struct DelayedPlant {
     pub(crate) g: DMatrix<f64>,
 }
 
-/// Adds to a plant the states of its delays that the observer has, and those of the filters of controllers of low
-/// order.
+/// Adds to a plant the states with which the observer approximates its delays, and the filters of a controller of low
+/// order. `f`, `g`: the columns by which faults enter x' and y.
 pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,

@@ -58,7 +58,7 @@ impl Quartic {
         row[0]
     }
 
-    /// Whether no coefficient is infinite or not a number.
+    /// Whether all coefficients are finite.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {

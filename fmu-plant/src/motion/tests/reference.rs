@@ -8,6 +8,7 @@ const REFERENCE: &str = include_str!("../../../../tests/data/plant_reference.csv
 const HOLD: f64 = 0.01;
 const HOLDS_PER_ROW: u32 = 8;
 
+/// The force in N at the start of piece `k`.
 fn node(k: u32) -> f64 {
     55.0 * (2.0 * std::f64::consts::PI * (f64::from(k) * HOLD)).sin()
 }
