@@ -670,8 +670,8 @@ def _changes(
     recorded = None if record is None else list(record)
     if recorded is not None and not recorded:
         record_every = "never"
-    changed = {} if algorithm is None else dict(algorithm)
-    changed = {name.replace("_", "-"): value for name, value in changed.items()}
+    options = {} if algorithm is None else dict(algorithm)
+    options = {name.replace("_", "-"): value for name, value in options.items()}
     tables_of = {
         "settings": None if start_values is None else _flat(start_values),
         "scenario": {
@@ -687,7 +687,7 @@ def _changes(
             "file": file,
         },
         "experiment": {"start-time": start_time, "stop-time": stop_time, "tolerance": tolerance},
-        "algorithm": {**changed, **({} if step is None else {"step": step})},
+        "algorithm": {**options, **({} if step is None else {"step": step})},
         "isolation": {
             "isolate": isolate,
             "time-limit": call_time_limit,

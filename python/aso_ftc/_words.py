@@ -64,6 +64,7 @@ def in_python(sentence: str) -> str:
 
 
 def _names(match: re.Match[str]) -> list[str]:
+    """The names that the sentence expects."""
     return re.findall(r"`([^`]*)`", match["known"])
 
 
@@ -77,6 +78,7 @@ def _shown(match: re.Match[str]) -> str:
     return f"{_table(match)}{match['shown']}" if match["shown"] else "the entry"
 
 
+# Each of these functions writes the sentence that replaces a match of the pattern with its name.
 def _field(match: re.Match[str]) -> str:
     known = _names(match)
     hint = similar(match["name"], known) or f", expected {', '.join(known)}"
