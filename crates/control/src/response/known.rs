@@ -22,6 +22,16 @@ pub(crate) fn of_channel(system: &StateSpace, channel: usize) -> StateSpace {
     }
 }
 
+/// The frequencies of modes, where a response may have peaks: in continuous time imaginary part and modulus.
+pub(crate) fn resonances(modes: &[Complex<f64>], domain: Domain) -> Vec<f64> {
+    let modes = modes.iter().filter(|mode| mode.im >= 0.0);
+    let frequencies = |mode: &Complex<f64>| match domain {
+        Domain::Continuous => vec![mode.im.abs(), mode.norm()],
+        Domain::Sampled { period } => vec![mode.arg().abs() / period],
+    };
+    modes.flat_map(frequencies).collect()
+}
+
 /// A stable system with its eigenvalues, its Hessenberg form, and its response at frequencies of a sweep.
 ///
 /// Systems that differ in B, C and D by a choice of channels, by their sign or by units share all of
@@ -65,14 +75,9 @@ impl KnownResponse {
         }
     }
 
-    /// The frequencies of the eigenvalues, where G may have peaks: in continuous time imaginary part and modulus.
+    /// The [`resonances`] of the eigenvalues.
     pub(crate) fn resonances(&self) -> Vec<f64> {
-        let modes = self.modes.iter().filter(|mode| mode.im >= 0.0);
-        let frequencies = |mode: &Complex<f64>| match self.system.domain {
-            Domain::Continuous => vec![mode.im.abs(), mode.norm()],
-            Domain::Sampled { period } => vec![mode.arg().abs() / period],
-        };
-        modes.flat_map(frequencies).collect()
+        resonances(&self.modes, self.system.domain)
     }
 
     /// The frequencies of a sweep, ascending: zero, 60 for each decade as in [`super::frequency_grid`], and the

@@ -17,8 +17,8 @@ const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.
 const TESTED_GAINS_IF_LARGE: u32 = 8;
 const LARGE: usize = 100;
-/// A change of the sign of Im L is a crossing of the real axis, not a pole, if the angle to the axis
-/// is below this.
+/// A change of the sign of Im T is a crossing of the real axis by L, not a pole of L, if the angle to the
+/// axis is below this.
 const ON_AXIS: f64 = 1e-6;
 
 /// The margins of one channel while the other channels are closed and exact.
@@ -41,9 +41,10 @@ pub struct ChannelMargins {
 ///
 /// With the other channels closed the loop transfer of the channel is L = T / S, T and S the
 /// diagonal entries. Gain limits are at real negative L, phase margins at |L| = 1. Method: changes
-/// of sign between 60 frequencies for each decade and the resonances, located by bisection; the gain
-/// limits are confirmed by the eigenvalues of the loop at 40 gains on each side, at 8 if the loop has
-/// more than 100 states. Two crossings between adjacent frequencies are missed.
+/// of sign between 60 frequencies for each decade and the resonances of the closed and of the opened
+/// loop, up to frequencies where |T| is small, located by bisection; the gain limits are confirmed by
+/// the eigenvalues of the loop at 40 gains on each side, at 8 if the loop has more than 100 states. Two
+/// crossings between adjacent frequencies are missed.
 ///
 /// # Errors
 ///
@@ -59,9 +60,10 @@ pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<Chann
 
 /// The margins of the channel with this T.
 pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins, Error> {
-    let sweep = Sweep::new(complementary)?;
+    let sweep = Sweep::of_loop(complementary)?;
     let transfer = |t: &DMatrix<Complex<f64>>| loop_transfer(t[(0, 0)]);
-    let crossings = sweep.crossings(|t| transfer(t).im)?;
+    // Im L has the sign of Im T, also where L has a pole.
+    let crossings = sweep.crossings(|t| t[(0, 0)].im)?;
     let mut limits = vec![];
     let ends = [0, sweep.frequencies.len() - 1].map(|end| sweep.frequencies[end]);
     for frequency in crossings.into_iter().chain(ends) {
@@ -74,7 +76,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
     }
     let gain = gain_limits(&complementary.system, &limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
-    for frequency in sweep.crossings(|t| transfer(t).norm() - 1.0)? {
+    for frequency in sweep.crossings(|t| modulus(t[(0, 0)]) - 1.0)? {
         let lag = (-transfer(&complementary.gain(frequency)?)).arg();
         if lag.abs() < phase {
             (phase, phase_frequency) = (lag.abs(), frequency);
@@ -93,6 +95,11 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
 /// L = T / (1 - T).
 fn loop_transfer(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
+}
+
+/// |L|, infinite at a pole of L.
+fn modulus(t: Complex<f64>) -> f64 {
+    t.norm() / (Complex::new(1.0, 0.0) - t).norm()
 }
 
 /// The gains about 1 between which the loop of the channel with T = `system` is stable: on each side the nearest of

@@ -23,7 +23,8 @@ const REFINED_SAMPLES: f64 = 20.0;
 /// ```
 ///
 /// has a solution where an eigenvalue of L(j w) has the modulus 1. Method: the moduli of the
-/// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection.
+/// eigenvalues on 60 frequencies for each decade and at the resonances of the closed and of the opened loop, up to
+/// frequencies where T is small, located by bisection.
 ///
 /// In sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for parts of a sample
 /// too. If an eigenvalue of L at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each
@@ -40,7 +41,7 @@ pub fn delay_margin(closed: &Loop) -> Result<f64, Error> {
 
 /// The delay margin of the loop with this T.
 pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
-    let sweep = Sweep::new(complementary)?;
+    let sweep = Sweep::of_loop(complementary)?;
     let all = sweep.values.iter().map(loci).collect::<Result<Vec<_>, _>>()?;
     let mut delay = f64::INFINITY;
     for rank in 0..complementary.system.d.nrows() {

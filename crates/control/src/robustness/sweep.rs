@@ -1,9 +1,15 @@
 //! Frequencies at which margins are searched.
 
 use super::crossing::{Evaluation, narrow};
-use crate::Error;
-use crate::response::KnownResponse;
+use crate::eigen::{complex_eigenvalues, eigenvalues};
+use crate::response::{KnownResponse, resonances};
+use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
+
+/// The modulus of the eigenvalues of T at which a sweep ends: those of L are below 1 from 1/2 down.
+const SMALL: f64 = 0.25;
+/// Ratio of the frequencies above the grid, about 60 for each decade.
+const STEP: f64 = 1.04;
 
 /// A frequency response on a grid that includes the resonances of the system.
 pub(super) struct Sweep<'a> {
@@ -17,7 +23,32 @@ pub(super) struct Sweep<'a> {
 impl<'a> Sweep<'a> {
     /// At [`KnownResponse::frequencies`].
     pub(super) fn new(response: &'a KnownResponse) -> Result<Self, Error> {
-        let frequencies = response.frequencies();
+        Self::at(response, response.frequencies())
+    }
+
+    /// The sweep of T = `complementary` for L = T (I - T)^-1: also at the frequencies of the poles of L, the
+    /// eigenvalues of A + B C, where L may have narrow peaks, and in continuous time up to a T for which the
+    /// eigenvalues of L are below 1.
+    pub(super) fn of_loop(complementary: &'a KnownResponse) -> Result<Self, Error> {
+        let StateSpace { a, b, c, domain, .. } = &complementary.system;
+        let mut frequencies = complementary.frequencies();
+        frequencies.extend(resonances(&eigenvalues(&(a + b * c))?, *domain));
+        frequencies.sort_by(f64::total_cmp);
+        frequencies.dedup();
+        let mut sweep = Self::at(complementary, frequencies)?;
+        loop {
+            let last = sweep.frequencies.len() - 1;
+            let moduli = complex_eigenvalues(&sweep.values[last])?.into_iter().map(Complex::norm);
+            if *domain != Domain::Continuous || moduli.fold(0.0, f64::max) < SMALL {
+                return Ok(sweep);
+            }
+            let frequency = STEP * sweep.frequencies[last];
+            sweep.values.push(complementary.gain(frequency)?);
+            sweep.frequencies.push(frequency);
+        }
+    }
+
+    fn at(response: &'a KnownResponse, frequencies: Vec<f64>) -> Result<Self, Error> {
         let values = frequencies.iter().map(|w| response.gain(*w)).collect::<Result<_, _>>()?;
         Ok(Self { response, frequencies, values })
     }

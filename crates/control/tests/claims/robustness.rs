@@ -11,7 +11,7 @@ use control::robustness::{
 };
 use control::stability::instability;
 use control::{Domain, Error, StateSpace};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 const RECORDED: &str = include_str!("../data/robustness.txt");
@@ -230,6 +230,63 @@ fn the_margins_of_a_servo_are_the_closed_form() {
         assert_near(delay_margin(&servo(k)).expect("a delay"), phase / frequency, 1e-9, "delay");
         assert!(computed.gain[0] <= 0.0 && computed.gain[1] == f64::INFINITY, "{computed:?}");
     }
+}
+
+/// L = k / (s^2 + d s + w0^2) with a narrow peak, from which the gain moves the closed loop away: |L| = 1 at w with
+/// (w0^2 - w^2)^2 + (d w)^2 = k^2, and above w0 the lag to -1 is atan(d w / (w^2 - w0^2)).
+#[test]
+fn a_lightly_damped_mode_has_its_margins_although_its_peak_is_narrow() {
+    let domain = Domain::Continuous;
+    for (w0, damping, k) in [(3.0, 0.006, 0.1), (5.0, 0.01, 0.3), (2.0, 0.004, 0.06)] {
+        let square: f64 = w0 * w0;
+        let plant = StateSpace {
+            a: matrix(2, 2, &[0.0, 1.0, -square, -damping]),
+            b: matrix(2, 1, &[0.0, 1.0]),
+            c: matrix(1, 2, &[1.0, 0.0]),
+            d: matrix(1, 1, &[0.0]),
+            domain,
+        };
+        let closed = Loop::new(plant, gain(&matrix(1, 1, &[-k]), domain)).expect("a loop");
+        let half = square - 0.5 * damping * damping;
+        let frequency = (half + (half * half - square * square + k * k).sqrt()).sqrt();
+        let phase = (damping * frequency / (frequency * frequency - square)).atan();
+        let computed = channel_margins(&closed, Point::Output, 0).expect("margins");
+        assert_near(computed.phase, phase, 1e-9, "phase");
+        assert_near(computed.phase_frequency, frequency, 1e-9, "frequency");
+        assert_near(computed.delay, phase / frequency, 1e-9, "delay");
+        assert_near(delay_margin(&closed).expect("a delay"), phase / frequency, 1e-9, "delay");
+    }
+}
+
+/// A feedback of n integrators in series with all eigenvalues -1 has L = (1 + 1 / s)^n - 1; together they are so fast
+/// that |L| = 1 is above ten times each of them.
+#[test]
+fn many_fast_modes_together_have_their_margins_far_above_each_of_them() {
+    let (n, domain) = (16_u32, Domain::Continuous);
+    let order = n as usize;
+    let plant = StateSpace {
+        a: DMatrix::from_fn(order, order, |i, j| f64::from(u8::from(j == i + 1))),
+        b: DMatrix::from_fn(order, 1, |i, _| f64::from(u8::from(i + 1 == order))),
+        c: DMatrix::identity(order, order),
+        d: DMatrix::zeros(order, 1),
+        domain,
+    };
+    let binomials = (0..n).scan(1.0, |binomial, i| {
+        let before = *binomial;
+        *binomial *= f64::from(n - i) / f64::from(i + 1);
+        Some(-before)
+    });
+    let k = DMatrix::from_iterator(1, order, binomials);
+    let closed = Loop::new(plant, gain(&k, domain)).expect("a loop");
+    let computed = channel_margins(&closed, Point::Input, 0).expect("margins");
+    let frequency = computed.phase_frequency;
+    assert!((15.0..16.0).contains(&frequency), "{computed:?}");
+    let one = Complex::new(1.0, 0.0);
+    let l = (one + Complex::new(0.0, -frequency.recip())).powu(n) - one;
+    assert_near(l.norm(), 1.0, 1e-9, "|L|");
+    assert_near(computed.phase, (-l).arg(), 1e-9, "phase");
+    assert_near(computed.delay, computed.phase / frequency, 1e-9, "delay");
+    assert_near(delay_margin(&closed).expect("a delay"), computed.delay, 1e-9, "delay");
 }
 
 /// y[k+1] = -0.5 y[k] + u[k], u = 1.2 y: the eigenvalue 0.7. |L| = 2.4 at z = -1, and with one sample of delay an
