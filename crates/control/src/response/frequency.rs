@@ -91,7 +91,8 @@ pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32
         Domain::Continuous => value.norm(),
         Domain::Sampled { period } => value.ln().norm() / period,
     });
-    let floor = f64::EPSILON * system.a.norm();
+    // An eigenvalue at the origin has a rounding error of the size of the balanced A.
+    let floor = f64::EPSILON * Balance::new(&system.a).matrix.norm() / system.domain.step();
     let sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > floor).collect();
     let slowest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
     let fastest = sizes.iter().copied().fold(0.0, f64::max);

@@ -191,6 +191,18 @@ fn the_grid_reaches_from_a_tenth_of_the_slowest_to_ten_times_the_fastest() {
     assert!((grid[grid.len() - 1] - PI / 0.01).abs() < 1e-9);
 }
 
+/// s^2 + 10 s + 100 has two eigenvalues of modulus 10, in any units of its states.
+#[test]
+fn the_grid_does_not_depend_on_the_units_of_the_states() {
+    for unit in [1.0, 1e9, 1e18, 1e-18] {
+        let a = matrix(2, 2, &[0.0, unit, -100.0 / unit, -10.0]);
+        let system = single(a, &[0.0, 1.0 / unit], &[1.0, 0.0], CONTINUOUS);
+        let grid = frequency_grid(&system, 10).unwrap();
+        let ends = [grid[0], grid[grid.len() - 1] / 100.0];
+        assert!(ends.iter().all(|end| (end - 1.0).abs() < 1e-9), "{unit}: {ends:?}");
+    }
+}
+
 /// For c' (s I - A)^-1 b the largest |z| at energy one is reached by the time-reversed impulse
 /// response.
 #[test]
