@@ -38,7 +38,7 @@ pub struct SampledLoop<'a> {
 ///
 /// The fault is constant over each part, with any sequence of values, and x is read at the start of each
 /// part; with growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With
-/// N = 1 they are those of [`peak_gain`] for [`super::fault_system`]: the fault changes only at the samples,
+/// N = 1 they are those of [`super::fault_gains`], that of f' times T: the fault changes only at the samples,
 /// and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
@@ -83,6 +83,8 @@ struct Lifted<'a> {
 struct Effects {
     /// For each part of the input: its effect on x[k+1], n + filters rows.
     states_after: Vec<DMatrix<f64>>,
+    /// Whether the observer knows this effect on x[k+1], so that e[k+1] does not have it.
+    is_known: bool,
     /// [i][j]: the effect of part j of the input on x at the start of part i.
     outputs: Vec<Vec<DMatrix<f64>>>,
     /// The effect on eps[k+1], a factor for each part.
@@ -132,6 +134,7 @@ impl<'a> Lifted<'a> {
         let states_after = |j| stacked(&self.effect(count, j), &filter(j));
         Effects {
             states_after: (0..count).map(states_after).collect(),
+            is_known: false,
             outputs: (0..count).map(|i| (0..count).map(|j| self.effect(i, j)).collect()).collect(),
             next_error: vec![0.0; count],
             present_error: (0..count).map(|j| if j == 0 { -1.0 } else { 0.0 }).collect(),
@@ -149,6 +152,7 @@ impl<'a> Lifted<'a> {
         let states_after = |r| stacked(&sum(count, r), &filter);
         Effects {
             states_after: (0..count).map(states_after).collect(),
+            is_known: false,
             outputs: (0..count).map(|i| (0..count).map(|r| sum(i, r)).collect()).collect(),
             next_error: vec![-self.part; count],
             present_error: vec![0.0; count],
@@ -161,6 +165,7 @@ impl<'a> Lifted<'a> {
         let until = |i: usize| (0..i).fold(&self.gamma[i] * k_f, |sum, j| sum + self.effect(i, j));
         Effects {
             states_after: vec![stacked(&until(self.parts()), &self.filter_entry())],
+            is_known: true,
             outputs: (0..self.parts()).map(|i| vec![until(i)]).collect(),
             next_error: vec![0.0],
             present_error: vec![0.0],
@@ -187,10 +192,11 @@ impl<'a> Lifted<'a> {
     fn input(&self, inputs: &Effects, j: usize) -> DMatrix<f64> {
         let (n, q) = self.plant.f_a.shape();
         let states_after = &inputs.states_after[j];
-        let mut errors = states_after.clone().resize_vertically(n + q, 0.0);
+        let unknown = states_after * if inputs.is_known { 0.0 } else { 1.0 };
+        let mut errors = unknown.clone().resize_vertically(n + q, 0.0);
         errors.rows_mut(n, q).fill_diagonal(inputs.next_error[j]);
         if self.gains.estimator == Estimator::Current {
-            errors -= self.gains.observer_gain() * &self.plant.c * states_after;
+            errors -= self.gains.observer_gain() * &self.plant.c * unknown;
         }
         let factor = self.period * inputs.present_error[j];
         with_integrals(self.gains, &stacked(states_after, &errors), factor)

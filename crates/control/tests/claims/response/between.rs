@@ -121,6 +121,38 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
     }
 }
 
+/// x1' = -x1 + u, x2' = -x2 + f, both measured: u does not reach x2, which follows f with the gain 1 at all times, and
+/// an f that is estimated exactly causes no error.
+#[test]
+fn a_fault_that_no_command_reaches_and_that_is_known_causes_no_error() {
+    let (period, domain) = (0.1, Domain::Sampled { period: 0.1 });
+    let at = |row: usize| DMatrix::from_fn(2, 1, |i, _| f64::from(u8::from(i == row)));
+    let identity = DMatrix::identity(2, 2);
+    let plant = FaultyPlant::with_constant_faults(-&identity, at(0), identity.clone(), at(1));
+    let extended = ExtendedPlant::without_filter(plant);
+    let plant = control::sampled::sample(&extended, period).unwrap();
+    for estimator in [Estimator::Prediction, Estimator::Current] {
+        let gains = Gains {
+            estimator,
+            k_x: DMatrix::from_row_slice(1, 2, &[-0.2, 0.0]),
+            k_f: DMatrix::zeros(1, 1),
+            l_x: identity.clone() * 0.5,
+            l_f: DMatrix::from_row_slice(1, 2, &[0.0, 1.0]),
+            p_f: None,
+            integral: None,
+        };
+        for parts in [1, 4] {
+            let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
+            let rows = [0, 1, 2, 3, 4];
+            let [.., left] = gains_between_samples(&closed, parts, &rows, WIDTH).unwrap();
+            assert!((left[1] - 1.0).abs() < 2.0 * WIDTH, "{parts}: {left}");
+            assert!([0, 2, 3, 4].iter().all(|row| left[*row].abs() < 1e-12), "{parts}: {left}");
+        }
+        let rates = fault_rate_system(&plant, &gains, domain).unwrap();
+        assert!((peak_gain(&rates, WIDTH).unwrap().upper[(1, 1)] - 1.0).abs() < 2.0 * WIDTH);
+    }
+}
+
 #[test]
 fn a_slow_sampled_closedis_farther_from_rest_between_its_samples_than_at_them() {
     let period = 0.01;
