@@ -218,8 +218,9 @@ impl Modes {
             let reserved = RESERVED * as_number(self.list.len() - first);
             let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
-            if self.period == 0.0 && until < end {
-                // Powers of two, so that neighbouring segments share a step and its propagator.
+            if self.period == 0.0 && until + spacing < end {
+                // Powers of two, so that neighbouring segments share a step and its propagator; the last one may end
+                // after `until`.
                 let step = power_of_two(spacing / SQRT_2);
                 let count = ((until - from) / step).ceil();
                 left -= count;

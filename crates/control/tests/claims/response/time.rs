@@ -70,6 +70,21 @@ fn a_ramp_is_the_difference_of_two_integrals_of_the_step() {
     assert!(trace.time.iter().any(|&t| (t - rise).abs() < 1e-15));
 }
 
+/// The fast mode has decayed at 25 / 3, less than a step before the end of the ramp.
+#[test]
+fn a_ramp_ends_in_time_also_if_a_mode_has_decayed_just_before() {
+    let a = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![-3.0, -0.1]));
+    let direct = matrix(1, 1, &[1.0]);
+    let input = StateSpace { d: direct, ..single(a, &[1.0, 1.0], &[0.0, 0.0], CONTINUOUS) };
+    for rise in [8.3333, 8.34, 8.36, 8.5] {
+        let trace = ramp_response(&input, 0, rise).unwrap();
+        assert!(trace.time.iter().any(|t| (t - rise).abs() < 1e-12), "{rise}");
+        for (t, w) in trace.time.iter().zip(trace.output.iter()) {
+            assert!((w - (t / rise).min(1.0)).abs() < 1e-12, "{rise} {t}: {w}");
+        }
+    }
+}
+
 /// The recursion, sample by sample, for a slow and a fast mode, one of them alternating.
 #[test]
 fn sampled_responses_are_those_of_the_recursion() {
