@@ -153,6 +153,6 @@ fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f
         let size = product.norm();
         polynomial = if size > 0.0 { product / size } else { product };
     }
-    let svd = Svd::new(&polynomial)?;
-    Ok(svd.left.columns(n - values.len(), values.len()).into_owned())
+    let svd = Svd::new(&polynomial.transpose())?;
+    Ok(svd.right.columns(n - values.len(), values.len()).into_owned())
 }

@@ -454,6 +454,20 @@ fn half_of_a_pair_is_no_silent_mode_and_a_faster_one_does_not_take_its_place() {
     assert!((computed.gain[(0, 0)] - 2.0).abs() < 1e-12, "{}", computed.gain);
 }
 
+/// x' = -(p + q) x + p q x_i + N_r r, x_i' = r - x: x = (p q + N_r s) / ((s + p) (s + q)) r lacks -p for N_r = q. Of
+/// whole numbers some eigenvalues are exact.
+#[test]
+fn an_exact_eigenvalue_is_silent_too() {
+    for (p, q) in (1..9).flat_map(|p| (p + 1..10).map(move |q| (f64::from(p), f64::from(q)))) {
+        let k = matrix(1, &[-p - q, p * q]);
+        let domain = Domain::Continuous;
+        let computed = integral_feedforward(&one(0.0), &one(1.0), &one(1.0), &k, domain);
+        let computed = computed.unwrap().unwrap();
+        assert!((computed.gain[(0, 0)] / q - 1.0).abs() < 1e-10, "{p} {q}: {}", computed.gain);
+        assert!((computed.silent[0].re / p + 1.0).abs() < 1e-10 && computed.silent.len() == 1);
+    }
+}
+
 fn double_integrator() -> [DMatrix<f64>; 3] {
     [matrix(2, &[0.0, 1.0, 0.0, 0.0]), matrix(2, &[0.0, 1.0]), matrix(1, &[1.0, 0.0])]
 }
