@@ -32,10 +32,11 @@ pub use integral_feedforward::{IntegralFeedforward, integral_feedforward};
 pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
 pub use windup::windup_gain;
 
+use crate::balance::{divide_rows, multiply_columns, power_of_two};
 use crate::blocks::{beside, block_2x2, stacked};
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this, relative to the largest, count as zero; rows and columns have length one.
 const TOLERANCE: f64 = 1e-12;
@@ -166,13 +167,13 @@ pub(crate) fn integration(domain: Domain) -> (f64, f64) {
 ///
 /// `a`, `b`, `output`: as in [`extended_pair`]; `k_x`: m x n, such that A + B `K_x` is stable. G^+ is the
 /// pseudoinverse: of several `N_r` (more commands than references) the one of least norm in the given
-/// units. It exists if [`tracking_rank`] is full. Method: singular value decomposition of G and one step of
-/// iterative refinement.
+/// units. It exists if [`tracking_rank`] is full. Method: singular value decomposition of G, the references in units in
+/// which its rows have about length one, and one step of iterative refinement.
 ///
 /// # Errors
 ///
 /// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable A + B `K_x`;
-/// [`Error::ResidualTooLarge`] if G `N_r` differs from I by more than 1e-9; [`Error::Overflow`],
+/// [`Error::ResidualTooLarge`] if G `N_r` differs from I by more than 1e-9 in these units; [`Error::Overflow`],
 /// [`Error::NotConverged`].
 pub fn feedforward(
     a: &DMatrix<f64>,
@@ -198,17 +199,24 @@ pub fn feedforward(
         check::in_range(what, output * states)
     };
     let whole = gain(&DMatrix::identity(m, m))?;
-    let svd = Svd::new(&whole.transpose())?;
+    // Units of the references in which each row of G has about length one.
+    let unit = |length: f64| match power_of_two(length) {
+        unit if unit.is_normal() => unit,
+        _ => 1.0,
+    };
+    let units = DVector::from_iterator(t, whole.row_iter().map(|row| unit(row.norm())));
+    let svd = Svd::new(&divide_rows(&whole, &units).transpose())?;
     let rank = svd.rank(TOLERANCE);
     // (G')^+ = (G^+)'.
     let solve = |r: &DMatrix<f64>| {
         let left = svd.left.columns(0, rank);
-        left * svd.whitening(rank).transpose() * r
+        left * svd.whitening(rank).transpose() * divide_rows(r, &units)
     };
     let identity = DMatrix::identity(t, t);
     let first = solve(&identity);
     let n_r = &first + solve(&(&identity - gain(&first)?));
-    require_residual("G N_r = I", (gain(&n_r)? - identity).amax(), 1e-9)?;
+    let remainder = multiply_columns(&(gain(&n_r)? - identity), &units);
+    require_residual("G N_r = I", divide_rows(&remainder, &units).amax(), 1e-9)?;
     Ok(n_r)
 }
 

@@ -289,6 +289,19 @@ fn the_feedforward_of_one_state_is_its_closed_form() {
     assert!((computed[(0, 0)] - (1.0 - a - b * 0.1) / (b * c)).abs() < 1e-15);
 }
 
+/// A reference in a thousandth of its unit has a thousandth of the gain.
+#[test]
+fn the_feedforward_of_references_in_very_different_units_is_the_same() {
+    let [a, b, c] = plant();
+    let (output, k) = (h() * c, -DMatrix::identity(2, 3) * 0.3);
+    let expected = feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap();
+    for unit in [1e3, 1e5, 1e9] {
+        let units = DMatrix::from_diagonal(&DVector::from_vec(vec![unit, 1.0 / unit]));
+        let computed = feedforward(&a, &b, &(&units * &output), &k, Domain::Continuous).unwrap();
+        assert!((computed * units - &expected).amax() < 1e-13, "{unit}");
+    }
+}
+
 #[test]
 fn a_feedforward_for_which_a_state_overflows_is_refused() {
     // r_1 = 1 needs u_1 = 1e10, which leads x_2 to 1e310.
