@@ -2,6 +2,7 @@
 
 use crate::blocks::beside;
 use crate::svd::{Svd, norm_2};
+use crate::tracking::tracking_rank;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
@@ -136,7 +137,8 @@ pub fn equilibrium(
     check::shape("outputs", outputs, (outputs.nrows(), n))?;
     let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
     check::shape("disturbance", &w, (n, 1))?;
-    let whole = beside(a, &actuators.remaining()?);
+    let remaining = actuators.remaining()?;
+    let whole = beside(a, &remaining);
     let svd = Svd::new(&whole)?;
     let rank = svd.rank(TOLERANCE);
     if rank < n {
@@ -146,12 +148,11 @@ pub fn equilibrium(
     let mut solution = svd.least_squares(&-&w, rank);
     solution -= svd.least_squares(&(&whole * &solution + &w), rank);
     let free = svd.right.columns(rank, n + m - rank);
-    let free_outputs = outputs * free.rows(0, n);
-    if !free_outputs.is_empty() {
-        let svd = Svd::new(&free_outputs)?;
-        let correction = svd.least_squares(&-(outputs * solution.rows(0, n)), svd.rank(TOLERANCE));
-        solution += free * correction;
-    }
+    // The outputs that they reach; what rounding leaves of the others is no effect.
+    let reached = tracking_rank(a, &remaining, outputs)?.rank.saturating_sub(n);
+    let svd = Svd::new(&(outputs * free.rows(0, n)))?;
+    let correction = svd.least_squares(&-(outputs * solution.rows(0, n)), reached);
+    solution += free * correction;
     let x: DVector<f64> = solution.column(0).rows(0, n).into();
     Ok(Equilibrium {
         left: (outputs * &x).norm(),

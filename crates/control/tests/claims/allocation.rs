@@ -61,6 +61,27 @@ fn a_remaining_input_holds_the_output_that_must_be_kept() {
     assert!((&both.x - DVector::from_row_slice(&[-0.12, 0.24])).amax() < 1e-13);
 }
 
+/// z1' = -z1 + w, z2' = -2 z2 + u, z3' = -3 z3 + u in other coordinates x = T z: no command moves z1 from w = 1.
+#[test]
+fn an_output_that_no_remaining_input_moves_is_left() {
+    for t in [
+        [0.0, 0.0, 2.0, 3.0, -3.0, -2.0, 2.0, 3.0, -2.0],
+        [-1.0, 3.0, -1.0, -2.0, 2.0, -2.0, -1.0, 1.0, 0.0],
+        [-3.0, -3.0, 3.0, 2.0, 2.0, 0.0, 2.0, -1.0, 0.0],
+    ] {
+        let t = matrix(3, 3, &t);
+        let inverse = t.clone().try_inverse().unwrap();
+        let modes = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -2.0, -3.0]));
+        let (a, b) = (&t * modes * &inverse, &t * matrix(3, 1, &[0.0, 1.0, 1.0]));
+        let w = t.column(0).into_owned();
+        let actuators = Actuators { b: &b, gone: &[], authority: &[1.0] };
+        let rest = equilibrium(&a, &actuators, &inverse.rows(0, 1).into(), &w).unwrap();
+        assert!((rest.left - 1.0).abs() < 1e-12, "{rest:?}");
+        assert!((&a * &rest.x + &b * &rest.u + &w).amax() < 1e-12, "{rest:?}");
+        assert!(rest.x.amax() < 5.0 && rest.u[0].abs() < 5.0, "{rest:?}");
+    }
+}
+
 #[test]
 fn a_plant_that_cannot_rest_under_the_disturbance_is_refused() {
     let (a, b) = (DMatrix::zeros(2, 2), DMatrix::identity(2, 2));
