@@ -10,6 +10,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this part of the largest count as zero; the columns have length one.
 const TOLERANCE: f64 = 1e-9;
+/// An effect of an input on a measurement below this part of the sizes of its terms is rounding of their sum.
+const ROUNDING: f64 = 1e-13;
 
 /// A plant with noise and unknown inputs d: x' = A x + B u + w + sum of e d, y = C x + v + sum of `e_s` d;
 /// `x[k+1]` for x' in sampled time.
@@ -176,7 +178,9 @@ impl UnknownInputObserver {
         let on_measurements = columns(|input| &input.on_measurements, p);
         let Some(unaffected) = left_null_space(&on_measurements)? else { return Ok(None) };
         let e = columns(|input| &input.on_states, n);
-        let visible = &unaffected * &plant.c * &e;
+        let sizes = unaffected.abs() * plant.c.abs() * e.abs();
+        let effect = |sum: f64, size: f64| if sum.abs() > ROUNDING * size { sum } else { 0.0 };
+        let visible = (&unaffected * &plant.c * &e).zip_map(&sizes, effect);
         if e.ncols() > 0 && rank(&unit_columns(&visible))? < rank(&e)? {
             return Ok(None);
         }
@@ -304,4 +308,29 @@ fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
 
 fn rank(m: &DMatrix<f64>) -> Result<usize, Error> {
     Ok(Svd::new(m)?.rank(TOLERANCE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 0.1 * 3 - 0.3 is zero, but not with the rounded length of (3, -1).
+    #[test]
+    fn an_input_without_effect_on_the_measurements_is_not_decoupled() {
+        let plant = NoisyPlant {
+            a: DMatrix::from_row_slice(3, 3, &[-1.0, 0.2, 0.0, 0.1, -2.0, 0.3, 0.0, 0.4, -1.5]),
+            b: DMatrix::identity(3, 1),
+            c: DMatrix::from_row_slice(2, 3, &[0.1, 0.3, 0.0, 0.0, 0.0, 1.0]),
+            w: DMatrix::identity(3, 3),
+            v: DMatrix::identity(2, 2),
+            domain: Domain::Continuous,
+        };
+        let filter = |on_states: [f64; 3]| {
+            let on_states = DVector::from_row_slice(&on_states);
+            let input = UnknownInput { on_states, on_measurements: DVector::zeros(2) };
+            detection_filter(&plant, &[input]).unwrap()
+        };
+        assert_eq!(filter([3.0, -1.0, 0.0]), None);
+        assert!(filter([0.0, 0.0, 1.0]).is_some());
+    }
 }
