@@ -1,6 +1,6 @@
 //! The filter of the residuals: a Kalman filter behind an unknown-input observer.
 
-use crate::balance::unit_columns;
+use crate::balance::{divide_columns, unit_columns};
 use crate::blocks::symmetric_part;
 use crate::residual::ResidualGenerator;
 use crate::riccati::kalman;
@@ -187,9 +187,12 @@ impl UnknownInputObserver {
         let Some(left) = left_null_space(&visible)? else { return Ok(None) };
         let mut h = DMatrix::zeros(n, p);
         if e.ncols() > 0 {
-            let svd = Svd::new(&visible)?;
+            // In units of the inputs in which all have effects of length one.
+            let lengths = visible.column_iter().map(|column| column.norm());
+            let e = divide_columns(&e, &DVector::from_iterator(e.ncols(), lengths));
+            let svd = Svd::new(&unit_columns(&visible))?;
             let unit = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
-            h = &e * svd.least_squares(&unit, svd.rank(TOLERANCE)) * &unaffected;
+            h = e * svd.least_squares(&unit, svd.rank(TOLERANCE)) * &unaffected;
         }
         let t = DMatrix::identity(n, n) - &h * &plant.c;
         let range = Svd::new(&t)?;
@@ -332,5 +335,29 @@ mod tests {
         };
         assert_eq!(filter([3.0, -1.0, 0.0]), None);
         assert!(filter([0.0, 0.0, 1.0]).is_some());
+    }
+
+    /// The second state is measured in units of 1e10; both inputs are removed all the same.
+    #[test]
+    fn inputs_with_effects_of_very_different_sizes_are_decoupled() {
+        let sizes = DVector::from_vec(vec![1.0, 1e-10, 1.0]);
+        let plant = NoisyPlant {
+            a: DMatrix::from_row_slice(3, 3, &[-1.0, 0.2, 0.1, 0.1, -2.0, 0.3, 0.5, 0.4, -1.5]),
+            b: DMatrix::identity(3, 1),
+            c: DMatrix::from_diagonal(&sizes),
+            w: DMatrix::identity(3, 3),
+            v: DMatrix::from_diagonal(&sizes.map(|size| size * size)),
+            domain: Domain::Continuous,
+        };
+        let input = |at: usize| UnknownInput {
+            on_states: DVector::from_fn(3, |i, _| f64::from(u8::from(i == at))),
+            on_measurements: DVector::zeros(3),
+        };
+        let filter = detection_filter(&plant, &[input(0), input(1)]).unwrap().unwrap();
+        for at in [0, 1] {
+            let effect = filter.effect(&input(at)).unwrap();
+            assert!(effect.b.amax() < 1e-12 && effect.d.amax() < 1e-12, "{at}: {effect:?}");
+        }
+        assert!(filter.effect(&input(2)).unwrap().b.amax() > 0.1);
     }
 }
