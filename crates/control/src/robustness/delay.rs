@@ -13,7 +13,12 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
 
 /// Number of whole samples up to which the delay of a sampled loop is refined.
-const REFINED_SAMPLES: f64 = 20.0;
+const REFINED_SAMPLES: u32 = 20;
+/// Number of parts of a sample at which loops with up to `LARGE` states are tested.
+const PARTS: u32 = 4;
+const LARGE: usize = 100;
+/// Instability between two stable samples that is no rounding error of modes close to z = 1.
+const CLEAR: f64 = 1e-6;
 
 /// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
 /// at which the loop is on the limit of stability; infinite if there is none.
@@ -85,8 +90,9 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 /// `plant`: continuous, or in the samples of the controller, for which the result is rounded down to whole samples;
 /// `controller`: sampled. Over an interval the plant receives first the command
 /// of the sample before, then the new one, so that every delay gives a sampled loop whose
-/// eigenvalues decide. Method: the whole samples by [`delay_margin`], the part of a sample by regula falsi; above
-/// 20 samples the result is that of [`delay_margin`].
+/// eigenvalues decide. Method: the whole samples by [`delay_margin`]; before them, up to 20 samples and 100 states,
+/// each quarter of a sample, since modes near half of the sample rate may be unstable between two stable samples; the
+/// limit by regula falsi. Above 20 samples it is that of [`delay_margin`].
 ///
 /// # Errors
 ///
@@ -118,19 +124,30 @@ pub(super) fn refine(
     if plant.domain != Domain::Continuous {
         return Ok(period * whole);
     }
-    if whole.is_nan() || whole > REFINED_SAMPLES {
-        return Ok(estimate);
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most twenty")]
-    let samples = whole as usize;
-    let value = |part: f64| {
-        let dynamics = delayed(plant, controller, period, samples, part)?;
+    let value = |samples: f64| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 21")]
+        let count = samples as usize;
+        let dynamics = delayed(plant, controller, period, count, samples.fract())?;
         instability(&dynamics, controller.domain)
     };
+    let mut ends = [whole, whole + 1.0];
+    let is_large = plant.a.nrows() + controller.a.nrows() > LARGE;
+    let most = if is_large { 0 } else { PARTS * REFINED_SAMPLES };
+    let tested = (1..most).filter(|at| at % PARTS > 0).map(|at| f64::from(at) / f64::from(PARTS));
+    for delay in tested.take_while(|delay| whole.is_nan() || *delay < whole) {
+        if value(delay)? > CLEAR {
+            ends = [delay - 1.0 / f64::from(PARTS), delay];
+            break;
+        }
+    }
+    if ends[0].is_nan() || ends[0] > f64::from(REFINED_SAMPLES) {
+        return Ok(estimate);
+    }
     // Rounding may hide that the loop is stable at the start and unstable at the end.
-    let start = Evaluation { at: 0.0, value: value(0.0)?.min(-f64::MIN_POSITIVE) };
-    let end = Evaluation { at: 1.0, value: value(1.0)?.max(f64::MIN_POSITIVE) };
-    Ok(period * (whole + narrow(start, end, value)?.0))
+    let [start, end] = ends;
+    let start = Evaluation { at: start, value: value(start)?.min(-f64::MIN_POSITIVE) };
+    let end = Evaluation { at: end, value: value(end)?.max(f64::MIN_POSITIVE) };
+    Ok(period * narrow(start, end, value)?.0)
 }
 
 /// The loop whose commands are delayed by `samples` and a part of one, 0 to 1: its states are those of plant and

@@ -312,6 +312,40 @@ fn a_loop_of_more_than_one_at_half_of_the_sample_rate_bears_no_delay() {
     }
 }
 
+/// An oscillator that is sampled once in each turn, and decays by d in it: x[k+1] = d x[k] - (1 - d) k x[k-j], stable
+/// for every delay of j samples if k < 1. With a delay of half a sample, with r = d^(1/2),
+/// x[k+1] = (d - k (1 + r)) x[k] + k r (1 + r) x[k-1], unstable for k r (1 + r) > 1.
+#[test]
+fn a_loop_may_bear_every_whole_sample_of_delay_and_not_a_part_of_one() {
+    let (d, k, period) = (0.9_f64, 0.8, 0.5);
+    let (decay, turn) = (-d.ln() / period, 2.0 * PI / period);
+    let square = decay * decay + turn * turn;
+    let plant = StateSpace {
+        a: matrix(2, 2, &[0.0, 1.0, -square, -2.0 * decay]),
+        b: matrix(2, 1, &[0.0, square]),
+        c: matrix(1, 2, &[1.0, 0.0]),
+        d: matrix(1, 1, &[0.0]),
+        domain: Domain::Continuous,
+    };
+    let controller = gain(&matrix(1, 1, &[-k]), Domain::Sampled { period });
+    let delay = sampled_delay_margin(&plant, &controller).expect("a delay");
+    assert!(delay < 0.5 * period, "{delay}");
+    // The size of x after many samples, by the states at the instants at which the command changes.
+    let grown = |delay: f64| {
+        let hold = |time: f64| zero_order_hold(&plant.a, &plant.b, time).expect("a plant");
+        let (before, after) = (hold(delay), hold(period - delay));
+        let (mut x, mut old) = (matrix(2, 1, &[1.0, 0.0]), 0.0);
+        for _ in 0..4000 {
+            let new = -k * x[0];
+            x = &before.0 * x + &before.1 * old;
+            x = &after.0 * x + &after.1 * new;
+            old = new;
+        }
+        x.norm()
+    };
+    assert!(grown(0.99 * delay) < 1e-3 && grown(1.01 * delay) > 1e3, "{delay}");
+}
+
 /// An integrator with u = -k y, held over h, has the eigenvalue 1 - k h.
 #[test]
 fn an_integrator_may_be_held_for_two_time_constants() {
