@@ -11,8 +11,8 @@ const BETWEEN: usize = 6;
 /// Width of the logarithm of the largest deviation at which the search ends, relative to that of a constant weight.
 const NARROW: f64 = 1e-3;
 /// Smallest value of the first and the last coefficient of the squared magnitude: magnitudes at frequency 0 and
-/// infinity are neither 0 nor infinite.
-const SMALLEST: f64 = 1e-6;
+/// infinity are neither 0 nor infinite. For poles and zeros of second order at an end of four decades it is 1e-8.
+const SMALLEST: f64 = 1e-10;
 /// Least damping ratio of poles and zeros.
 const DAMPING: f64 = 0.2;
 
@@ -192,6 +192,16 @@ mod tests {
         // Straight lines between the points of the table differ from the weight by 3 %.
         let deviation = weight_of_table(&table, 2).unwrap().deviation;
         assert!(deviation < 1.05, "{deviation}");
+    }
+
+    /// 1 / (s + 0.001)^2 differs from 1 / s^2 by 1 % at 0.01 rad/s, and by less above.
+    #[test]
+    fn a_table_with_a_slope_at_both_ends_is_met() {
+        for slope in [-2, 2] {
+            let table = [0.01, 1.0, 100.0].map(|w: f64| (w, w.powi(slope)));
+            let deviation = weight_of_table(&table, 2).unwrap().deviation;
+            assert!(deviation < 1.02, "{slope}: {deviation}");
+        }
     }
 
     /// By symmetry the best first-order weight for a step from 1 to 4 at once in a table of three
