@@ -1,7 +1,9 @@
 //! Exact discretisation of a linear system with an input that is constant or linear over the step,
 //! and its inverse.
 
-use crate::balance::{Balance, divide_columns, divide_rows, power_of_two};
+use crate::balance::{
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+};
 use crate::blocks::beside;
 use crate::exponential::scaling_and_squaring;
 use crate::logarithm::logarithm_of_one_plus;
@@ -125,8 +127,9 @@ pub fn zero_order_hold(
 /// [`zero_order_hold`].
 ///
 /// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants it is the one whose eigenvalues
-/// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: the
-/// logarithm of [phi, gamma; 0, I], see [`logarithm_of_one_plus`].
+/// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: states
+/// balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I], see
+/// [`logarithm_of_one_plus`].
 ///
 /// # Example
 ///
@@ -151,9 +154,17 @@ pub fn continuous(
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let (n, m) = (check::with_inputs(phi, gamma)?, gamma.ncols());
     check::positive("h", h)?;
-    let less_one = beside(&(phi - DMatrix::identity(n, n)), gamma).resize_vertically(n + m, 0.0);
-    let all = logarithm_of_one_plus(&less_one).ok_or(Error::NoContinuousPlant)? / h;
-    Ok((all.view((0, 0), (n, n)).into(), all.view((0, n), (n, m)).into()))
+    let balance = Balance::new(phi);
+    let less_one = &balance.matrix - DMatrix::identity(n, n);
+    let inputs = divide_rows(gamma, &balance.scale);
+    let relative = inputs.column_iter().map(|c| unit(c.norm() / less_one.norm()));
+    let units = DVector::from_iterator(m, relative);
+    let whole = beside(&less_one, &divide_columns(&inputs, &units));
+    let whole = whole.resize_vertically(n + m, 0.0);
+    let all = logarithm_of_one_plus(&whole).ok_or(Error::NoContinuousPlant)? / h;
+    let input = multiply_columns(&all.view((0, n), (n, m)).into(), &units);
+    let a = balance.restore(&all.view((0, 0), (n, n)).into());
+    Ok((a, multiply_rows(&input, &balance.scale)))
 }
 
 /// Computes Phi, `Gamma_0`, and `Gamma_1` of the first `slopes` inputs, n x `slopes`.
@@ -185,7 +196,8 @@ fn integrals(
     ])
 }
 
-/// The power of two nearest to the norm of an input's column; one for an input without effect.
+/// The power of two nearest to the norm of an input's column; one for an input without effect, and for a norm that is
+/// infinite.
 fn unit(norm: f64) -> f64 {
     let power = power_of_two(norm);
     if power.is_normal() { power } else { 1.0 }

@@ -6,7 +6,7 @@ use crate::reference::{
 use crate::{integers, matrix};
 use control::Error;
 use control::hold::{FirstOrderHold, continuous, zero_order_hold};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Natural units of the controller's states; its entries are proportional to powers of 1800 / s.
 const UNITS: [f64; 5] = [1.0, 1.0, 1800.0, 1800.0, 3_240_000.0];
@@ -162,6 +162,25 @@ fn the_continuous_plant_of_samples_is_the_one_that_was_sampled() {
         let (computed, input) = continuous(&phi, &gamma, h).unwrap();
         assert!((&computed - &a).amax() < 1e-10 * a.amax() / h, "{h}: {computed}");
         assert!((&input - &b).amax() < 1e-10 * b.amax() / h, "{h}: {input}");
+    }
+}
+
+/// With x = S `x_s` and u = k `u_s` the matrices of the same plant are S^-1 A S and k S^-1 B.
+#[test]
+fn the_continuous_plant_does_not_depend_on_the_units_of_states_and_inputs() {
+    let a = matrix(3, 3, &[-1e-3, 1.0, 0.0, -40.0, -0.4, 2.0, 0.0, 0.0, 0.0]);
+    let b = matrix(3, 2, &[0.0, 1.0, 5.0, 0.0, 0.0, 1.0]);
+    for h in [1e-4, 0.05, 0.4] {
+        let (phi, gamma) = zero_order_hold(&a, &b, h).unwrap();
+        for (unit, factor) in [(1.0, 1e-9), (1.0, 1e9), (1e9, 1.0)] {
+            let s = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, unit, 1.0 / unit]));
+            let inverse = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1.0 / unit, unit]));
+            let (phi, gamma) = (&inverse * &phi * &s, &inverse * &gamma * factor);
+            let (computed, input) = continuous(&phi, &gamma, h).unwrap();
+            let error = (&s * computed * &inverse - &a).amax() / a.amax();
+            let input_error = (&s * input / factor - &b).amax() / b.amax();
+            assert!(error < 1e-11 && input_error < 1e-11, "{h} {unit} {factor}: {error:e}");
+        }
     }
 }
 
