@@ -1,11 +1,12 @@
 //! The plant with faults.
 
+use crate::balance::unit_columns;
 use crate::blocks::block_2x2;
 use crate::svd::Svd;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// Singular values of B below this part of the largest count as zero.
+/// Singular values of B, its columns scaled to length one, below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
 /// The plant with faults (1) and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x; in
@@ -79,15 +80,15 @@ impl FaultyPlant {
     ///
     /// It always exists. The compensation is complete if the columns of `F_a` are in the range of
     /// B; [`crate::aso::AsoDesign::cancellation_residual`] measures the part that is not cancelled.
-    /// Singular values of B below 1e-12 of the largest count as zero.
+    /// Singular values of B, its columns scaled to length one, below 1e-12 of the largest count as zero.
     ///
     /// # Errors
     ///
     /// Same as [`FaultyPlant::check`]; [`Error::NotConverged`].
     pub fn compensation_gain(&self) -> Result<DMatrix<f64>, Error> {
         self.check()?;
+        let rank = Svd::new(&unit_columns(&self.b))?.rank(TOLERANCE);
         let b = Svd::new(&self.b)?;
-        let rank = b.rank(TOLERANCE);
         let gain = b.least_squares(&-&self.f_a, rank);
         let correction = b.least_squares(&(&self.b * &gain + &self.f_a), rank);
         Ok(gain - correction)

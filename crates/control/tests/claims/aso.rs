@@ -35,6 +35,16 @@ fn friction_on_the_cart_is_compensated_one_to_one() {
     assert!(design.cancellation_residual < 1e-15);
 }
 
+/// B = diag(1e9, 1e-9) and `F_a` = -B: each actuator compensates its own fault.
+#[test]
+fn faults_of_actuators_with_very_different_units_are_compensated_one_to_one() {
+    let b = matrix(2, 2, &[1e9, 0.0, 0.0, 1e-9]);
+    let (a, c) = (DMatrix::zeros(2, 2), DMatrix::identity(2, 2));
+    let plant = FaultyPlant::with_constant_faults(a, b.clone(), c, -b);
+    let k_f = plant.compensation_gain().unwrap();
+    assert!((&k_f - DMatrix::identity(2, 2)).amax() < 1e-15, "{k_f}");
+}
+
 /// A force on the pendulum itself, `F_a` = [0, 0, 0, 1]', is not in the range of the actuator.
 #[test]
 fn a_fault_beside_the_actuator_leaves_the_residual_of_the_projection() {
