@@ -88,6 +88,9 @@ impl Weight {
     /// |W(j w)|, `frequency`: w in rad/s; in sampled time the [`bilinear_frequency`] of the signal's.
     #[must_use]
     pub fn magnitude(&self, frequency: f64) -> f64 {
+        if frequency.is_infinite() {
+            return self.numerator[0];
+        }
         let p = Complex::new(0.0, frequency / self.unit);
         let value = |coefficients: &[f64]| {
             coefficients.iter().fold(Complex::new(0.0, 0.0), |sum, b| sum * p + b)
@@ -210,6 +213,7 @@ pub fn bilinear_frequency(frequency: f64, domain: Domain) -> f64 {
 mod tests {
     use super::*;
     use crate::response::frequency_response;
+    use std::f64::consts::PI;
 
     #[test]
     fn systems_have_the_stated_magnitudes_in_continuous_and_in_sampled_time() {
@@ -237,6 +241,16 @@ mod tests {
                 assert!(((at(&numerator) / at(&denominator)).norm() - 2.0).abs() < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn the_magnitude_at_half_of_the_sampling_rate_is_that_of_high_frequencies() {
+        let frequency = bilinear_frequency(PI / 0.2, Domain::Sampled { period: 0.2 });
+        for order in [1, 2] {
+            let magnitude = Weight::lead_lag(0.1, 5.0, 10.0, order).unwrap().magnitude(frequency);
+            assert!((magnitude - 10.0).abs() < 1e-13, "{order}: {magnitude}");
+        }
+        assert!((Weight::constant(3.0).magnitude(frequency) - 3.0).abs() < 1e-15);
     }
 
     #[test]
