@@ -4,6 +4,7 @@ use crate::check::as_number;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
 use crate::robustness::uniform;
 use crate::stability::instability;
+use crate::svd::Svd;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
@@ -82,10 +83,8 @@ impl Structure<'_> {
             });
             let cross = feedback.row(row) * covariance.select_columns(&columns);
             let target = DMatrix::from_fn(count, 1, |i, _| cross[i] / sizes[i]);
-            let svd = correlation.svd(true, true);
-            let least = ROUNDING * svd.singular_values.max();
-            let overflow = |_| Error::Overflow { what: "the correlation of the signals" };
-            let gains = svd.solve(&target, least).map_err(overflow)?;
+            let svd = Svd::new(&correlation)?;
+            let gains = svd.least_squares(&target, svd.rank(ROUNDING));
             for (i, column) in columns.iter().enumerate() {
                 projected[(row, reached[*column])] = gains[i] / sizes[i];
             }
@@ -217,6 +216,22 @@ mod tests {
         let structure = Structure { a: &a, b: &b, free: &[(0, 0)], domain: Domain::Continuous };
         let k = structure.projected(&DMatrix::from_row_slice(1, 2, &[-2.0, -3.0]))?;
         assert!((k[0] + 2.0).abs() < 1e-9 && k[1].abs() <= 0.0, "{k}");
+        Ok(())
+    }
+
+    /// x = G w with w' = -w / 2 + v: the covariance G G' has rank 3, and feedbacks with the same K G have the same
+    /// commands.
+    #[test]
+    fn dependent_states_give_the_commands_of_the_whole_feedback() -> Result<(), Error> {
+        let g = [0., -1., 2., -1., 2., -2., 0., -2., -2., -2., 1., 1., 2., 2., 0.];
+        let b = DMatrix::from_row_slice(5, 3, &g);
+        let row = DMatrix::from_row_slice(1, 5, &[-3.0, 0.0, 1.0, 1.0, -1.0]);
+        let k = row.resize_vertically(3, 0.0);
+        let a = DMatrix::from_diagonal_element(5, 5, -0.5) - &b * &k;
+        let free: Vec<_> = (0..5).map(|column| (0, column)).collect();
+        let structure = Structure { a: &a, b: &b, free: &free, domain: Domain::Continuous };
+        let difference = (structure.projected(&k)? - &k) * &b;
+        assert!(difference.amax() < 1e-12, "{difference}");
         Ok(())
     }
 
