@@ -89,7 +89,7 @@ pub fn smallest_radius(
 /// ```
 ///
 /// For the solver P G is divided by norm(P(I) G) = s, and Y = D Y~ D with D diagonal such that
-/// norm(P(D `E_ii` D) G) = s for every i.
+/// norm(P(D `E_ii` D) G) = s for every i that w moves, otherwise `d_i` = 1.
 fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
     let n = f.nrows();
     let p_times_g = |q: &DMatrix<f64>| Ok::<_, Error>(lyapunov(f, q)?.p * g);
@@ -99,10 +99,11 @@ fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64
         unit
     };
     let of_identity = p_times_g(&DMatrix::identity(n, n))?;
-    let size = of_identity.norm();
+    let size = of_identity.norm().max(f64::MIN_POSITIVE);
     let mut d = DVector::from_element(n, 1.0);
     for state in 0..n {
-        d[state] = (size / p_times_g(&unit(state, state))?.norm()).sqrt();
+        let ratio = size / p_times_g(&unit(state, state))?.norm();
+        d[state] = if ratio.is_finite() { ratio.sqrt() } else { 1.0 };
     }
     let mut problem = Problem::new();
     let mut scaled_p_g = Affine::constant(&(&of_identity / size));

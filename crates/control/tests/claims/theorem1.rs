@@ -105,6 +105,19 @@ mod free {
         }
     }
 
+    /// w does not move the second state; the first has the radius of z' = -z + w: P = 1/2.
+    #[test]
+    fn a_state_that_the_disturbance_does_not_move_leaves_the_radius_of_the_others() {
+        let f = matrix(2, 2, &[-1.0, 0.0, 0.0, -2.0]);
+        let radius = |entry: f64| {
+            let g = matrix(2, 1, &[entry, 0.0]);
+            smallest_radius(&f, &g, 3.0).unwrap().optimal().unwrap().delta
+        };
+        let delta = radius(1.0);
+        assert!((2.999_99..3.001).contains(&delta), "{delta}");
+        assert!(radius(0.0) <= 0.0);
+    }
+
     /// For the paper's example the radius decreases by a factor of 6, for the corrected printed
     /// gains by 3.
     #[test]
