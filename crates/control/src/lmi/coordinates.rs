@@ -30,8 +30,8 @@ pub(super) struct Coordinates {
 impl Coordinates {
     /// Coordinates in which the norm of A - c I is little more than its spectral radius: in balanced
     /// coordinates T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
-    /// eigenvalues, s 1.2 times the largest distance from it, at least 0.1 |c|. The unit is near
-    /// |c| + s. None if rounding errors hide that P > 0.
+    /// eigenvalues, s 1.2 times the largest distance from it, at least 0.1 |c|, and the norm of A if
+    /// all eigenvalues are zero. The unit is near |c| + s. None if rounding errors hide that P > 0.
     ///
     /// # Errors
     ///
@@ -40,7 +40,8 @@ impl Coordinates {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::new(a);
         let (center, farthest) = spread(a)?;
-        let radius = (WIDER * farthest).max(0.1 * center.abs()).max(f64::MIN_POSITIVE);
+        let size = (WIDER * farthest).max(0.1 * center.abs());
+        let radius = if size > 0.0 { size } else { matrix.norm().max(f64::MIN_POSITIVE) };
         let mut power = (matrix - DMatrix::identity(n, n) * center) / radius;
         let mut p = DMatrix::identity(n, n);
         for _ in 0..DOUBLINGS {

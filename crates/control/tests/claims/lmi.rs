@@ -193,6 +193,17 @@ fn the_resonance_of_an_oscillator_is_bounded_tightly() {
     }
 }
 
+/// 1 / z^2, whose eigenvalues are all zero, has the norm 1.
+#[test]
+fn a_delay_of_two_samples_is_proven() {
+    let a = matrix(2, 2, &[0., 1., 0., 0.]);
+    let (b, c) = (matrix(2, 1, &[0., 1.]), matrix(1, 2, &[1., 0.]));
+    assert!(optimal(certify_region(&a, &Region::default(), SAMPLED)).margin > 0.0);
+    let system = StateSpace { a, b, c, d: one(0.0), domain: SAMPLED };
+    let bound = optimal(certify_gain(&system, Norm::HInfinity)).gamma;
+    assert!(bound > 1.0 && bound < 1.001, "{bound}");
+}
+
 #[test]
 fn an_unstable_system_has_no_bound() {
     let system = StateSpace {
