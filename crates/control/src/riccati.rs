@@ -59,11 +59,12 @@ pub struct Regulator {
 /// Riccati equation of the domain, see [`crate::riccati`]. The stabilising solution exists and is unique when (A, B)
 /// is stabilisable and every mode of A - B R^-1 N' on the stability limit appears in the weight Q - N R^-1 N'. Both
 /// are decided by the smallest singular value of [A - lambda I, B], or of [A - lambda I; Q], with these two matrices
-/// for A and Q, in balanced coordinates; it is zero below 1e-13 n of the largest. Method: balancing of the
-/// Hamiltonian, structured doubling (after a Cayley transform for continuous time), then Newton's method, each step a
-/// Lyapunov equation for the remainder. About (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step
-/// of Newton; usually 5 to 15 doublings and 2 steps. The solution is returned only if A + B K is stable and every
-/// entry of the residual is below 1e-9 of the sum of its absolute terms.
+/// for A and Q, in balanced coordinates; it is zero below 1e-13 n of the largest; lambda are the eigenvalues of A, and
+/// those of A + B K near the limit. Method: balancing of the Hamiltonian, structured doubling (after a Cayley
+/// transform for continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About
+/// (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to 15 doublings and 2
+/// steps. The solution is returned only if A + B K is stable and every entry of the residual is below 1e-9 of the sum
+/// of its absolute terms.
 ///
 /// Source: E. K.-W. Chu, H.-Y. Fan and W.-W. Lin, A structure-preserving doubling algorithm for
 /// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with
@@ -106,6 +107,7 @@ pub fn lqr(
     let p = problem.refine(&problem.start()?)?;
     let (p, gain) = (problem.restore(&p)?, problem.restore_gain(&p)?);
     let eigenvalues = stability::require_stable("A + B K", &(a + b * &gain), domain)?;
+    existence::require_closed(&problem, &eigenvalues)?;
     let residual = problem.residual(&p);
     if residual > ALLOWED_RESIDUAL {
         let (equation, allowed) = ("the Riccati equation", ALLOWED_RESIDUAL);

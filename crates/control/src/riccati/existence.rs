@@ -12,6 +12,9 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 const TOLERANCE_PER_STATE: f64 = 1e-13;
 /// An eigenvalue this near to the limit of stability, relative to the norm of A, is not stable.
 const NEAR: f64 = 1e-12;
+/// Largest distance from the limit, relative to the norm of A, to which rounding moves a mode of A + B K that does not
+/// appear in Q: about the root of the residual of P.
+const MOVED: f64 = 1e-4;
 
 /// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q.
 ///
@@ -21,13 +24,40 @@ const NEAR: f64 = 1e-12;
 /// [`Error::NotConverged`].
 pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
     let (a, b, domain) = (&problem.decoupled_a, &problem.equation.b, problem.equation.domain);
-    let least_weight = smallest_weight(a, &problem.decoupled_q);
-    for eigenvalue in eigenvalues(a)?.into_iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
+    let all = eigenvalues(a)?;
+    for &eigenvalue in all.iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
         if domain.excess(eigenvalue) >= -NEAR * a.norm()
             && is_deficient(&a.transpose(), &b.transpose(), eigenvalue)?
         {
             return Err(Error::NotStabilisable { eigenvalue });
         }
+    }
+    require_weights(problem, &all)
+}
+
+/// Checks that the modes at the eigenvalues of A + B K appear in Q if these are so near to the stability limit that
+/// rounding errors may have moved them from there.
+///
+/// Rounding splits a multiple eigenvalue of A, so that [`require`] may miss a mode on the limit. A + B K keeps it as a
+/// simple eigenvalue if it does not appear in Q.
+///
+/// # Errors
+///
+/// [`Error::Unweighted`]; [`Error::NotConverged`].
+pub(super) fn require_closed(
+    problem: &ScaledProblem,
+    closed: &[Complex<f64>],
+) -> Result<(), Error> {
+    let (limit, domain) = (-MOVED * problem.decoupled_a.norm(), problem.equation.domain);
+    let near = closed.iter().copied().filter(|&value| domain.excess(value) >= limit);
+    require_weights(problem, &near.collect::<Vec<_>>())
+}
+
+/// Checks that every mode on the stability limit appears in Q, at the points of the limit nearest to `eigenvalues`.
+fn require_weights(problem: &ScaledProblem, eigenvalues: &[Complex<f64>]) -> Result<(), Error> {
+    let (a, domain) = (&problem.decoupled_a, problem.equation.domain);
+    let least_weight = smallest_weight(a, &problem.decoupled_q);
+    for eigenvalue in eigenvalues.iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
         // The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
         let limit = match domain {
             Domain::Continuous => Complex::new(0.0, eigenvalue.im),

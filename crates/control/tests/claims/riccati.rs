@@ -113,6 +113,24 @@ fn a_mode_on_the_limit_of_stability_that_the_weight_does_not_see_is_named() {
     assert!(matches!(refused, Err(Error::Unweighted { .. })), "{refused:?}");
 }
 
+/// x'' = u with a weight of the speed alone, in turned coordinates: rounding splits the double eigenvalue 0, and the
+/// best gain leaves the position at rest, with the eigenvalue 0.
+#[test]
+fn a_double_mode_on_the_limit_of_stability_is_never_taken_for_a_stable_one() {
+    for step in 1..150_u32 {
+        let (s, c) = (0.02 * f64::from(step)).sin_cos();
+        let turn = matrix(2, 2, &[c, -s, s, c]);
+        let turned = |m: DMatrix<f64>| &turn * m * turn.transpose();
+        let a = turned(matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]));
+        let b = &turn * matrix(2, 1, &[0.0, 1.0]);
+        let mut weights = identity_weights(2, 1);
+        weights.q = turned(matrix(2, 2, &[0.0, 0.0, 0.0, 1.0]));
+        weights.q[(1, 0)] = weights.q[(0, 1)];
+        let refused = lqr(&a, &b, &weights, Domain::Continuous);
+        assert!(refused.is_err(), "{step}: {refused:?}");
+    }
+}
+
 #[test]
 fn weights_that_are_not_definite_are_refused_by_name() {
     let (a, b) = (-DMatrix::identity(2, 2), DMatrix::identity(2, 2));
