@@ -7,7 +7,7 @@ use crate::lyapunov::lyapunov;
 use crate::svd::Svd;
 use crate::zeros::{Nulling, output_nulling};
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 /// Relative distance of a zero from the stability limit below which no bound is stated.
 const ON_THE_LIMIT: f64 = 1e-7;
@@ -103,7 +103,7 @@ pub fn noiseless_norm_lower_bound(
         }
     };
     let Some(nulling) = output_nulling(&system, &e, &g)? else { return Ok(None) };
-    let Some(unstable) = unstable_part(&nulling.dynamics)? else { return Ok(None) };
+    let Some(unstable) = unstable_part(&nulling)? else { return Ok(None) };
     if unstable.dynamics.is_empty() {
         return Ok(Some(0.0));
     }
@@ -150,20 +150,22 @@ struct InvariantSubspace {
     dynamics: DMatrix<f64>,
 }
 
-/// The invariant subspace of the eigenvalues with positive real parts, without columns if there are none; None if an
-/// eigenvalue is on the imaginary axis or the subspace is not accurate.
+/// The invariant subspace of A, the dynamics of `nulling`, for the eigenvalues with positive real parts, without columns
+/// if there are none; None if an eigenvalue is on the imaginary axis or the subspace is not accurate.
 ///
 /// Method: the sign of A by Newton's iteration with norm scaling (N. J. Higham, Functions of Matrices (2008),
 /// section 5.5); U is the range of I + sign A.
-fn unstable_part(a: &DMatrix<f64>) -> Result<Option<InvariantSubspace>, Error> {
-    let n = a.nrows();
+fn unstable_part(nulling: &Nulling) -> Result<Option<InvariantSubspace>, Error> {
+    let (a, n) = (&nulling.dynamics, nulling.dynamics.nrows());
     let empty = InvariantSubspace { basis: DMatrix::zeros(n, 0), dynamics: DMatrix::zeros(0, 0) };
     if n == 0 {
         return Ok(Some(empty));
     }
     let all = eigenvalues(a)?;
-    if all.iter().any(|value| value.re.abs() <= ON_THE_LIMIT * value.norm().max(f64::MIN_POSITIVE))
-    {
+    let on_the_limit = |value: &Complex<f64>| {
+        value.re.abs() <= (ON_THE_LIMIT * value.norm()).max(nulling.rounding)
+    };
+    if all.iter().any(on_the_limit) {
         return Ok(None);
     }
     let count = all.iter().filter(|value| value.re > 0.0).count();
@@ -238,6 +240,16 @@ pub(super) mod tests {
         let ratios = pick.lu().solve(&of_z).unwrap();
         let largest = eigenvalues(&ratios).unwrap().iter().map(|x| x.re).fold(0.0, f64::max);
         assert!((bound([p * q, -p - q, 1.0]) / largest.sqrt() - 1.0).abs() < 1e-5);
+    }
+
+    /// Rounding errors would make a zero at 0 one of the right half plane, with an error of 1 / z.
+    #[test]
+    fn a_zero_at_the_origin_has_no_bound() {
+        for numerator in [[0.0, 2.0, 1.0], [0.0, 1.0, -1.0], [0.0, 1.0, 0.0]] {
+            let (a, c, performance) = filtered_fault(numerator);
+            let bound = noiseless_norm_lower_bound(&a, &c, &performance, Domain::Continuous);
+            assert_eq!(bound, Ok(None), "{numerator:?}");
+        }
     }
 
     /// The bound for noise of the measurement is proven by linear matrix inequalities; it falls towards that

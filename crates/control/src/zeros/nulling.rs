@@ -15,6 +15,8 @@ pub(crate) struct Nulling {
     pub(crate) input: DMatrix<f64>,
     /// Z, r x s.
     pub(crate) output: DMatrix<f64>,
+    /// The size of the rounding errors of S.
+    pub(crate) rounding: f64,
 }
 
 /// Computes the motions of x' = A x + B w that y = C x + D w does not show, with z = E x + G w.
@@ -56,7 +58,8 @@ pub(crate) fn output_nulling(
     let quotient = core.d.lu().solve(&core.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
     let dynamics = check::in_range("A - B D^-1 C", core.a - core.b * &quotient)?;
     let input = -(DMatrix::from_diagonal(&columns) * quotient);
-    Ok(Some(Nulling { dynamics, output: output + direct * &input, input }))
+    let output = output + direct * &input;
+    Ok(Some(Nulling { dynamics, output, input, rounding: zero }))
 }
 
 /// The lengths of the columns; 1 for a column of zeros.
