@@ -6,6 +6,9 @@ use nalgebra::{DMatrix, DVector};
 const SWEEPS: usize = 100;
 /// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
+/// For an exponential, entries of a state that acts on no other state, or on which no other state acts, are large above
+/// this multiple of the largest diagonal entry.
+const LARGE: f64 = 1024.0;
 
 /// The balanced matrix S^-1 A S, S diagonal and positive such that row i and column i have about
 /// the same norm.
@@ -37,6 +40,40 @@ impl Balance {
         let entering = DVector::from_fn(a.nrows(), |state, _| b.row(state).lp_norm(1));
         let leaving = DVector::from_fn(a.nrows(), |state, _| c.column(state).lp_norm(1));
         Self::with_signals(a, entering, leaving)
+    }
+
+    /// Balances A for its exponential: the scale of a state that acts on no other state, or on which no other state
+    /// acts, is changed, too, if its entries are large. They would be squared with the rates beside them, which lose a
+    /// digit in every third squaring.
+    pub(crate) fn of_exponential(a: &DMatrix<f64>) -> Self {
+        let mut balance = Self::new(a);
+        let size = a.diagonal().amax();
+        for _ in 0..SWEEPS {
+            let mut changed = false;
+            for state in 0..a.nrows() {
+                let diagonal = balance.matrix[(state, state)].abs();
+                let column = balance.matrix.column(state).lp_norm(1) - diagonal;
+                let row = balance.matrix.row(state).lp_norm(1) - diagonal;
+                let ratio = match (column > 0.0, row > 0.0) {
+                    (false, true) if row > LARGE * size => row / size,
+                    (true, false) if column > LARGE * size => size / column,
+                    _ => continue,
+                };
+                let factor = power_of_two(ratio);
+                if factor.is_normal() {
+                    balance.matrix.column_mut(state).scale_mut(factor);
+                    balance.matrix.row_mut(state).unscale_mut(factor);
+                    balance.scale[state] *= factor;
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+            let Self { matrix, scale } = Self::new(&balance.matrix);
+            balance = Self { matrix, scale: balance.scale.component_mul(&scale) };
+        }
+        balance
     }
 
     /// Balances A; `entering`, `leaving`: the 1-norms of each state's row of B and of its column of C.

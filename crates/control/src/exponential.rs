@@ -53,7 +53,7 @@ const REACH: f64 = 5.371_920_351_148_152;
 /// the result leaves the range of double precision.
 pub fn exponential(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     check::square("A", a)?;
-    let balance = Balance::new(a);
+    let balance = Balance::of_exponential(a);
     check::in_range("e^A", balance.restore(&scaling_and_squaring(&balance.matrix)?))
 }
 

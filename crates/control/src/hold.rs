@@ -176,7 +176,7 @@ fn integrals(
 ) -> Result<[DMatrix<f64>; 3], Error> {
     let (n, m) = (check::with_inputs(a, b)?, b.ncols());
     check::positive("h", h)?;
-    let balance = Balance::new(a);
+    let balance = Balance::of_exponential(a);
     let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
     let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));
     let mut block = DMatrix::zeros(n + m + slopes, n + m + slopes);

@@ -27,6 +27,20 @@ fn the_observer_of_the_pendulum_agrees_with_high_precision_in_every_entry() {
     assert!(error < 1e-11, "{error:e}");
 }
 
+/// x1' = -x1 + g x2, x2' = -2 x2, of which e^A has the entry g (e^-1 - e^-2), in both orders of the states.
+#[test]
+fn a_cascade_of_states_with_very_different_units_keeps_its_digits() {
+    let (one, two) = ((-1.0_f64).exp(), (-2.0_f64).exp());
+    for g in [1e-9, 1.0, 1e5, 1e9] {
+        let coupling = g * (one - two);
+        let e = exponential(&matrix(2, 2, &[-1.0, g, 0.0, -2.0])).unwrap();
+        let error = entry_error(&e, &matrix(2, 2, &[one, coupling, 0.0, two]));
+        let e = exponential(&matrix(2, 2, &[-2.0, 0.0, g, -1.0])).unwrap();
+        let other = entry_error(&e, &matrix(2, 2, &[two, 0.0, coupling, one]));
+        assert!(error < 1e-13 && other < 1e-13, "{g:e}: {error:e} {other:e}");
+    }
+}
+
 #[test]
 fn a_nilpotent_matrix_gives_its_finite_series() {
     let e = exponential(&matrix(3, 3, &[0., 1., 0., 0., 0., 1., 0., 0., 0.])).unwrap();
