@@ -36,8 +36,9 @@ const NO_INNOVATION: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Subspace {
     windows: Windows,
-    /// The factor of the windows, and the units of the signals in it.
+    /// The factor of the deviations of the windows from their means, these means, and the units of the signals in both.
     factor: DMatrix<f64>,
+    means: DVector<f64>,
     units: Vec<f64>,
     /// T of the largest order: `x[k]` = T z.
     states: DMatrix<f64>,
@@ -48,33 +49,37 @@ pub struct Subspace {
 impl Subspace {
     /// Steps 1 to 3 of [`crate::identification`]; D is zero without `feedthrough`.
     ///
-    /// Cost: singular value decompositions of matrices with 1 + s (m + p) and s p columns.
+    /// Cost: singular value decompositions of matrices with s (m + p) and s p columns.
     ///
     /// # Errors
     ///
     /// [`Error::TooFewSamples`] unless there are more windows than coefficients of the autoregressive model;
     /// [`Error::NotConverged`].
     pub fn new(windows: &Windows, feedthrough: bool) -> Result<Self, Error> {
-        let past = windows.past_columns();
-        let regressors = past.end + if feedthrough { windows.inputs } else { 0 };
-        if windows.count <= regressors {
-            let (expected, actual) = (windows.past + regressors + 1, windows.past + windows.count);
+        let (past, m) = (windows.past_columns().len(), windows.inputs);
+        let regressors = past + if feedthrough { m } else { 0 };
+        if windows.count <= 1 + regressors {
+            let (expected, actual) = (windows.past + regressors + 2, windows.past + windows.count);
             return Err(Error::TooFewSamples { expected, actual });
         }
         let (factor, units) = windows.scaled();
-        let outputs = factor.columns(past.end + windows.inputs, windows.outputs).into_owned();
+        let width = factor.ncols() - 1;
+        let means = factor.row(0).columns(1, width).transpose() / factor[(0, 0)];
+        // Without its first row the factor is that of the deviations, which would count as rounding beside large means.
+        let factor = factor.view((1, 1), (width, width)).into_owned();
+        let outputs = factor.columns(past + m, windows.outputs).into_owned();
         let svd = Svd::new(&factor.columns(0, regressors).into_owned())?;
         let coefficients = svd.least_squares(&outputs, svd.rank(ROUNDING));
         let product = observability_product(windows, &coefficients);
-        // Without the first row, the factor is that of the deviations from the means.
-        let deviations = factor.view((1, 1), (past.len(), past.len()));
+        let deviations = factor.view((0, 0), (past, past));
         let svd = Svd::new(&(deviations * product.transpose()))?;
         let rank = svd.rank(ROUNDING);
         let balance = svd.values.rows(0, rank).map(f64::sqrt) * as_number(windows.count).powf(0.25);
         let balance = DMatrix::from_diagonal(&balance);
         let states = balance * svd.whitening(rank).transpose() * product;
         let singular_values = svd.values.iter().copied().take(rank).collect();
-        Ok(Self { windows: windows.clone(), factor, units, states, singular_values, feedthrough })
+        let windows = windows.clone();
+        Ok(Self { windows, factor, means, units, states, singular_values, feedthrough })
     }
 
     /// The singular values of step 3, descending; a gap after the n-th suggests n states.
@@ -93,34 +98,39 @@ impl Subspace {
         let rule = "at least 1 and at most the number of states that the samples determine";
         let holds = (1..=self.states.nrows()).contains(&order);
         check::that(holds, "order", as_number(order), rule)?;
-        let past = self.windows.past_columns();
+        let (past, signals) = (self.windows.past_columns().len(), self.windows.signals());
         let (m, p) = (self.windows.inputs, self.windows.outputs);
         let states = self.states.rows(0, order).into_owned();
         let transposed = states.transpose();
-        let now = self.factor.columns(1, past.len()) * &transposed;
-        let next = self.factor.columns(1 + self.windows.signals(), past.len()) * &transposed;
-        let inputs = self.factor.columns(past.end, m).into_owned();
-        let outputs = self.factor.columns(past.end + m, p).into_owned();
-        let constant = self.factor.columns(0, 1).into_owned();
+        let now = self.factor.columns(0, past) * &transposed;
+        let next = self.factor.columns(signals, past) * &transposed;
+        let inputs = self.factor.columns(past, m).into_owned();
+        let outputs = self.factor.columns(past + m, p).into_owned();
 
         let no_inputs = inputs.columns(0, 0).into_owned();
         let direct = if self.feedthrough { &inputs } else { &no_inputs };
-        let (of_outputs, innovations) = regression(&[&now, direct, &constant], &outputs)?;
-        let (of_states, residuals) = regression(&[&now, &inputs, &constant], &next)?;
+        let (of_outputs, innovations) = regression(&[&now, direct], &outputs)?;
+        let (of_states, residuals) = regression(&[&now, &inputs], &next)?;
         let svd = Svd::new(&innovations)?;
         let rank = svd.rank_above(NO_INNOVATION * outputs.norm());
         let gain = svd.least_squares(&residuals, rank).transpose();
 
+        let a = of_states.columns(0, order).into_owned();
+        let b = of_states.columns(order, m).into_owned();
+        let c = of_outputs.columns(0, order).into_owned();
         let mut d = DMatrix::zeros(p, m);
         d.columns_mut(0, direct.ncols()).copy_from(&of_outputs.columns(order, direct.ncols()));
+        let mean = |first: usize, count: usize| self.means.rows(first, count).into_owned();
+        let (x, x_next) = (&states * mean(0, past), &states * mean(signals, past));
+        let (u, y) = (mean(past, m), mean(past + m, p));
         let scaled = IdentifiedModel {
-            a: of_states.columns(0, order).into(),
-            b: of_states.columns(order, m).into(),
-            c: of_outputs.columns(0, order).into(),
+            state_constant: x_next - &a * &x - &b * &u,
+            output_constant: y - &c * x - &d * u,
+            a,
+            b,
+            c,
             d,
             k: gain,
-            state_constant: last_column(&of_states),
-            output_constant: last_column(&of_outputs),
             past: states,
         };
         Ok(scaled.in_units(&self.units))
@@ -135,8 +145,7 @@ fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMat
     DMatrix::from_fn(past * outputs, past * signals, |row, column| {
         let (ahead, output) = (row / outputs, row % outputs);
         let regressor = column.checked_sub(ahead * signals);
-        // The first row of the coefficients is the constant.
-        regressor.map_or(0.0, |regressor| coefficients[(1 + regressor, output)])
+        regressor.map_or(0.0, |regressor| coefficients[(regressor, output)])
     })
 }
 
@@ -151,8 +160,4 @@ fn regression(
     let coefficients = svd.least_squares(targets, svd.rank(ROUNDING));
     let residuals = targets - &all * &coefficients;
     Ok((coefficients.transpose(), residuals))
-}
-
-fn last_column(matrix: &DMatrix<f64>) -> DVector<f64> {
-    matrix.column(matrix.ncols() - 1).into_owned()
 }

@@ -171,7 +171,7 @@ impl Windows {
     /// without windows.
     ///
     /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean
-    /// for each row.
+    /// for each row; deviations of a column that are smaller are zero in the factor.
     pub(super) fn scaled(&self) -> (DMatrix<f64>, Vec<f64>) {
         let rounding = f64::EPSILON * as_number(self.count + self.factor.nrows());
         let mut units = self.deviations();
@@ -181,8 +181,14 @@ impl Windows {
             }
         }
         let mut factor = self.factor.clone();
-        for column in 1..factor.ncols() {
-            factor.column_mut(column).unscale_mut(units[(column - 1) % units.len()]);
+        for at in 1..factor.ncols() {
+            let mut column = factor.column_mut(at);
+            let least = rounding * column[0].abs();
+            let mut deviations = column.rows_mut(1, self.factor.nrows() - 1);
+            if deviations.norm() <= least {
+                deviations.fill(0.0);
+            }
+            column.unscale_mut(units[(at - 1) % units.len()]);
         }
         (factor, units)
     }

@@ -144,6 +144,22 @@ fn joined_parts_of_a_record_are_the_whole_record() {
     assert!(error(&one, &other) < 1e-9);
 }
 
+/// Measurements that show 1e7 more, millions of times their deviations.
+#[test]
+fn the_means_of_the_signals_do_not_change_the_model() {
+    let exact = plant();
+    let record = record(&exact, 0.1, &open(&exact), 8);
+    let shifted = Record { outputs: record.outputs.add_scalar(1e7), ..record.clone() };
+    let [one, other] = [&record, &shifted].map(|record| {
+        let windows = Windows::new(record, 8, 0..record.len()).unwrap();
+        Subspace::new(&windows, false).unwrap().model(3).unwrap()
+    });
+    assert!(error(&system(&one), &system(&other)) < 1e-5);
+    assert!((&one.c * &one.k - &other.c * &other.k).amax() < 1e-5);
+    let expected = one.predict(&record, 8..800, 5).unwrap().add_scalar(1e7);
+    assert!((other.predict(&shifted, 8..800, 5).unwrap() - expected).amax() < 1e-4);
+}
+
 #[test]
 fn measurements_and_rates_become_states() {
     // Two masses and a spring: positions in m, seen in other coordinates.
