@@ -13,6 +13,11 @@ use nalgebra::DMatrix;
 /// verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
+/// A level below this, where B and C are about one, is not large compared with the margin of the inequalities: then the
+/// coordinates are refined, at most so many times.
+const WEAK: f64 = 2e-3;
+const REFINEMENTS: usize = 3;
+
 const NO_P: &str = "no bound of the gain could be proven in double precision";
 
 /// A norm of a system from w to z.
@@ -239,18 +244,27 @@ pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound
     }
 }
 
-/// [`certify_gain`] with the program solved in given coordinates.
+/// [`certify_gain`] with the program solved in given coordinates, for a weak gain also in those in which its P is the
+/// identity.
 pub(super) fn certify_in(
     coordinates: Coordinates,
     system: &StateSpace,
     norm: Norm,
 ) -> Result<Outcome<GainBound>, Error> {
-    let search = BoundProblem::new(coordinates, system, norm);
-    let (problem, p) = search.problem(None);
-    let Some((smallest, unknowns)) = problem.minimum() else {
+    let mut search = BoundProblem::new(coordinates, system, norm);
+    let Some((mut smallest, mut p)) = search.minimum() else {
         return Ok(Outcome::Inconclusive(NO_P));
     };
-    if let Some(bound) = search.verified(smallest, &p.evaluate(&unknowns))? {
+    for _ in 0..REFINEMENTS {
+        if smallest >= WEAK {
+            break;
+        }
+        let Some(refined) = search.coordinates.refined(&p) else { break };
+        let next = BoundProblem::new(refined, system, norm);
+        let Some((level, next_p)) = next.minimum() else { break };
+        (search, smallest, p) = (next, level, next_p);
+    }
+    if let Some(bound) = search.verified(smallest, &p)? {
         return Ok(Outcome::Optimal(bound));
     }
     for relaxation in RELAXED_LEVELS {
@@ -300,6 +314,13 @@ impl<'a> BoundProblem<'a> {
             problem.constrain(&matrix, MARGIN);
         }
         (problem, p)
+    }
+
+    /// The smallest level and its P; None if the solver fails.
+    fn minimum(&self) -> Option<(f64, DMatrix<f64>)> {
+        let (problem, p) = self.problem(None);
+        let (smallest, unknowns) = problem.minimum()?;
+        Some((smallest, p.evaluate(&unknowns)))
     }
 
     /// The bound at `level`; None if P does not prove it in the units of the data.

@@ -204,6 +204,23 @@ fn a_delay_of_two_samples_is_proven() {
     assert!(bound > 1.0 && bound < 1.001, "{bound}");
 }
 
+/// e / ((s + 1) (s + 2)) has the H-infinity norm e / 2. Its energy to peak is the root of the integral of
+/// e^2 (exp(-t) - exp(-2 t))^2, e / sqrt(12).
+#[test]
+fn weak_gains_between_states_are_bounded_tightly() {
+    for e in [1e-4, 1e-6, 1e-8] {
+        let a = matrix(2, 2, &[-1., 0., e, -2.]);
+        let (b, c) = (matrix(2, 1, &[1., 0.]), matrix(1, 2, &[0., 1.]));
+        let system = StateSpace { a, b, c, d: one(0.0), domain: Domain::Continuous };
+        for (norm, exact) in
+            [(Norm::HInfinity, 0.5 * e), (Norm::EnergyToPeak, e / 12.0_f64.sqrt())]
+        {
+            let ratio = optimal(certify_gain(&system, norm)).gamma / exact;
+            assert!(ratio > 1.0 && ratio < 1.001, "{e:e} {norm:?}: {ratio}");
+        }
+    }
+}
+
 #[test]
 fn an_unstable_system_has_no_bound() {
     let system = StateSpace {
