@@ -5,6 +5,7 @@ use super::definite::{AccurateProduct, margin};
 use super::lower_bound::product_trace;
 use super::region::MARGIN;
 use super::{Affine, Outcome, Problem};
+use crate::blocks::symmetric_part;
 use crate::check::as_number;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
 use crate::stability::instability;
@@ -15,6 +16,9 @@ use nalgebra::{DMatrix, DVector};
 const ENLARGEMENTS: [f64; 5] = [1.0, 1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 /// The part of the trace in the objective of [`common_reachable_set`].
 const REGULARISATION: f64 = 1e-6;
+/// Values of Q below this in the direction of an output, in coordinates of about one, are not large compared with
+/// [`MARGIN`]: then the program is solved in the coordinates in which the smallest Q of the mean matrix is the identity.
+const WEAK: f64 = 1e-4;
 const NOT_PROVEN: &str = "no common ellipsoid could be proven in double precision";
 
 /// An ellipsoid that contains all states that a family of systems reaches from rest.
@@ -83,35 +87,76 @@ pub fn common_reachable_set(
         return Ok(Outcome::Inconclusive(NOT_PROVEN));
     };
     coordinates.unit = time_unit(domain, coordinates.unit);
-    let scaled_b = coordinates.input(&b);
-    let size = unit_near(scaled_b.norm());
-    let inequality = Reachability { b: scaled_b / size, rate: rate / coordinates.unit, domain };
-    let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&mean))? else {
+    let search = Search { matrices, mean, outputs, inequality: Reachability { b, rate, domain } };
+    let (inequality, _) = search.scaled(&coordinates);
+    let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&search.mean))? else {
         return Ok(Outcome::Infeasible { conflict: vec!["rate"] });
     };
-    let mut problem = Problem::new();
-    let q = problem.symmetric(n);
-    problem.constrain(&q, MARGIN);
-    for a in matrices {
-        problem.constrain(&inequality.matrix(&q, &coordinates.dynamics(a)), MARGIN);
-    }
-    problem.minimise(&objective(&q, &coordinates.output(outputs), &of_mean));
-    let Outcome::Optimal(solution) = problem.solve()? else {
-        return Ok(Outcome::Inconclusive(NOT_PROVEN));
+    let refined = if is_weak(&coordinates.output(outputs), &of_mean) {
+        let inverse = of_mean.cholesky().map(|factor| symmetric_part(&factor.inverse()));
+        inverse.and_then(|p| coordinates.refined(&p))
+    } else {
+        None
     };
-    let shape = coordinates.shape(&solution.value(&q)) * (size * size);
-    let inequality = Reachability { b, rate, domain };
-    for enlargement in ENLARGEMENTS {
-        let shape = &shape * enlargement;
-        let mut smallest = margin(&shape)?;
-        for a in matrices {
-            smallest = smallest.min(margin(&inequality.value(&shape, a))?);
-        }
-        if smallest > 0.0 {
-            return Ok(Outcome::Optimal(ReachableSet { shape, margin: smallest }));
+    for coordinates in refined.iter().chain([&coordinates]) {
+        if let Some(set) = search.smallest(coordinates)? {
+            return Ok(Outcome::Optimal(set));
         }
     }
     Ok(Outcome::Inconclusive(NOT_PROVEN))
+}
+
+/// Whether Q in the direction of a row of `outputs` is not large compared with the margin of the inequalities.
+fn is_weak(outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> bool {
+    outputs.row_iter().any(|row| (row * of_mean * row.transpose())[0] < WEAK * row.norm_squared())
+}
+
+/// The search of [`common_reachable_set`].
+struct Search<'a> {
+    matrices: &'a [DMatrix<f64>],
+    /// Their mean.
+    mean: DMatrix<f64>,
+    outputs: &'a DMatrix<f64>,
+    /// In the units of the data.
+    inequality: Reachability,
+}
+
+impl Search<'_> {
+    /// The inequality in `coordinates`, and the unit of the disturbance there.
+    fn scaled(&self, coordinates: &Coordinates) -> (Reachability, f64) {
+        let Reachability { b, rate, domain } = &self.inequality;
+        let b = coordinates.input(b);
+        let size = unit_near(b.norm());
+        (Reachability { b: b / size, rate: rate / coordinates.unit, domain: *domain }, size)
+    }
+
+    /// The smallest proven Q, with the program solved in `coordinates`; None if there is none.
+    fn smallest(&self, coordinates: &Coordinates) -> Result<Option<ReachableSet>, Error> {
+        let (inequality, size) = self.scaled(coordinates);
+        let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&self.mean))? else {
+            return Ok(None);
+        };
+        let mut problem = Problem::new();
+        let q = problem.symmetric(of_mean.nrows());
+        problem.constrain(&q, MARGIN);
+        for a in self.matrices {
+            problem.constrain(&inequality.matrix(&q, &coordinates.dynamics(a)), MARGIN);
+        }
+        problem.minimise(&objective(&q, &coordinates.output(self.outputs), &of_mean));
+        let Outcome::Optimal(solution) = problem.solve()? else { return Ok(None) };
+        let shape = coordinates.shape(&solution.value(&q)) * (size * size);
+        for enlargement in ENLARGEMENTS {
+            let shape = &shape * enlargement;
+            let mut smallest = margin(&shape)?;
+            for a in self.matrices {
+                smallest = smallest.min(margin(&self.inequality.value(&shape, a))?);
+            }
+            if smallest > 0.0 {
+                return Ok(Some(ReachableSet { shape, margin: smallest }));
+            }
+        }
+        Ok(None)
+    }
 }
 
 /// The inequality of [`common_reachable_set`] for one vertex, as a matrix that must be positive definite.

@@ -78,6 +78,23 @@ fn the_reachable_set_of_a_scalar_family_is_that_of_its_slowest_member() {
     assert!((5.0..5.001).contains(&actual), "{actual}");
 }
 
+/// x1' = -x1 + w, x2' = -2 x2 + e x1: x2 is in proportion to e, and so is its bound.
+#[test]
+fn bounds_of_states_do_not_depend_on_their_units() {
+    let peak = |e: f64| {
+        let family = [matrix(2, 2, &[-1.0, 0.0, e, -2.0]), matrix(2, 2, &[-1.2, 0.0, e, -2.5])];
+        let disturbance = DVector::from_vec(vec![1.0, 0.0]);
+        let output = matrix(1, 2, &[0.0, 1.0]);
+        let domain = Domain::Continuous;
+        let actual = common_reachable_set(&family, &disturbance, &output, 0.9, domain);
+        actual.unwrap().optimal().unwrap().peak(&DVector::from_vec(vec![0.0, 1.0]))
+    };
+    let unit = peak(1.0);
+    for e in [1e-3, 1e-5, 1e-8] {
+        assert!((peak(e) / (e * unit) - 1.0).abs() < 1e-3, "{e:e}: {} {unit}", peak(e));
+    }
+}
+
 type Loop = (FaultyPlant, control::StateSpace);
 
 /// Two carts whose forces may lose effect, with the controller that estimates and compensates both losses.
