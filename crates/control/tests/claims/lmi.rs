@@ -212,8 +212,7 @@ fn weak_gains_between_states_are_bounded_tightly() {
         let a = matrix(2, 2, &[-1., 0., e, -2.]);
         let (b, c) = (matrix(2, 1, &[1., 0.]), matrix(1, 2, &[0., 1.]));
         let system = StateSpace { a, b, c, d: one(0.0), domain: Domain::Continuous };
-        for (norm, exact) in
-            [(Norm::HInfinity, 0.5 * e), (Norm::EnergyToPeak, e / 12.0_f64.sqrt())]
+        for (norm, exact) in [(Norm::HInfinity, 0.5 * e), (Norm::EnergyToPeak, e / 12.0_f64.sqrt())]
         {
             let ratio = optimal(certify_gain(&system, norm)).gamma / exact;
             assert!(ratio > 1.0 && ratio < 1.001, "{e:e} {norm:?}: {ratio}");
