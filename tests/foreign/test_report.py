@@ -18,6 +18,7 @@ from browser import browser
 from conftest import ROOT
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+DRAWN = "document.querySelector('.uplot') && document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length"
 
 
 def table(page, identifier):
@@ -433,7 +434,7 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
             globalThis.id = (name) => document.getElementById(name);
             globalThis.range = () => [Number(id("from").value), Number(id("to").value)];
             globalThis.curves = () => document.querySelectorAll(".u-legend .u-series").length""")
-        page.until("document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length")
+        page.until(DRAWN)
         readings = page.evaluate("""(() => {
             const found = [range(), curves()];
             id("closer").click(); found.push(range());
@@ -449,9 +450,6 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
     assert (whole, closer, later, typed, compared, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
     # Each plot has a line for the time, and one for each curve.
     assert both - differences == 3
-
-
-DRAWN = "document.querySelector('.uplot') && document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length"
 
 
 def show(page, low, high):
