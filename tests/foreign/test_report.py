@@ -219,8 +219,10 @@ def test_what_is_not_compared_is_named_on_the_terminal(aso_ftc, write):
 
 def test_runs_without_a_common_time_are_not_said_to_be_equal(aso_ftc, write):
     results = pd.DataFrame({"time": [0.0, 1.0], "x": [0.0, 1.0]})
-    _, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", results + 5))
+    page, said = report(aso_ftc, write("own.csv", results), "--against", write("other.csv", results + 5))
     assert "nothing was compared with" in said and "no difference" not in said
+    text = page.text_content()
+    assert "Nothing was compared with" in text and "are equal" not in text
     assert "not compared: 2 rows of" in said
 
 

@@ -158,10 +158,12 @@ fn message_count(messages: usize) -> String {
     }
 }
 
-/// Says at the top of the page how much the two runs differ.
+/// Says at the top of the page how much the two runs differ, or that they have no time in common.
 fn largest(comparison: &Comparison, other: &str) -> Markup {
     html! {
-        @if comparison.is_equal() {
+        @if comparison.rows == 0 {
+            p.outcome.warned { "Nothing was compared with " (other) ": the two runs have no time in common." }
+        } @else if comparison.is_equal() {
             p.outcome { "All " (comparison.differences.len()) " common variables are equal in all " (comparison.rows) " common rows." }
         } @else if let Some(largest) = comparison.differences.first() {
             p.outcome.warned {
