@@ -348,6 +348,19 @@ def test_nothing_of_others_is_overwritten(aso_ftc, write, tmp_path):
     assert done.returncode == 2 and "no variable in common" in done.stderr
 
 
+def test_the_page_of_a_file_of_the_same_name_in_another_folder_is_kept(aso_ftc, write, tmp_path):
+    page = tmp_path / "page.html"
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    one, other = (write(f"{folder}/results.csv", frame()) for folder in ("a", "b"))
+    report(aso_ftc, one, "--out", page)
+    before = page.read_bytes()
+    done = aso_ftc("report", other, "--out", page)
+    assert done.returncode == 2 and "not written by aso-ftc report of b/results.csv; --force" in done.stderr
+    assert page.read_bytes() == before
+    report(aso_ftc, one, "--out", page)
+
+
 TRACE = """(0.001000) can0 100#0102
 (0.001500) can0 00000101#
 (0.002000) can0 100#0102

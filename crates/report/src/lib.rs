@@ -215,11 +215,13 @@ pub enum Error {
     },
 }
 
-/// Returns the text that marks a page as the report of a results file with the name of `results`, in any folder: a
-/// later report may replace the page.
+/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in a
+/// folder with the name of its folder.
 #[must_use]
 pub fn identity(results: &Path) -> String {
-    format!("aso-ftc report of {}", name(results))
+    let path = results.canonicalize().unwrap_or_else(|_| results.to_owned());
+    let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+    format!("aso-ftc report of {folder}/{}", name(results))
 }
 
 /// Creates the report of a results file.
