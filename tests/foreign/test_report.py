@@ -348,6 +348,13 @@ def test_nothing_of_others_is_overwritten(aso_ftc, write, tmp_path):
     assert done.returncode == 2 and "no variable in common" in done.stderr
 
 
+def test_a_page_is_written_again_whatever_the_name_of_the_file(aso_ftc, write):
+    # HTML writes &amp; for &.
+    file = write("R&D.csv", frame())
+    for _ in range(2):
+        report(aso_ftc, file)
+
+
 def test_the_page_of_a_file_of_the_same_name_in_another_folder_is_kept(aso_ftc, write, tmp_path):
     page = tmp_path / "page.html"
     for folder in ("a", "b"):

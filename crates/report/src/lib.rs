@@ -216,12 +216,13 @@ pub enum Error {
 }
 
 /// Returns the text by which a later report recognises a report of a results file with the name of `results`, in a
-/// folder with the name of its folder.
+/// folder with the name of its folder. Characters that the page has in another form are `_`.
 #[must_use]
 pub fn identity(results: &Path) -> String {
     let path = results.canonicalize().unwrap_or_else(|_| results.to_owned());
     let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
-    format!("aso-ftc report of {folder}/{}", name(results))
+    let identity = format!("aso-ftc report of {folder}/{}", name(results));
+    identity.replace(|sign: char| "&<>\"".contains(sign) || sign.is_control(), "_")
 }
 
 /// Creates the report of a results file.
