@@ -51,7 +51,7 @@ def run(folder, *arguments, trusted=False):
     command = [COMMAND, "run", *arguments, "--out", folder / "out"]
     environment = os.environ | ({"ASO_FTC_TRUST_FILES": "1"} if trusted else {})
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    usual = ("nothing is connected", "replaces the results of an earlier run")
+    usual = ("nothing is connected", "replaces the file of this name")
     said = [line for line in done.stderr.splitlines() if not any(part in line for part in usual)]
     return done.returncode, said
 

@@ -78,7 +78,7 @@ impl OutputFile {
         let metadata = file.metadata().map_err(failed)?;
         let regular = metadata.is_file() && !is_stream;
         if regular && metadata.len() > 0 {
-            tracing::info!("{}: replaces the results of an earlier run", path.display());
+            tracing::info!("{}: replaces the file of this name", path.display());
             file.set_len(0).map_err(failed)?;
         }
         let absolute = std::path::absolute(path).map_err(failed)?;

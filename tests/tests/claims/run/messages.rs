@@ -51,12 +51,16 @@ fn a_results_file_that_is_replaced_is_one_line_on_standard_error() {
         |more: &[&str]| said(&bench.coupled(&[&["--stop-time", "0.1"][..], more].concat()));
     assert_eq!(message(&[]), "");
     let line = message(&[]);
-    let end = "out/results.csv: replaces the results of an earlier run\n";
+    let end = "out/results.csv: replaces the file of this name\n";
     assert!(line.starts_with("info: ") && line.ends_with(end), "{line:?}");
     assert_eq!(line.lines().count(), 1, "{line:?}");
     let line: Value = serde_json::from_str(&message(&["--log-json"])).unwrap();
     assert_eq!(line["level"], "INFO");
     assert_eq!(message(&["--results", "out/other.csv"]), "");
+    // No run has written this file.
+    bench.write("notes.csv", "mine\n");
+    let line = message(&["--results", "notes.csv"]);
+    assert!(line.ends_with("notes.csv: replaces the file of this name\n"), "{line:?}");
 }
 
 #[test]
