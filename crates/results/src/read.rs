@@ -4,6 +4,7 @@ mod groups;
 mod lines;
 mod trajectories;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::{Column, Envelope, ResultsError, Selection};
@@ -97,7 +98,8 @@ impl Table {
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
     /// [`ResultsError::Order`] if a time is earlier than the one before, [`ResultsError::Read`] if the file cannot be
-    /// read or a time is no finite number. The function was then called for some rows before the error.
+    /// read, a time is no finite number, or several columns have the name of a requested one. The function was then
+    /// called for some rows before the error.
     ///
     /// # Panics
     ///
@@ -110,6 +112,13 @@ impl Table {
         let mut columns = vec![self.time];
         columns.extend(positions);
         let (path, all) = (&self.path, &self.columns);
+        let mut counts = HashMap::new();
+        all.iter().for_each(|column| *counts.entry(column.name.as_str()).or_insert(0) += 1);
+        let names = columns.iter().map(|position| all[*position].name.as_str());
+        if let Some(name) = names.filter(|name| !name.is_empty()).find(|name| counts[name] > 1) {
+            let reason = format!("two columns have the name {name:?}, expected different names");
+            return Err(unreadable(path, &reason));
+        }
         match &self.layout {
             Layout::Lines(layout) => lines::visit(path, layout, all, &columns, visitor),
             Layout::Groups => groups::visit(path, all, &columns, visitor),

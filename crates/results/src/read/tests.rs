@@ -100,6 +100,17 @@ fn layouts_of_other_programs_are_read() {
 }
 
 #[test]
+fn a_name_of_two_columns_is_an_error_where_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = written(folder.path(), "a.csv", "time,x,y,x\n0,1,2,3\n");
+    assert_eq!(table.column(2).unwrap(), [2.0]);
+    for position in [1, 3] {
+        let refused = table.column(position).unwrap_err().to_string();
+        assert!(refused.contains("a.csv: two columns have the name \"x\""), "{refused}");
+    }
+}
+
+#[test]
 fn times_that_decrease_are_an_error_with_their_place() {
     let folder = tempfile::tempdir().unwrap();
     let table = written(folder.path(), "a.csv", "time,x\n0,1\n2,2\n2,3\n1,4\n");
