@@ -276,6 +276,20 @@ def test_rows_stay_the_same_if_an_adaptive_cluster_starts_empty_and_shrinks(camp
     assert rows(folder) == rows(tmp_path / "undisturbed")
 
 
+@pytest.mark.parametrize(
+    "left", [[".plan.parquet.7.tmp"], ["plan.parquet", ".system.toml.7.tmp"], ["plan.parquet", "system.toml", ".manifest.json.7.tmp"]]
+)
+def test_a_campaign_that_was_killed_while_its_folder_was_made_goes_on(campaign, tmp_path, left):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in left:
+        (folder / name).write_bytes(b"cut")
+    status, _, messages = done(campaign(runs=4), "--out", folder, "--workers", 1)
+    assert (status, messages) == (0, "")
+    assert rows(folder)["run"] == list(range(4)) and not list(folder.glob(".*"))
+    assert parquet.read_table(folder / "plan.parquet").num_rows == 4
+
+
 def test_a_campaign_that_is_done_is_not_done_again(campaign, tmp_path):
     file, folder = campaign(runs=8), tmp_path / "out"
     assert done(file, "--out", folder, "--workers", 1)[0] == 0

@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,8 @@ __all__ = ["Folder", "column", "parquet_bytes", "read_manifest", "system_of"]
 
 MANIFEST = "manifest.json"
 _FORMAT = 1
+# The temporary name of a file; see `write`.
+_TEMPORARY = re.compile(r"\.(.+)\.\d+\.tmp")
 
 
 def write(path: Path, content: bytes) -> None:
@@ -75,7 +78,9 @@ class Folder:
     def _adopt(self) -> None:
         known = read_manifest(self.path)
         if known is None:
-            if self.path.exists() and any(self.path.iterdir()):
+            names = {_TEMPORARY.sub(r"\1", path.name) for path in self.path.glob("*")}
+            # A start that was killed before it had written the manifest goes on.
+            if names and not {"plan.parquet"} <= names <= {"plan.parquet", "system.toml", MANIFEST}:
                 raise ConfigurationError(
                     f"the folder {self.path} is not empty and has no campaign: choose another one"
                 )
@@ -89,11 +94,11 @@ class Folder:
                     "choose another folder, or remove this one"
                 )
         self.manifest["complete"] = known["complete"]
-        for temporary in self.path.rglob(".*.tmp"):
-            temporary.unlink(missing_ok=True)
 
     def begin(self, campaign: Campaign) -> None:
-        """Write plan, system and manifest, the manifest last."""
+        """Write plan, system and manifest, the manifest last; remove what a killed process was writing."""
+        for temporary in self.path.rglob(".*.tmp"):
+            temporary.unlink(missing_ok=True)
         if not (self.path / MANIFEST).is_file():
             write(self.path / "plan.parquet", parquet_bytes(_plan_table(campaign)))
             write(self.path / "system.toml", campaign.system.to_toml().encode())
