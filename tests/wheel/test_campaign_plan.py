@@ -5,8 +5,10 @@ import json
 
 import aso_ftc as af
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
 from aso_ftc.campaign import Campaign
+from aso_ftc.campaign._folder import Folder
 from aso_ftc.campaign._measures import Expression
 from scipy import stats
 
@@ -44,6 +46,14 @@ def test_whole_levels_between_whole_ends_stay_whole():
     for change, expected in (({}, [1, 3, 5, 7]), ({"to": 7.0}, [1.0, 3.0, 5.0, 7.0]), ({"steps": 5}, [1.0, 2.5, 4.0, 5.5, 7.0])):
         levels = columns(paper(parameters={"n": parameter | change}))["n"]
         assert levels == expected and {type(level) for level in levels[1:-1]} == {type(expected[1])}
+
+
+@pytest.mark.parametrize("design", [{"method": "grid"}, {"method": "random", "runs": 4}])
+def test_a_range_with_whole_steps_is_written_as_its_design_has_it(design, tmp_path):
+    study = paper(parameters={"n": {"from": 1, "to": 7, "steps": 4, "set": "plant.F_c"}}, design=design)
+    Folder(tmp_path, study).begin(study)
+    written = parquet.read_table(tmp_path / "plan.parquet")["n"].to_pylist()
+    assert written == columns(study)["n"] and {type(value) for value in written} == {int if design["method"] == "grid" else float}
 
 
 @pytest.mark.parametrize(

@@ -158,11 +158,15 @@ def _plan_table(campaign: Campaign) -> Any:
 
 
 def column(kind: str, values: Any) -> Any:
-    """Return the values of a parameter as a column; see :attr:`Parameter.kind`."""
+    """Return the values of a parameter as a column; see :attr:`Parameter.kind`.
+
+    The steps of a range are whole in a grid only; other designs have all numbers of the range.
+    """
     arrow = package("pyarrow")
     if kind == "text":
         return arrow.array([text(value) for value in values], arrow.string())
-    return arrow.array(list(values), arrow.int64() if kind == "integer" else arrow.float64())
+    whole = kind == "integer" and not any(isinstance(value, float) for value in values)
+    return arrow.array(list(values), arrow.int64() if whole else arrow.float64())
 
 
 def parquet_bytes(table: Any) -> bytes:
