@@ -81,6 +81,17 @@ def test_a_discrete_distribution_gives_whole_numbers():
     assert set(values) == {1, 2, 3, 4}
 
 
+def test_a_discrete_distribution_has_its_own_numbers_at_the_ends_of_a_design():
+    # The positions of a design morris with four levels are 0, 1/3, 2/3 and 1, the quantiles of 1 to 4 there 1, 2, 3 and 4.
+    for parameter in ({"distribution": "randint", "low": 1, "high": 5}, {"distribution": stats.randint(1, 5)}):
+        campaign = paper(
+            parameters={"n": {**parameter, "set": "algorithm.jobs"}, "plant.F_c": {"relative": 0.1}},
+            design={"method": "morris", "trajectories": 40},
+        )
+        values = columns(campaign)["n"]
+        assert set(values) <= {1, 2, 3, 4} and {1, 4} <= set(values)
+
+
 @pytest.mark.parametrize("method", ["latin-hypercube", "sobol", "halton"])
 def test_space_filling_designs_have_less_discrepancy_than_random_ones(method):
     ranges = {name: {"from": 0.0, "to": 1.0} for name in ("plant.x_p_0", "plant.theta_0", "plant.v_p_0")}
@@ -198,6 +209,13 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"parameters": {"plant.F_c": {"distribution": "gamma"}}}, "needs a"),
         ({"parameters": {"plant.F_c": {"distribution": "norm", "sigma": 1.0}}}, "unknown entry sigma"),
         ({"parameters": {"plant.F_c": {"distribution": "norm", "scale": -1.0}}}, "out of range"),
+        (
+            {
+                "parameters": {"n": {"distribution": "poisson", "mu": 3.0, "set": "algorithm.jobs"}},
+                "design": {"method": "morris", "trajectories": 40},
+            },
+            "reaches the ends of a distribution that has none",
+        ),
         ({"parameters": {"plant.F_c": {"from": 2.0, "to": 1.0}}}, "from below to"),
         ({"parameters": {"plant.F_c": {"from": 2.0, "to": 3.0}}}, "steps"),
         ({"parameters": {"plant.F_c": {"values": []}}}, "at least one"),

@@ -201,9 +201,7 @@ def _distribution(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any
         quantile = name.ppf if hasattr(name, "ppf") else name.icdf
         if not np.isfinite(quantile(np.array([0.25, 0.5, 0.75]))).all():
             raise fail(place, "the distribution has no quantiles: its arguments are out of range")
-        if isinstance(getattr(name, "dist", None), stats.rv_discrete):
-            return None, lambda unit: [int(value) for value in quantile(unit)]
-        return None, quantile
+        return None, _integers(name) if isinstance(getattr(name, "dist", None), stats.rv_discrete) else quantile
     family: Any = getattr(stats, name, None) if isinstance(name, str) else None
     discrete = isinstance(family, stats.rv_discrete)
     if not isinstance(family, stats.rv_continuous) and not discrete:
@@ -219,9 +217,16 @@ def _distribution(place: str, entries: dict[str, Any], _: Any) -> tuple[Any, Any
     frozen = family(**{key: _number(place, key, entries[key]) for key in allowed if key in entries})
     if not np.isfinite(frozen.ppf([0.25, 0.5, 0.75])).all():
         raise fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
-    if discrete:
-        return None, lambda unit: [int(value) for value in frozen.ppf(unit)]
-    return None, frozen.ppf
+    return None, _integers(frozen) if discrete else frozen.ppf
+
+
+def _integers(frozen: Any) -> Callable[[Numbers], Sequence[Any]]:
+    """Return the quantiles of a discrete distribution as integers; an end that it does not have is infinite.
+
+    At the position 0 scipy has the number below the smallest one.
+    """
+    lowest = frozen.support()[0]
+    return lambda unit: [int(value) if np.isfinite(value) else value for value in np.maximum(frozen.ppf(unit), lowest)]
 
 
 @dataclass(frozen=True)
@@ -260,7 +265,7 @@ def sample(
     """Return the complete design and its values.
 
     The same design, parameters and seed give the same values on every machine with the same versions
-    of NumPy, scipy and SALib; a campaign that goes on takes them from its folder.
+    of NumPy, scipy and SALib; a campaign that goes on compares them with those in its folder.
     """
     method, options = _options(design)
     complete = {"method": method, **options}
