@@ -81,6 +81,13 @@ def test_a_discrete_distribution_gives_whole_numbers():
     assert set(values) == {1, 2, 3, 4}
 
 
+def test_a_logarithmic_range_has_its_own_ends_at_the_ends_of_a_design():
+    # exp(log(20)) is 19.999999999999996, exp(log(30)) is 30.000000000000004.
+    ranges = {"plant.F_c": {"from": 20.0, "to": 30.0, "logarithmic": True}, "plant.F_s": {"relative": 0.1}}
+    values = columns(paper(parameters=ranges, design={"method": "morris", "trajectories": 40}))["plant.F_c"]
+    assert (min(values), max(values)) == (20.0, 30.0)
+
+
 def test_a_discrete_distribution_has_its_own_numbers_at_the_ends_of_a_design():
     # The positions of a design morris with four levels are 0, 1/3, 2/3 and 1, the quantiles of 1 to 4 there 1, 2, 3 and 4.
     for parameter in ({"distribution": "randint", "low": 1, "high": 5}, {"distribution": stats.randint(1, 5)}):

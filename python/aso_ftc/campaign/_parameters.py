@@ -156,9 +156,10 @@ def _between(place: str, entries: Mapping[str, Any], low: float, high: float) ->
         raise fail(place, f"from = {low}: a logarithmic range starts above 0")
 
     def quantile(unit: Numbers) -> Any:
-        if logarithmic:
-            return np.exp(np.log(low) + unit * (np.log(high) - np.log(low)))
-        return low + unit * (high - low)
+        linear = low + unit * (high - low)
+        value = np.exp(np.log(low) + unit * (np.log(high) - np.log(low))) if logarithmic else linear
+        # The rounded value at an end may be beyond it.
+        return np.clip(value, low, high)
 
     levels = None
     if "steps" in entries:
