@@ -175,6 +175,7 @@ def test_a_table_of_the_user_is_taken_row_by_row(tmp_path):
 
 TIME = np.linspace(0.0, 2.0, 2001)
 SIGNALS = {"a.x": np.exp(-3.0 * TIME) * np.cos(20.0 * TIME), "a.der(x)": TIME, "a.K[1,2]": TIME**2}
+SIGNALS |= {"a.on": TIME > 1.0, "a.count": np.arange(2001, dtype=np.int32) * 1000}
 
 
 @pytest.mark.parametrize(
@@ -196,6 +197,11 @@ SIGNALS = {"a.x": np.exp(-3.0 * TIME) * np.cos(20.0 * TIME), "a.der(x)": TIME, "
         ("time_while(time > 0.5 and not time >= 1.5)", 1.0, 2e-3),
         ("last_time(a.x > 0.5)", None, 0.0),
         ("min(time, start=3)", np.nan, 0.0),
+        ("max(a.on + a.on)", 2.0, 0.0),
+        ("max((time > 0.5) + (time > 1.5))", 2.0, 0.0),
+        ("min(-a.on)", -1.0, 0.0),
+        ("amplitude(a.on)", 0.5, 0.0),
+        ("max(a.count * 2000)", 4e9, 0.0),
     ],
 )
 def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):

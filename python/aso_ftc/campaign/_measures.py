@@ -57,14 +57,14 @@ class _Window:
 
 def _over(function: Callable[[Signal], Any]) -> Callable[..., float]:
     def reduced(window: _Window, x: Any) -> float:
-        values = window.of(x)
+        values = np.asarray(window.of(x), float)
         return float(function(values)) if len(values) else np.nan
 
     return reduced
 
 
 def _rms(values: Signal) -> float:
-    return float(np.sqrt(np.mean(np.square(values.astype(float)))))
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _integral(window: _Window, x: Any) -> float:
@@ -150,13 +150,20 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     for name in ("abs", "sqrt", "exp", "log", "log10", "sin", "cos", "tan", "arctan2", "hypot", "sign")
 } | {"maximum": np.maximum, "minimum": np.minimum}
 _CONSTANTS = {"pi": np.pi}
+
+
+def _of_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return an operator on floats: of NumPy's own, integers overflow, and a sum of Booleans is a Boolean."""
+    return lambda *sides: function(*(np.asarray(side, float) for side in sides))
+
+
 _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: np.add,
-    ast.Sub: np.subtract,
-    ast.Mult: np.multiply,
-    ast.Div: np.divide,
-    ast.Pow: lambda x, y: np.power(np.asarray(x, float), y),
-    ast.USub: np.negative,
+    ast.Add: _of_numbers(np.add),
+    ast.Sub: _of_numbers(np.subtract),
+    ast.Mult: _of_numbers(np.multiply),
+    ast.Div: _of_numbers(np.divide),
+    ast.Pow: _of_numbers(np.power),
+    ast.USub: _of_numbers(np.negative),
     ast.UAdd: lambda x: x,
     ast.Not: np.logical_not,
     ast.And: np.logical_and,
