@@ -41,6 +41,21 @@ def test_the_worst_case_is_the_largest_value_of_the_function(tmp_path):
     assert again == worst_case
 
 
+def test_the_arguments_of_the_worst_case_repeat_its_run_with_its_noise(tmp_path):
+    study = af.campaign.Campaign(
+        "paper",
+        experiment={"stop-time": 0.01},
+        design={"method": "random", "runs": 40},
+        parameters={"a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]}},
+        disturbances={"noise": {"connection": "controller.x_p", "noise": {"deviation": 0.01}}},
+        measures={"y": "max(controller.x_p)"},
+        seed=1,
+    )
+    worst_case = study.worst_case(tmp_path / "search", "y", workers=1)
+    again = study.system.run(record_every="step", **worst_case.arguments)
+    assert again["controller.x_p"].max() == worst_case.value
+
+
 def test_the_probability_of_a_half_space_is_that_of_the_normal_distribution(tmp_path):
     # The sum of two independent standard normal variables has the deviation sqrt(2): P(z > 3.5) = 2.33e-4.
     study = campaign(

@@ -159,7 +159,9 @@ def worst_case(
             values, faults = batches(unit, sign)
             best = int(values.argmax())
             if values[best] > worst["value"]:
-                worst.update(value=values[best], unit=unit[best : best + 1].copy(), fault=int(faults[best]))
+                # The noise of a run depends on its number.
+                run = best * len(campaign.plan.faults) + int(faults[best])
+                worst.update(value=values[best], part=batches.part(unit), run=run)
             history.append(sign * worst["value"])
             # The optimiser compares finite numbers.
             return -np.clip(values, -1e300, 1e300)
@@ -175,12 +177,10 @@ def worst_case(
             updating="deferred",
             vectorized=True,
         )
-        if "unit" not in worst:
+        if "part" not in worst:
             raise fail(f"measures.{measure}", "no run of the search has a value")
-        part = batches.part(worst["unit"])
-        run = worst["fault"]
+        part, run, value = worst["part"], worst["run"], worst["value"]
         values, case = part.plan.row(run)
-        value = worst["value"]
         return WorstCase(
             measure=measure,
             value=float(sign * value) if np.isfinite(value) else float("nan"),
