@@ -77,6 +77,22 @@ def test_the_probability_of_a_half_space_is_that_of_the_normal_distribution(tmp_
     assert list(estimate.levels) == sorted(estimate.levels)
 
 
+def test_the_variation_of_a_frequent_failure_is_that_of_the_rows_of_parameters(tmp_path):
+    # A row has two runs, with and without the fault, and fails with the probability P(z > 1) = 0.16: a binomial proportion.
+    study = campaign(
+        {"method": "random", "runs": 100},
+        '(parameter("a") - 25) / 0.5',
+        parameters={"a": {"distribution": "norm", "loc": 25.0, "scale": 0.5, "set": PLACES["a"]}},
+        faults=[{"connection": "plant.u", "bias": {"value": 0.0}}],
+        limits={"y": {"below": 1.0}},
+        seed=1,
+    )
+    estimate = study.rare_event(tmp_path / "rare", "y", workers=1)
+    chance = estimate.probability
+    assert estimate.runs == 200 and 0.5 * norm.sf(1.0) < chance < 2 * norm.sf(1.0)
+    assert estimate.variation == pytest.approx(math.sqrt((1 - chance) / (100 * chance)))
+
+
 def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):
     parameters = {"a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]}}
     few = campaign({"method": "random", "runs": 10}, 'parameter("a")', parameters=parameters)

@@ -232,7 +232,8 @@ def rare_event(
         variation = float(result.getCoefficientOfVariation())
         if variation < 0.0 < probability:
             # Of a probability that the first level finds by counting, OpenTURNS states none.
-            variation = math.sqrt((1.0 - probability) / (probability * batches.runs))
+            rows = batches.runs // len(campaign.plan.faults)
+            variation = math.sqrt((1.0 - probability) / (probability * rows))
         factor = float(np.exp(_NORMAL_QUANTILE_95 * np.sqrt(np.log1p(variation**2)))) if probability else float("nan")
         return RareEvent(
             limit=limit,
