@@ -5,7 +5,8 @@ import math
 import aso_ftc as af
 import numpy as np
 import pytest
-from scipy.stats import norm
+from aso_ftc.campaign._search import _bounds
+from scipy.stats import lognorm, norm
 
 
 def campaign(design, measure, **entries):
@@ -91,6 +92,13 @@ def test_the_variation_of_a_frequent_failure_is_that_of_the_rows_of_parameters(t
     chance = estimate.probability
     assert estimate.runs == 200 and 0.5 * norm.sf(1.0) < chance < 2 * norm.sf(1.0)
     assert estimate.variation == pytest.approx(math.sqrt((1 - chance) / (100 * chance)))
+
+
+def test_the_bounds_of_a_rare_event_are_quantiles_of_the_log_normal_distribution():
+    estimate = lognorm(s=math.sqrt(math.log(1 + 0.3**2)), scale=1e-4)
+    assert estimate.std() / estimate.mean() == pytest.approx(0.3)
+    assert _bounds(1e-4, 0.3) == pytest.approx(tuple(estimate.ppf([0.025, 0.975])), rel=1e-9)
+    assert np.isnan(_bounds(0.0, -1.0)).all() and _bounds(0.9, 1.0)[1] == 1.0
 
 
 def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):

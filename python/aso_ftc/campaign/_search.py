@@ -234,13 +234,21 @@ def rare_event(
             # Of a probability that the first level finds by counting, OpenTURNS states none.
             rows = batches.runs // len(campaign.plan.faults)
             variation = math.sqrt((1.0 - probability) / (probability * rows))
-        factor = float(np.exp(_NORMAL_QUANTILE_95 * np.sqrt(np.log1p(variation**2)))) if probability else float("nan")
+        lower, upper = _bounds(probability, variation)
         return RareEvent(
             limit=limit,
             probability=probability,
-            lower=probability / factor,
-            upper=min(1.0, probability * factor),
+            lower=lower,
+            upper=upper,
             variation=variation,
             levels=tuple(float(level) for level in simulation.getThresholdPerStep()),
             runs=batches.runs,
         )
+
+
+def _bounds(probability: float, variation: float) -> tuple[float, float]:
+    """Return the bounds of 95 % of a log-normal estimate; NaN of a probability of 0."""
+    if probability <= 0:
+        return math.nan, math.nan
+    factor = math.exp(_NORMAL_QUANTILE_95 * math.sqrt(math.log1p(variation**2)))
+    return probability / factor, min(1.0, probability * factor)
