@@ -1,11 +1,13 @@
 """Searches against closed forms: the largest value of a function, the probability of a half space."""
 
+import logging
 import math
 
 import aso_ftc as af
 import numpy as np
 import pytest
 from aso_ftc.campaign._search import _bounds
+from distributed import Client, LocalCluster
 from scipy.stats import lognorm, norm
 
 
@@ -40,6 +42,16 @@ def test_the_worst_case_is_the_largest_value_of_the_function(tmp_path):
     # All runs are in the folder: the same call does none of them again, also without workers.
     again = study.worst_case(tmp_path / "search", "y", scheduler="tcp://127.0.0.1:9")
     assert again == worst_case
+
+
+def test_a_search_leaves_no_job_on_the_workers_of_a_cluster(tmp_path):
+    parameters = {"a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]}}
+    study = campaign({"method": "random", "runs": 40}, 'parameter("a")', parameters=parameters)
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "local_directory": tmp_path, "silence_logs": logging.CRITICAL}
+    with LocalCluster(n_workers=1, **options) as cluster, Client(cluster) as client:
+        study.worst_case(tmp_path / "search", "y", scheduler=cluster.scheduler_address)
+        (names,) = client.run(lambda dask_worker: [str(name) for name in dask_worker.plugins]).values()
+        assert not [name for name in names if name.startswith("aso-ftc")]
 
 
 def test_the_arguments_of_the_worst_case_repeat_its_run_with_its_noise(tmp_path):

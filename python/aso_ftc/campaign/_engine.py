@@ -99,6 +99,7 @@ class Session:
                 if self._client is None:
                     self._open.enter_context(_quiet())
                     self._client = self._open.enter_context(_client(self.workers, self.scheduler))
+                    self._open.callback(_forget, self._client, self._name)
                     work.prepare(self._client, self._name)
                 work.perform(self._client, self.scheduler, self._name)
             work.close()
@@ -381,9 +382,8 @@ class _Work:
             raise
         finally:
             self.progress.close()
-            with contextlib.suppress(Exception):
-                if prepared is None and client.status == "running":
-                    client.unregister_worker_plugin(name)
+            if prepared is None:
+                _forget(client, name)
 
     def prepare(self, client: Any, name: str) -> None:
         """Give the job to all workers, and ask each whether it can run it."""
@@ -513,6 +513,13 @@ def _plugin(name: str, job: bytes) -> Any:
     base = package("distributed").diagnostics.plugin.WorkerPlugin
     plugin = type("CampaignPlugin", (_Plugin, base), {"idempotent": True})
     return plugin(name, job)
+
+
+def _forget(client: Any, name: str) -> None:
+    """Take the job with this name from all workers and the scheduler."""
+    with contextlib.suppress(Exception):
+        if client.status == "running":
+            client.unregister_worker_plugin(name)
 
 
 def _of_worker(error: BaseException) -> Error:
