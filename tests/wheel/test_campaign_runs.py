@@ -18,6 +18,7 @@ import aso_ftc as af
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
+from aso_ftc.campaign._command import main
 from distributed import Client, LocalCluster
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -296,6 +297,13 @@ def test_a_campaign_that_is_done_is_not_done_again(campaign, tmp_path):
     times = {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
     assert done(file, "--out", folder, "--workers", 1)[0] == 0
     assert times == {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
+
+
+def test_the_command_reads_no_table_of_all_columns(campaign, tmp_path, monkeypatch):
+    file, folder = campaign(runs=4), tmp_path / "out"
+    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+    monkeypatch.setattr(af.campaign.Outcome, "table", None)
+    assert main([str(file), "--out", str(folder)]) == 0
 
 
 def test_a_folder_with_another_campaign_or_with_other_files_is_left_alone(campaign, tmp_path):

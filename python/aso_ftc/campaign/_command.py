@@ -107,7 +107,7 @@ def _perform(chosen: argparse.Namespace) -> int:
     outcome.page(page, force=True)
     print(_summary(outcome))
     print(f"report: {shlex.quote(str(page))}")
-    return 0 if (outcome.table["status"] == "ok").any() else 1
+    return 0 if "ok" in outcome.statuses else 1
 
 
 def _announce(address: str) -> None:
