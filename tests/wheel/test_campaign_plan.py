@@ -273,6 +273,7 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"parameters": {"experiment.stop-time": [1.0, -2.0, 3.0]}}, "parameters.experiment.stop-time: stop time -2 s"),
         ({"parameters": {"late": {"values": [0.0, 0.2, 0.0], "set": "experiment.start-time"}}}, "parameters.late: stop time 0.1 s"),
         ({"record_every": -1.0}, "found -1"),
+        ({"isolate": True, "memory_limit": "2 gigs"}, "2GiB"),
     ],
 )
 def test_what_is_wrong_is_named_before_the_first_run(entries, words):

@@ -158,6 +158,11 @@ class Campaign:
         self.memory_limit: Any = entries.get("memory-limit")
         if self.memory_limit is not None and not self.isolate:
             raise fail("memory-limit", "a limit of memory needs isolate = true")
+        if self.isolate:
+            # An FMU may also crash while it is opened for a check.
+            limits = {"time-limit": self.time_limit, "memory-limit": self.memory_limit}
+            stated = {name: limit for name, limit in limits.items() if limit is not None}
+            self.system.isolation.update({"isolate": True, **stated})
         self.record_every: Any = entries.get("record-every", "step")
         self._variables = {variable.name: variable for variable in self.system.variables()}
         self.disturbances: dict[str, dict[str, Any]] = disturbances(entries.get("disturbances", {}))

@@ -56,20 +56,13 @@ class Job:
     keep: dict[str, Any]
     seed: int
     record_every: Any
-    options: dict[str, Any]
+    time_limit: float | None
     paths: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, campaign: Campaign) -> Job:
         """Return the job of a campaign; reads its files."""
         paths = campaign.describe()["files"]
-        options: dict[str, Any] = {"time_limit": campaign.time_limit}
-        if campaign.isolate:
-            options |= {
-                "isolate": True,
-                "call_time_limit": campaign.time_limit,
-                "memory_limit": campaign.memory_limit,
-            }
         return cls(
             version=_core.__version__,
             system=campaign.system.copy(),
@@ -84,7 +77,7 @@ class Job:
             keep=campaign.keep,
             seed=campaign.seed,
             record_every=campaign.record_every,
-            options=options,
+            time_limit=campaign.time_limit,
             paths=paths,
         )
 
@@ -218,7 +211,8 @@ class Runner:
         return row
 
     def _simulate(self, overrides: Mapping[str, Any], record: Any, every: Any) -> Any:
-        return self.system.run(**arguments(overrides), **self.job.options, record=record, record_every=every)
+        limit = self.job.time_limit
+        return self.system.run(**arguments(overrides), time_limit=limit, record=record, record_every=every)
 
     def _kept(self, row: Row) -> bool:
         keep = self.job.keep
