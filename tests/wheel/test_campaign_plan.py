@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 from aso_ftc.campaign import Campaign
-from aso_ftc.campaign._folder import Folder
+from aso_ftc.campaign._folder import Folder, system_of
 from aso_ftc.campaign._measures import Expression
 from scipy import stats
 
@@ -151,6 +151,13 @@ def test_a_parameter_sets_variables_steps_and_entries_of_disturbances():
     assert list(changes["start_values"].values()) == [2.0, 2.0]
     assert changes["algorithm"] == {"step": 0.002}
     assert changes["faults"] == [{"connection": "plant.u", "delay": {"seconds": 0.01, "hold": True}}]
+
+
+def test_a_time_with_the_name_of_python_is_shown_with_that_of_the_file(tmp_path):
+    study = paper(parameters={"experiment.stop_time": [0.1, 0.2]})
+    Folder(tmp_path, study).begin(study)
+    assert [system_of(tmp_path, run).experiment["stop-time"] for run in (0, 1)] == [0.1, 0.2]
+    assert "stop-time = 0.2" in system_of(tmp_path, 1).to_toml()
 
 
 def test_a_fault_campaign_has_each_fault_at_each_connection_time_and_size():

@@ -49,7 +49,7 @@ def changes(
                 kind = next(key for key in faults[table] if key in KINDS)
                 faults[table][kind][entry] = value
             elif table in TABLES:
-                overrides[table][entry] = value
+                overrides[table][entry.replace("_", "-")] = value
             else:
                 overrides["start_values"][place] = value
     entries: list[dict[str, Any]] = []
