@@ -160,6 +160,14 @@ def test_a_time_with_the_name_of_python_is_shown_with_that_of_the_file(tmp_path)
     assert "stop-time = 0.2" in system_of(tmp_path, 1).to_toml()
 
 
+def test_only_times_are_in_seconds():
+    study = paper(
+        parameters={"algorithm.step": [0.001], "rough.step": [1e-3], "rough.until": [0.05], "experiment.stop_time": [0.1]},
+        disturbances={"rough": {"connection": "controller.x_p", "quantisation": {"step": 1e-4}}},
+    )
+    assert [parameter.unit for parameter in study.parameters] == ["s", None, "s", "s"]
+
+
 def test_a_fault_campaign_has_each_fault_at_each_connection_time_and_size():
     campaign = paper(
         faults=[

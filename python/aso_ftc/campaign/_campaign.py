@@ -196,7 +196,9 @@ class Campaign:
     def _nominal(self, place: str) -> tuple[Any, str | None]:
         variable = self._variables.get(place)
         if variable is None:
-            return None, "s" if place.endswith((".step", "-time", ".seconds", ".every", ".from")) else None
+            times = ("-time", ".seconds", ".every", ".from", ".until", ".lost", ".period")
+            is_step = place.startswith("algorithm.") and place.endswith("step")
+            return None, "s" if is_step or place.replace("_", "-").endswith(times) else None
         return self.system.start_values.get(place, variable.start), variable.unit
 
     def _parameters(self, entries: Mapping[str, Any], folder: Path) -> list[Parameter]:
