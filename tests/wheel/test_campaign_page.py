@@ -303,37 +303,57 @@ def test_only_pages_of_campaigns_are_overwritten(tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["c", "p.html"]
 
 
+def in_a_browser(outcome, folder, script, result):
+    """The result, an expression, of a script that follows those of the page."""
+    outcome.page(folder / "p.html")
+    probe = f"""<script>
+    const byId = id => document.getElementById(id);
+    const waiting = setInterval(() => {{
+    if (!document.documentElement.dataset.drawn) return;
+    clearInterval(waiting);
+    {script}
+    document.title = JSON.stringify({result});
+    }}, 50);
+    </script></body>"""
+    text = (folder / "p.html").read_text(encoding="utf-8").replace("</body>", probe)
+    (folder / "probe.html").write_text(text, encoding="utf-8")
+    words = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
+    words += ["--enable-unsafe-swiftshader", "--virtual-time-budget=20000", "--enable-logging=stderr"]
+    words += [f"--user-data-dir={folder / 'profile'}"]
+    done = subprocess.run(
+        ["chromium", *words, "--dump-dom", (folder / "probe.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert "CONSOLE" not in done.stderr, done.stderr
+    return json.loads(html.unescape(done.stdout.split("<title>")[1].split("</title>")[0]))
+
+
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
 def test_a_browser_draws_the_page_and_a_click_shows_the_command(tmp_path):
     outcome = fault_campaign(tmp_path / "c", {"below": 4.5})
-    outcome.page(tmp_path / "p.html")
-    probe = """<script>
-    const byId = id => document.getElementById(id);
-    const waiting = setInterval(() => {
-    if (!document.documentElement.dataset.drawn) return;
-    clearInterval(waiting);
+    script = """
     byId('scatter').emit('plotly_click', {points: [{customdata: 2}]});
     byId('input').selectedIndex = 2;
     byId('input').dispatchEvent(new Event('change'));
-    document.title = JSON.stringify([byId('point').querySelector('code').textContent,
+    """
+    result = """[byId('point').querySelector('code').textContent,
       byId('scatter').data.map(own => own.x.length), byId('heat').data.length, byId('histogram-0').data.length,
       [...byId('scatter').querySelectorAll('.modebar-btn')].map(own => own.dataset.title),
-      performance.getEntriesByType('resource').length]);
-    }, 50);
-    </script></body>"""
-    text = (tmp_path / "p.html").read_text(encoding="utf-8").replace("</body>", probe)
-    (tmp_path / "probe.html").write_text(text, encoding="utf-8")
-    words = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
-    words += ["--enable-unsafe-swiftshader", "--virtual-time-budget=20000", "--enable-logging=stderr"]
-    words += [f"--user-data-dir={tmp_path / 'profile'}"]
-    done = subprocess.run(
-        ["chromium", *words, "--dump-dom", (tmp_path / "probe.html").as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    title = html.unescape(done.stdout.split("<title>")[1].split("</title>")[0])
-    command, points, heat, histogram, buttons, requests = json.loads(title)
+      performance.getEntriesByType('resource').length]"""
+    command, points, heat, histogram, buttons, requests = in_a_browser(outcome, tmp_path, script, result)
     assert (
         command == outcome.command(2) and sum(points) == 7 and heat == 1 and histogram == 2 and requests == 0
     )
     assert [button.lower() for button in buttons] == ["download plot as a png", "zoom", "pan", "reset axes"]
-    assert "CONSOLE" not in done.stderr, done.stderr
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
+def test_a_run_that_did_not_finish_is_drawn_as_a_failure_whatever_value_its_measure_states(tmp_path):
+    # 10 of 40 runs did not finish and have the stated value 0, 20 of the others are within the limit, 10 outside.
+    values, status = np.repeat([0.0, 0.5, 2.0], [10, 20, 10]), np.repeat(["crashed", "ok", "ok"], [10, 20, 10])
+    stated = {"measures": {"y": {"expression": "last(plant.x_p)", "unfinished": 0.0}}}
+    columns, limits = {"p": np.arange(40.0), "q": -np.arange(40.0) ** 2}, {"y": {"below": 1.0}}
+    outcome = write(tmp_path / "c", {"method": "random"}, columns, {"y": values}, limits=limits, status=status, changes=stated)
+    assert outcome.failed("y").sum() == 20
+    traces = "['border', 'scatter'].map(name => byId(name).data.filter(own => own.mode === 'markers').map(own => own.x.length))"
+    assert in_a_browser(outcome, tmp_path, "", traces) == [[20, 20], [20, 20]]

@@ -36,6 +36,8 @@ const values = () => column(measure().name, 'measure').values;
 const inside = (value, {below, above} = measure().limit) => {
   return (below === undefined || value < below) && (above === undefined || value > above);
 };
+// A run that did not finish fails, also if its measure states a value for that.
+const passes = (at, value, limit) => shown(status, at) === 'ok' && inside(value, limit);
 // By default plotly.js has a button that uploads the data of a picture.
 const options = {displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: '',
   modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']]};
@@ -64,7 +66,7 @@ function drawBorder() {
       contours: {type: 'constraint', operation: '=', value: 0.5}, showlegend: false});
   }
   for (const [name, ok, shade, symbol] of [['pass', true, 'good', 'circle'], ['fail', false, 'bad', 'x']]) {
-    const rows = data.runs.map((_, at) => at).filter(at => (all[at] !== null && inside(all[at], limit)) === ok);
+    const rows = data.runs.map((_, at) => at).filter(at => (all[at] !== null && passes(at, all[at], limit)) === ok);
     traces.push({type: 'scatter', mode: 'markers', name, x: rows.map(at => x.values[at]), y: rows.map(at => y.values[at]),
       text: rows.map(at => 'run ' + data.runs[at] + '<br>' + plain(of) + ' = ' + all[at]), hoverinfo: 'text',
       marker: {color: color(shade), size: 5, symbol, opacity: 0.7}});
@@ -120,7 +122,7 @@ function drawParallel() {
   const from = part(0.02), to = part(0.98) > from ? part(0.98) : from + 1, limited = Object.keys(own.limit).length > 0;
   const shade = (value, at) => {
     const position = Math.min(Math.max((value - from) / (to - from), 0), 1), bad = worstLow ? 1 - position : position;
-    return !limited ? bad : inside(all[rows[at]]) ? bad / 2 : 1;
+    return !limited ? bad : passes(rows[at], all[rows[at]]) ? bad / 2 : 1;
   };
   const shades = last.values.map(shade), order = rows.map((_, at) => at).sort((a, b) => shades[a] - shades[b]);
   const axes = [...dimensions, last].map(one => ({...one, values: order.map(at => one.values[at])}));
@@ -139,7 +141,7 @@ function drawScatter() {
   const groups = {good: [], bad: [], none: []};
   data.runs.forEach((_, at) => {
     if (from.values[at] === null) return;
-    groups[all[at] === null ? 'none' : inside(all[at]) ? 'good' : 'bad'].push(at);
+    groups[all[at] === null ? 'none' : passes(at, all[at]) ? 'good' : 'bad'].push(at);
   });
   const finite = all.filter(value => value !== null);
   const top = finite.reduce((a, b) => Math.max(a, b), -Infinity);
@@ -153,7 +155,7 @@ function drawScatter() {
     marker: {color: color(shade), size: symbol === 'x' ? 8 : 5, symbol, opacity: symbol === 'x' ? 1 : 0.6}});
   const gl = document.createElement('canvas').getContext('webgl') ? 'scattergl' : 'scatter';
   const traces = [[groups.good, limited ? 'within the limit' : 'finished', 'good', 'circle'],
-    [groups.bad, 'outside the limit', 'bad', 'circle'],
+    [groups.bad, limited ? 'outside the limit' : 'not finished', 'bad', 'circle'],
     [groups.none, 'no finite value (at the top)', 'bad', 'x']].filter(one => one[0].length)
     .map(one => ({...trace(...one), type: gl}));
   const shapes = Object.values(own.limit).map(value => ({type: 'line', xref: 'paper', x0: 0, x1: 1, y0: value, y1: value,
