@@ -262,6 +262,7 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"faults": [{"connection": "plant.u", "bias": {"value": "x"}}]}, "value"),
         ({"faults": [{"connection": "plant.z", "bias": {"value": 1.0}}]}, "plant.z"),
         ({"faults": [{"connection": "plant.u", "biass": {"value": 1.0}}]}, "exactly one of"),
+        ({"faults": [{"connection": "plant.u", "bias": {"value": [], "from": 1.0}}]}, "faults[0]: bias.value = []"),
         ({"disturbances": {"n": {"connection": "plant.u", "noise": {"amplitud": 1.0}}}}, "amplitud"),
         ({"stop": {"limit": "peak", "width": 0.1}}, "limit"),
         ({"keep": {"runs": [17]}}, "0 to 0"),

@@ -75,6 +75,8 @@ def cases(entries: Any, inputs: Any) -> tuple[FaultCase, ...]:
         body = dict(fault[kind])
         names = list(body)
         lists = [value if isinstance(value, (list, tuple)) else [value] for value in body.values()]
+        if empty := [name for name, values in zip(names, lists, strict=True) if not values]:
+            raise fail(place, f"{kind}.{empty[0]} = []: expected at least one value")
         for connection, *values in itertools.product(connections, *lists):
             filled = dict(zip(names, values, strict=True))
             full = {"connection": connection, kind: filled}
