@@ -188,6 +188,12 @@ def test_a_table_of_the_user_is_taken_row_by_row(tmp_path):
     assert columns(campaign) == {"plant.F_c": [20.5, 21.0], "plant.F_s": [30, 31]}
 
 
+def test_a_table_with_a_name_twice_is_refused(tmp_path):
+    (tmp_path / "runs.csv").write_text("plant.F_c,plant.F_s,plant.F_c\n20.5,30,21\n", encoding="utf-8")
+    with pytest.raises(af.ConfigurationError, match="has several columns plant.F_c"):
+        paper(design={"method": "table", "file": "runs.csv"}, folder=tmp_path)
+
+
 TIME = np.linspace(0.0, 2.0, 2001)
 SIGNALS = {"a.x": np.exp(-3.0 * TIME) * np.cos(20.0 * TIME), "a.der(x)": TIME, "a.K[1,2]": TIME**2}
 SIGNALS |= {"a.on": TIME > 1.0, "a.count": np.arange(2001, dtype=np.int32) * 1000}

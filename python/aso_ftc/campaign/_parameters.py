@@ -320,7 +320,10 @@ def columns_of_table(file: Any, folder: Path) -> dict[str, list[Any]]:
         table = reader.read_table(path) if kind == "parquet" else reader.read_csv(path)
     except (OSError, ValueError) as error:
         raise fail("design.file", f"{path} cannot be read as a table: {error}") from None
-    columns = {name: table[name].to_pylist() for name in table.column_names if name != "run"}
+    names = table.column_names
+    if double := [name for name in names if names.count(name) > 1]:
+        raise fail("design.file", f"{path} has several columns {double[0]}, expected different names")
+    columns = {name: table[name].to_pylist() for name in names if name != "run"}
     if not table.num_rows or not columns:
         raise fail("design.file", f"{path} has no values")
     for name, column in columns.items():
