@@ -125,4 +125,7 @@ def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):
     grid = campaign({"method": "grid"}, "1", parameters={"a": {"values": [20.0, 25.0], "set": PLACES["a"]}})
     with pytest.raises(af.ConfigurationError, match='method = "random"'):
         grid.worst_case(tmp_path / "grid", "y")
+    enough = campaign({"method": "random", "runs": 40}, 'parameter("a")', parameters=parameters)
+    with pytest.raises(af.ConfigurationError, match="workers: 0: expected a whole number of at least 1"):
+        enough.worst_case(tmp_path / "few", "y", workers=0)
     assert not (tmp_path / "few").exists() and np.isfinite(len(grid))

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import plain
 from ._changes import arguments
 from ._engine import Session
-from ._entries import fail
+from ._entries import fail, whole
 from ._packages import package
 from ._parameters import Sampled
 
@@ -128,7 +129,8 @@ def _batches(
     # Neither the end of a random campaign nor kept signals belong to a search.
     variant = copy.copy(campaign)
     variant.stop, variant.keep = {}, {}
-    with Session(variant, workers, scheduler) as session:
+    count = None if workers is None else whole("workers", plain(workers), 1)
+    with Session(variant, count, scheduler) as session:
         yield _Batches(variant, path, session, measure)
 
 
