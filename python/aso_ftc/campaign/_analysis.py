@@ -525,7 +525,7 @@ class Outcome:
         """Return how the measure depends on each parameter, for any design.
 
         Numeric parameters have one row each, with Spearman's rank correlation between parameter and
-        measure over the finished runs (it sees monotone dependence only; its p-value is exact for
+        measure over the finished runs (it sees monotone dependence only; its p-value, by Student's t, is for
         independent samples only), and the fraction of failures in the lowest and in the highest tenth of
         the parameter. Other parameters have one row for each value. In a fault campaign, connection,
         kind, size and start of the fault are parameters, too.
