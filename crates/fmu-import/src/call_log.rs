@@ -26,18 +26,22 @@ pub struct CallLog {
 #[derive(Debug)]
 struct Output {
     file: File,
+    /// Whether the file still has its earlier content.
+    is_earlier: bool,
     /// The first error, after which nothing is written until [`CallLog::check`] returns it.
     failed: Option<io::Error>,
 }
 
 impl CallLog {
-    /// Creates the file at `path`, or empties an existing one.
+    /// Opens the file at `path`, or creates it. The first call replaces the content of an existing file, so that a run
+    /// without any keeps the log of an earlier one.
     ///
     /// # Errors
     ///
     /// [`io::Error`] if the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let output = Output { file: File::create(path)?, failed: None };
+        let file = File::options().write(true).create(true).truncate(false).open(path)?;
+        let output = Output { is_earlier: file.metadata()?.len() > 0, file, failed: None };
         Ok(Self { output: Arc::new(Mutex::new(output)) })
     }
 
@@ -93,7 +97,9 @@ impl CallLog {
     fn write(&self, text: &str) {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         if output.failed.is_none() {
-            output.failed = output.file.write_all(text.as_bytes()).err();
+            let is_earlier = std::mem::take(&mut output.is_earlier);
+            let emptied = if is_earlier { output.file.set_len(0) } else { Ok(()) };
+            output.failed = emptied.and_then(|()| output.file.write_all(text.as_bytes())).err();
         }
     }
 

@@ -32,8 +32,9 @@ pub(crate) struct BusTrace(Arc<Mutex<Writer>>);
 
 struct Writer {
     path: PathBuf,
-    file: File,
-    /// Buffer for a frame. Each frame is written to the file at once, so that a run that is killed loses none.
+    /// `None` until the FMUs are initialised.
+    file: Option<File>,
+    /// What the file gets next. With a file it is written at once, so that a run that is killed loses no frame.
     bytes: Vec<u8>,
     format: Format,
     /// The present time in s, and the frames of this instant with their bus: several terminals of a bus may send
@@ -45,14 +46,14 @@ struct Writer {
 }
 
 impl BusTrace {
-    /// Creates the file at `path` and its folder; the extension `.asc`, `.log` or `.pcapng` selects the format. During
-    /// the run, the trace gets the frames of all CAN buses of `system`: the frames that an FMU which simulates the bus
-    /// passes on or, without such an FMU, the frames that the nodes send.
+    /// Starts a trace for the file at `path`, which [`BusTrace::create`] creates; the extension `.asc`, `.log` or
+    /// `.pcapng` selects the format. During the run, the trace gets the frames of all CAN buses of `system`: the frames
+    /// that an FMU which simulates the bus passes on or, without such an FMU, the frames that the nodes send.
     ///
     /// # Errors
     ///
-    /// [`Error`] if the file cannot be written, if it has another extension, or if there is no CAN bus.
-    pub(crate) fn create(path: &Path, system: &mut System) -> Result<Self, Error> {
+    /// [`Error`] if the file has another extension, or if there is no CAN bus.
+    pub(crate) fn start(path: &Path, system: &mut System) -> Result<Self, Error> {
         let format = Format::of(path)?;
         let senders = senders(system);
         if senders.is_empty() {
@@ -61,15 +62,11 @@ impl BusTrace {
                 path.display()
             )));
         }
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        folder.map_or(Ok(()), std::fs::create_dir_all).map_err(Error::file("create", path))?;
-        let mut file = File::create(path).map_err(Error::file("create", path))?;
         let buses = 1 + senders.iter().map(|sender| sender.bus).max().unwrap_or_default();
         let mut bytes = Vec::new();
-        let start = format.write_start(&mut bytes, buses).and_then(|()| file.write_all(&bytes));
-        start.map_err(Error::file("write", path))?;
+        format.write_start(&mut bytes, buses).map_err(Error::file("write", path))?;
         let (path, time, frames) = (path.to_owned(), f64::NAN, Vec::new());
-        let writer = Writer { path, file, bytes, format, time, frames, failed: None };
+        let writer = Writer { path, file: None, bytes, format, time, frames, failed: None };
         let writer = Arc::new(Mutex::new(writer));
         let shared = writer.clone();
         let mut bytes = [Vec::new()];
@@ -83,6 +80,21 @@ impl BusTrace {
             Ok(())
         }));
         Ok(Self(writer))
+    }
+
+    /// Creates the file and its folder, and writes the frames so far. Call it after the initialisation, so that a run
+    /// that fails in it keeps the trace of an earlier one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the path if the file cannot be written.
+    pub(crate) fn create(&self) -> Result<(), Error> {
+        let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let path = writer.path.clone();
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        folder.map_or(Ok(()), std::fs::create_dir_all).map_err(Error::file("create", &path))?;
+        writer.file = Some(File::create(&path).map_err(Error::file("create", &path))?);
+        writer.write().map_err(Error::file("write", &path))
     }
 
     /// Checks that all frames so far were written.
@@ -124,11 +136,19 @@ impl Writer {
             if self.failed.is_some() || self.frames.contains(&frame) {
                 continue;
             }
-            self.bytes.clear();
             let result = self.format.write_operation(&mut self.bytes, time, bus, &frame.1);
-            self.failed = result.and_then(|()| self.file.write_all(&self.bytes)).err();
+            self.failed = result.and_then(|()| self.write()).err();
             self.frames.push(frame);
         }
+    }
+
+    /// Moves `bytes` to the file, if there is one.
+    fn write(&mut self) -> std::io::Result<()> {
+        if let Some(file) = &mut self.file {
+            file.write_all(&self.bytes)?;
+            self.bytes.clear();
+        }
+        Ok(())
     }
 }
 

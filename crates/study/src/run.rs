@@ -137,7 +137,7 @@ impl PreparedRun {
     ) -> Result<Run, Error> {
         let Self { config, mut system, plan, ports, scenario, tables, opened } = self;
         let trace = config.results.bus_trace.as_deref();
-        let trace = trace.map(|path| BusTrace::create(path, &mut system)).transpose()?;
+        let trace = trace.map(|path| BusTrace::start(path, &mut system)).transpose()?;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {
@@ -157,6 +157,7 @@ impl PreparedRun {
                 recorder.set_due(due);
             }
         }
+        trace.as_ref().map_or(Ok(()), BusTrace::create)?;
         Ok(Run {
             resumed: due.is_some(),
             checkpoints: Checkpoints::new(&config, text, plan.every),

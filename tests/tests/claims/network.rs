@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use tests::c_fmu::CFmu;
 use tests::{Table, bus, node};
 
 /// Duration of a frame with one byte in s: 52 bits at 100 kbit/s.
@@ -63,6 +64,25 @@ fn the_trace_of_the_file_goes_into_the_folder_of_the_command_line() {
     run(folder.path(), &format!("[fmus]\na = {fmu:?}\nb = {fmu:?}\n{trace}"), &[]);
     assert!(folder.path().join("out/frames.asc").is_file());
     assert!(!folder.path().join("elsewhere").exists());
+}
+
+#[test]
+fn a_run_that_fails_in_its_initialisation_keeps_an_earlier_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = CFmu::that("fail in fmi2ExitInitializationMode").write(folder.path(), "bad");
+    let (bad, node) = (format!("bad={}", bad.display()), node::write(folder.path()));
+    let node = format!("a={}", node.display());
+    let trace = folder.path().join("trace.log");
+    let earlier = "(0.003000) can0 001#01\n";
+    std::fs::write(&trace, earlier).unwrap();
+    let path = trace.display().to_string();
+    let times = ["--stop-time", "0.01", "--step", "0.001"];
+    let run = ["run", "--fmu", &node, "--fmu", &bad, "--bus-trace", &path];
+    let output = tests::run(&[&run[..], &times].concat());
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("fmi2ExitInitializationMode"), "{message}");
+    assert_eq!(std::fs::read_to_string(&trace).unwrap(), earlier);
 }
 
 /// A system structure connects terminals by their names, or the clocks and binaries that are their members.

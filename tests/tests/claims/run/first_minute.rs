@@ -131,6 +131,20 @@ fn the_log_of_calls_has_every_call_of_a_run() {
 }
 
 #[test]
+fn a_run_without_a_call_keeps_the_log_of_calls_of_an_earlier_one() {
+    let bench = Bench::new();
+    let log = ["--step", "0.5", "--stop-time", "1", "--log-calls", "calls.txt"];
+    let earlier = "an earlier line\n".repeat(1000);
+    bench.write("calls.txt", &earlier);
+    fails(&bench.run(&[&log[..], &["--fmu", "a=none.fmu"]].concat()), 2, &["none.fmu"]);
+    assert_eq!(bench.read("calls.txt"), earlier);
+    let path = CFmu::well_behaved().write(bench.folder.path(), "a").display().to_string();
+    printed(&bench.run(&[&log[..], &[path.as_str()]].concat()));
+    let calls = bench.read("calls.txt");
+    assert!(calls.starts_with("a fmi2Instantiate(") && !calls.contains("earlier"), "{calls}");
+}
+
+#[test]
 fn the_log_of_calls_distinguishes_warnings_from_ok() {
     let bench = Bench::new();
     let fmu = CFmu::that("warn everywhere").write(bench.folder.path(), "a");
