@@ -20,7 +20,7 @@ use crate::output;
 /// `target` of the events for messages of FMUs.
 const FMU: &str = "fmu";
 /// `target` of the events of a results file; the information that it is replaced is logged without `verbose`, too.
-const RESULTS_FILE: &str = "results::output";
+pub(crate) const RESULTS_FILE: &str = "results::output";
 
 /// Starts logging: errors, warnings, and that a results file is replaced; with `verbose` 1, all information; from 2 on,
 /// everything. `json` writes each message as a JSON object. Only the first call has an effect.

@@ -219,6 +219,16 @@ def test_a_stopped_run_keeps_its_rows(aso_ftc, tmp_path):
     assert results.count(b"\n") == 7 and again.startswith(results) and again.count(b"\n") == 3002
 
 
+def test_the_changes_of_an_earlier_run_are_replaced_with_a_line(aso_ftc, tmp_path):
+    for lines in (0, 1):
+        with live(tmp_path, "--stop-time", 0.1) as run:
+            run.do("scenario", SET)
+            run.do("scenario", FAULTS[2])
+            run.do("stop")
+            run.end()
+        assert run.errors.count("live.toml: replaces the changes of an earlier run\n") == lines
+
+
 def test_a_checkpoint_of_a_stopped_run_has_its_interventions(aso_ftc, tmp_path):
     saved = tmp_path / "run.state"
     with live(tmp_path, "--stop-time", 0.3, "--record-every", "step", "--checkpoint", saved) as run:

@@ -53,6 +53,8 @@ pub(super) struct Live {
     /// The file that repeats the run, in the folder of the results. It has another name for a resumed run, so that it
     /// does not replace the file of the run before the checkpoint.
     file: PathBuf,
+    /// Whether this run has written the file.
+    is_written: bool,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,
 }
@@ -120,6 +122,7 @@ impl Live {
             paused: Duration::ZERO,
             remarks: vec![first],
             file,
+            is_written: false,
             stopped: false,
         })
     }
@@ -214,9 +217,16 @@ impl Live {
         Ok(format!("Accepted: it takes effect at t = {from} s, or at the later time of an entry."))
     }
 
-    /// Writes the file that repeats the run; an error is also logged.
-    fn write(&self, run: &Run) -> Result<(), String> {
+    /// Writes the file that repeats the run, and logs that it replaces one of an earlier run; an error is also logged.
+    fn write(&mut self, run: &Run) -> Result<(), String> {
         let text = self.repetition(run).map_err(|error| error.sentence())?;
+        if !std::mem::replace(&mut self.is_written, true) && self.file.exists() {
+            let file = self.file.display();
+            tracing::info!(
+                target: logging::RESULTS_FILE,
+                "{file}: replaces the changes of an earlier run"
+            );
+        }
         files::whole::write(&self.file, text.as_bytes()).map_err(|error| {
             let message = format!("done, but {} cannot be written: {error}", self.file.display());
             tracing::error!("{message}");
