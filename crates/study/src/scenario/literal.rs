@@ -109,8 +109,8 @@ impl Literal {
     }
 }
 
-/// The largest magnitude up to which each integer is a double, 2^53.
-const EXACT: i128 = 1 << f64::MANTISSA_DIGITS;
+/// The largest magnitude of an integer whose double no other integer rounds to, 2^53 - 1.
+const EXACT: i128 = (1 << f64::MANTISSA_DIGITS) - 1;
 
 /// Returns the smallest and largest integer that a signal can give to a variable of this type; `None` if its values are
 /// not integers.
