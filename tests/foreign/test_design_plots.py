@@ -236,7 +236,7 @@ def test_the_first_screen_has_the_verdict_its_reasons_and_what_to_change(designe
     text = opened.evaluate("document.querySelector('.verdict').innerText")
     level, reasons = numbers["verdict"]["level"], numbers["verdict"]["reasons"]
     assert f"Verdict: {level}" in text and all(reason in text for reason in reasons)
-    assert ("To make it green" in text) == (level != "green")
+    assert ("What to change" in text) == (level != "green")
     figures = opened.evaluate("document.querySelector('.key').innerText")
     peaks = [point["judged"] for point in numbers["robustness"]["points"]]
     assert all(f"{peak:.5g}" in figures for peak in peaks)

@@ -1,4 +1,4 @@
-//! What to change so that a design becomes green.
+//! What to change in a design that is not green.
 
 use maud::{Markup, html};
 

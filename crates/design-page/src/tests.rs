@@ -365,6 +365,13 @@ fn a_fault_that_is_not_detected_for_sure_says_so() {
     assert!(shown.contains("least detectable") && shown.contains("none"), "{shown}");
 }
 
+/// No other design may meet the limits: the change is then the best one found, or a sentence that there is none.
+#[test]
+fn a_change_is_not_said_to_make_the_design_green() {
+    let text = page(&hostile());
+    assert!(text.contains("What to change") && !text.contains("make it green"));
+}
+
 /// The judged peak is 3 in the best units, and 1.5e5 in those of the plant file, as is the 12.5 of the other design.
 #[test]
 fn a_linear_quadratic_design_is_proposed_for_a_peak_in_the_same_units_only() {

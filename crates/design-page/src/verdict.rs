@@ -36,7 +36,7 @@ pub(super) fn verdict(report: &Report) -> Markup {
                 @if failures.is_empty() { p { (capitalised(&holding(count))) } }
             }
             @if !advice.is_empty() {
-                p.outcome { "To make it green" }
+                p.outcome { "What to change" }
                 ul { @for entry in &advice { li { (entry) } } }
             }
             @if !report.warnings.is_empty() {
