@@ -355,9 +355,10 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
     }
     for test in tests {
         if let Some(excess) = test.interior_excess.filter(|excess| *excess > NOTICEABLE) {
+            let allowance = if test.drift.is_some() { "drift" } else { "threshold" };
             warnings.push(format!(
                 "parameters within their limits give the test {} means that are up to {:.1} % larger than at the \
-                 corners of the limits; its threshold allows for the largest that was found",
+                 corners of the limits; its {allowance} allows for the largest that was found",
                 test.name,
                 100.0 * excess
             ));
@@ -404,4 +405,33 @@ fn confused(reacts: &[Vec<bool>], problem: &Problem) -> Vec<Vec<String>> {
         }
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A CUSUM test has a drift, a test of windows has none.
+    #[test]
+    fn a_warning_names_what_allows_for_errors_of_the_model() {
+        for (drift, window, part) in [
+            (Some(1.5), None, "; its drift allows for the largest"),
+            (None, Some(8), "; its threshold allows for the largest"),
+        ] {
+            let test = Test {
+                name: "f_u1".to_owned(),
+                residuals: 1,
+                drift,
+                window,
+                model_error: 1.0,
+                interior_excess: Some(0.1),
+                threshold: 5.0,
+                false_alarm_interval: 1e4,
+                decoupled: Vec::new(),
+            };
+            let mut warnings = Vec::new();
+            warn(&[test], &[], &mut warnings);
+            assert!(warnings.len() == 1 && warnings[0].contains(part), "{warnings:?}");
+        }
+    }
 }
