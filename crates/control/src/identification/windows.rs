@@ -11,6 +11,8 @@ use crate::{Error, check};
 
 /// Rows that are factored at once, as a multiple of the columns.
 const ROWS_AT_ONCE: usize = 3;
+/// Largest number of columns of R, which then needs 800 MB.
+const LARGEST: usize = 10_000;
 
 /// Samples of inputs and outputs at equidistant instants.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,18 +74,20 @@ pub struct Windows {
 impl Windows {
     /// Factors the windows whose last sample is in `range`, by Householder reflections: 2 N c^2 multiplications.
     ///
-    /// `past`: s, one or more. Windows that would start before the record or end after it are left out; the factor of a
-    /// range without windows is zero.
+    /// `past`: s, one or more; c is at most 10,000. Windows that would start before the record or end after it are left
+    /// out; the factor of a range without windows is zero.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad record; [`Error::OutOfRange`] for `past` of zero.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad record; [`Error::OutOfRange`] for `past`.
     pub fn new(record: &Record, past: usize, range: Range<usize>) -> Result<Self, Error> {
         record.check()?;
         check::positive("past", as_number(past))?;
         let (inputs, outputs) = (record.inputs.nrows(), record.outputs.nrows());
         let signals = inputs + outputs;
-        let columns = 1 + (past + 1) * signals;
+        let columns = past.saturating_add(1).saturating_mul(signals).saturating_add(1);
+        let rule = "a number with which R has at most 10,000 columns";
+        check::that(columns <= LARGEST, "past", as_number(past), rule)?;
         let range = range.start.max(past)..range.end.min(record.len());
         let entry = |at: usize, column: usize| {
             let Some(column) = column.checked_sub(1) else { return 1.0 };
@@ -217,6 +221,15 @@ mod tests {
             assert_eq!(units[0].to_bits(), 1.0_f64.to_bits(), "{value}: {units:?}");
             assert!((units[1] - 0.5_f64.sqrt()).abs() < 0.01, "{units:?}");
             assert_eq!(windows.excitation(1e-6), Ok(0), "{value}");
+        }
+    }
+
+    /// 1 + (4999 + 1) 2 = 10,001 columns.
+    #[test]
+    fn a_past_with_more_than_10_000_columns_is_refused() {
+        for past in [4999, usize::MAX] {
+            let refused = Windows::new(&record(20.0), past, 0..500);
+            assert!(matches!(refused, Err(Error::OutOfRange { name: "past", .. })), "{past}");
         }
     }
 
