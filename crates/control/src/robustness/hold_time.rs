@@ -100,7 +100,7 @@ fn search(
     [from, short, to]: [f64; 3],
 ) -> Result<f64, Error> {
     let (mut good, mut h) = (Evaluation { at: 0.0, value: f64::NAN }, from);
-    while h <= to {
+    while h <= to.min(f64::MAX) {
         let tested = Evaluation { at: h, value: value(h)? };
         if tested.value < 0.0 {
             good = tested;
@@ -119,6 +119,14 @@ fn search(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// For a mode slower than 1e-306 the search ends above the range of double precision.
+    #[test]
+    fn a_search_ends_with_the_largest_double() {
+        let value = |h: f64| Ok(if h.is_finite() { -1.0 } else { f64::NAN });
+        assert_eq!(search(value, [1e300, 1e300, f64::INFINITY]), Ok(f64::INFINITY));
+        assert_eq!(search(value, [f64::INFINITY; 3]), Ok(f64::INFINITY));
+    }
 
     #[test]
     fn a_sampled_loop_has_no_hold_time() {

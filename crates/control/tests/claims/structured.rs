@@ -364,3 +364,20 @@ fn a_stiff_drive_is_proven_to_near_the_instability_that_is_found() {
         assert!((0.8..0.923).contains(&actual.fraction), "{most}: {actual:?}");
     }
 }
+
+/// For a sampled loop the fraction is halved until a bound exists, which never ends from infinity.
+#[test]
+fn a_largest_fraction_that_is_not_finite_and_above_zero_is_refused() {
+    let one = |value| matrix(1, 1, &[value]);
+    let plant =
+        StateSpace { a: one(-1.0), b: one(1.0), c: one(1.0), d: one(0.0), domain: CONTINUOUS };
+    let tolerances = Tolerances { of: [0.1, 0.0, 0.0, 0.0].map(one), common: Vec::new() };
+    let family = EntryFamily::new(&plant, &tolerances).expect("fits");
+    for domain in [CONTINUOUS, Domain::Sampled { period: 0.1 }] {
+        let controller = StateSpace { domain, a: one(-0.5), ..idle(1, 1) };
+        for most in [f64::INFINITY, f64::NAN, 0.0] {
+            let refused = proven_tolerance(&family, &controller, most, &|| false);
+            assert!(matches!(refused, Err(Error::OutOfRange { name: "most", .. })), "{refused:?}");
+        }
+    }
+}

@@ -6,7 +6,7 @@ use super::held::HeldFamily;
 use super::structured_bound;
 use crate::robustness::tolerance::EntryFamily;
 use crate::robustness::{Loop, held_plant};
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// The largest number of channels of the perturbation, and of states of the loop.
@@ -59,9 +59,9 @@ pub enum Unproven {
 /// Each deviation d adds d L R' to [A, B; C, D], so that the loop is M in feedback with the diagonal matrix of the
 /// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
 ///
-/// `most`: the largest fraction of interest, above zero, for example one at which instability was found; no larger one
-/// is proven. `ending`: called at each interval; true ends the search. The inner result is the reason why nothing is
-/// proven.
+/// `most`: the largest fraction of interest, finite and above zero, for example one at which instability was found; no
+/// larger one is proven. `ending`: called at each interval; true ends the search. The inner result is the reason why
+/// nothing is proven.
 ///
 /// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that
 /// of the nominal plant plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
@@ -71,13 +71,15 @@ pub enum Unproven {
 ///
 /// # Errors
 ///
-/// Same as [`structured_bound`], [`super::super::Loop::new`], [`crate::hold::zero_order_hold`].
+/// Same as [`structured_bound`], [`super::super::Loop::new`], [`crate::hold::zero_order_hold`]; [`Error::OutOfRange`]
+/// for `most`.
 pub fn proven_tolerance(
     family: &EntryFamily<'_>,
     controller: &StateSpace,
     most: f64,
     ending: &dyn Fn() -> bool,
 ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
+    check::positive("most", most)?;
     let changes = family.changes();
     let perturbed = PerturbedLoop { plant: family.nominal(), changes, controller };
     match (controller.domain, perturbed.plant.domain) {
