@@ -44,7 +44,9 @@ impl Svd {
         let mut images = m / unit;
         let mut right = DMatrix::identity(cols, cols);
         let negligible = NEGLIGIBLE * images.norm();
-        for _ in 0..SWEEPS {
+        // A single column needs no rotation, so that it would pass.
+        let sweeps = if negligible.is_finite() { SWEEPS } else { 0 };
+        for _ in 0..sweeps {
             let mut rotated = false;
             for first in 0..cols {
                 for second in first + 1..cols {
@@ -221,6 +223,16 @@ mod tests {
             assert!((s.right.transpose() * &s.right - identity).norm() < 1e-14);
         }
         assert_eq!(Svd::new(&tall).unwrap().rank(1e-12), 2);
+    }
+
+    #[test]
+    fn entries_that_are_not_finite_are_an_error_also_in_a_single_column() {
+        for value in [f64::NAN, f64::INFINITY] {
+            for columns in [1, 2] {
+                let refused = Svd::new(&DMatrix::from_element(2, columns, value));
+                assert!(matches!(refused, Err(Error::NotConverged { .. })), "{value} {columns}");
+            }
+        }
     }
 
     /// The singular values of diag(1, 1e-9, 1e-18) times a rotation are those of the diagonal.
