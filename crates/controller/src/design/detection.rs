@@ -87,6 +87,10 @@ impl DetectionDesign {
 
     /// Describes the first entry with a wrong shape or length, without its counterpart, or that excludes another one.
     pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
+        let lists = [("faults", self.faults.len()), ("tests", self.tests.len())];
+        if let Some((name, _)) = lists.iter().find(|(_, count)| *count == 0) {
+            return Some(format!("detection.{name} is empty, expected at least one entry"));
+        }
         for (name, matrix, (rows, columns)) in self.shapes(design) {
             let (actual_rows, actual_columns) = (matrix.rows, matrix.columns);
             if (actual_rows, actual_columns) != (rows, columns) {

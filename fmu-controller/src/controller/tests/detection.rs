@@ -287,6 +287,7 @@ fn a_wrong_section_is_refused_with_its_entry() {
         ("sample_time = 0.05\nfrom", "from", "detection.sample_time is missing"),
         ("residuals = 1", "residuals = 2", "the tests take 2 residuals"),
         ("reacts = [true]", "reacts = []", "reacts has 0 entries, expected 1"),
+        ("faults = [\"f\"]", "faults = []", "detection.faults is empty, expected at least one"),
         ("drift = 0.005", "drift = -0.1", "drift = -0.1, expected above 0"),
         ("drift = 0.005", "drift = 0.005\nwindow = 3", "expected drift, or window"),
         ("from = 0.2", "from = -1.0", "detection.from = -1, expected a time in s from 0"),
