@@ -211,10 +211,11 @@ fn decision(case: &design::Reconfiguration, plant: &Plant<'_>) -> Result<Option<
     // The smallest whole number of samples that last as long, with the tolerance of the FMU.
     let least = time * (1.0 - 1e-9);
     let mut samples = (least / plant.sample_time).floor().max(0.0);
-    while samples * plant.sample_time < least {
+    let most = f64::from(u32::MAX);
+    while samples * plant.sample_time < least && samples <= most {
         samples += 1.0;
     }
-    if samples > f64::from(u32::MAX) {
+    if samples > most {
         return Err(Error(format!(
             "reconfiguration without {}: {time} s are more than 2^32 samples; a counter of the code has 32 bits",
             case.gone
@@ -222,4 +223,44 @@ fn decision(case: &design::Reconfiguration, plant: &Plant<'_>) -> Result<Option<
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
     Ok(Some(Decision { loss, fraction, samples: samples as u32 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 7 s have more than 2^53 samples of 3e-16 s: their number and the next one are the same double.
+    #[test]
+    fn a_time_of_more_samples_than_a_double_counts_is_refused() {
+        let case = design::Reconfiguration {
+            gone: "u".to_owned(),
+            actuator: 0,
+            stuck_at: 0.0,
+            k_x: None,
+            k_f: None,
+            k_s: None,
+            restart: Vec::new(),
+            restarted: Vec::new(),
+            loss: Some(0.5),
+            time: Some(7.0),
+        };
+        let actuator = Actuator {
+            name: "u".to_owned(),
+            unit: None,
+            description: String::new(),
+            operating: None,
+            limits: None,
+        };
+        let gain = DMatrix::zeros(1, 1);
+        let plant = Plant {
+            sample_time: 3e-16,
+            actuators: &[actuator],
+            faults: &[],
+            losses: &[Loss { fault: 0, actuator: 0, least_command: 1.0 }],
+            k_x: &gain,
+            k_f: &gain,
+        };
+        let refused = decision(&case, &plant).err().unwrap().to_string();
+        assert!(refused.contains("7 s are more than 2^32 samples"), "{refused}");
+    }
 }
