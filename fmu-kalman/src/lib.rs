@@ -96,7 +96,7 @@ impl KalmanFilter {
         let n = self.deviations.len();
         let variances = self.estimate.covariance.iter().step_by(n + 1);
         for (deviation, variance) in self.deviations.iter_mut().zip(variances) {
-            *deviation = variance.max(0.0).sqrt();
+            *deviation = variance.clamp(0.0, f64::INFINITY).sqrt();
         }
     }
 

@@ -80,6 +80,12 @@ pub enum FilterError<E> {
     /// The plant cannot be evaluated.
     #[error(transparent)]
     Plant(#[from] E),
+    /// P or H P H' is infinite or NaN.
+    #[error(
+        "the covariance of the estimate is not finite: the estimate diverges, expected measurements that show \
+         each unstable state often enough"
+    )]
+    NotFinite,
     /// H P H' + V is not positive definite.
     #[error("the covariance of the innovation is not positive definite: V must be")]
     NotDefinite,
@@ -158,7 +164,8 @@ impl NonlinearFilter {
     ///
     /// # Errors
     ///
-    /// [`FilterError::Plant`]. The extended filter then has the mean that the plant left.
+    /// [`FilterError::Plant`]. The extended filter then has the mean that the plant left. [`FilterError::NotFinite`];
+    /// the estimate is of no use then.
     pub fn predict<M: SampledPlant>(
         &mut self,
         plant: &mut M,
@@ -182,7 +189,7 @@ impl NonlinearFilter {
         }
         self.covariance += &self.w;
         symmetrise(&mut self.covariance);
-        Ok(())
+        check_finite(&self.covariance)
     }
 
     /// Corrects the estimate by those of the measurements `y` for whose index `is_due` is true.
@@ -235,6 +242,7 @@ impl NonlinearFilter {
             self.s.column_mut(k).fill(0.0);
             self.s[(k, k)] = 1.0;
         }
+        check_finite::<M::Error>(&self.s)?;
         let s = std::mem::replace(&mut self.s, DMatrix::zeros(0, 0));
         let size = s.nrows();
         let Some(factor) = Cholesky::new(s) else {
@@ -302,6 +310,11 @@ fn covariance_of(xs: &DMatrix<f64>, ys: &DMatrix<f64>, covariance: &mut DMatrix<
     for (x, y) in xs.column_iter().zip(ys.column_iter()) {
         covariance.ger(1.0 / as_number(xs.ncols()), &x, &y, 1.0);
     }
+}
+
+fn check_finite<E>(covariance: &DMatrix<f64>) -> Result<(), FilterError<E>> {
+    let is_finite = covariance.iter().all(|entry| entry.is_finite());
+    if is_finite { Ok(()) } else { Err(FilterError::NotFinite) }
 }
 
 fn symmetrise(matrix: &mut DMatrix<f64>) {

@@ -195,6 +195,20 @@ fn a_measurement_without_noise_of_a_known_state_is_refused() {
     }
 }
 
+/// 1e200 squared is above the range of double precision.
+#[test]
+fn a_covariance_that_overflows_is_named() {
+    for transform in BOTH {
+        let mut filter = NonlinearFilter::new(matrix([[1.0]]), matrix([[1.0]]));
+        filter.covariance[(0, 0)] = 1.0;
+        let mut plant = Linear { a: matrix([[1.0]]), c: matrix([[1e200]]) };
+        let refused = filter.correct(&mut plant, &[1.0], |_| true, transform);
+        assert_eq!(refused, Err(FilterError::NotFinite));
+        let mut plant = Linear { a: matrix([[1e200]]), c: matrix([[1.0]]) };
+        assert_eq!(filter.predict(&mut plant, transform), Err(FilterError::NotFinite));
+    }
+}
+
 #[test]
 fn the_root_of_a_singular_covariance_has_it_as_square() {
     let columns = matrix([[1e6, 2e6], [-3.0, 1.0], [0.0, 0.0], [2e-5, 7e-5]]);
