@@ -38,7 +38,7 @@ impl<M: Model> Instance<M> {
         let terminated = match done {
             Ok(()) => false,
             Err(Failure::Terminated { time, message }) => {
-                stop.time = time.clamp(start, end);
+                stop.time = if time.is_finite() { time.clamp(start, end) } else { start };
                 self.core.time = stop.time;
                 self.core.terminated = true;
                 self.log(Status::OK, "logEvents", &format!("the simulation ends: {message}"));

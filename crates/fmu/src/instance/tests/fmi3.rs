@@ -342,7 +342,7 @@ fn a_step_with_the_model_s_own_end_of_the_simulation_says_so() {
             Vec::new()
         }
         fn step(&mut self, step: &Step) -> Result<(), Failure> {
-            let time = step.start + 0.25;
+            let time = if step.size > 1.0 { f64::NAN } else { step.start + 0.25 };
             Err(Failure::Terminated { time, message: "enough".to_owned() })
         }
     }
@@ -351,6 +351,12 @@ fn a_step_with_the_model_s_own_end_of_the_simulation_says_so() {
             instantiate::<Ending>(InterfaceType::CoSimulation, false, early).unwrap();
         let step = instance.do_step_3(0.0, 1.0).unwrap();
         assert_eq!((step.early_return, step.last_successful_time), (early, 0.25));
+        assert!(step.terminate_simulation);
+        // A time that is no number is the start of the step, as in FMI 2.0.
+        let mut instance =
+            instantiate::<Ending>(InterfaceType::CoSimulation, false, early).unwrap();
+        let step = instance.do_step_3(0.0, 2.0).unwrap();
+        assert_eq!((step.early_return, step.last_successful_time), (early, 0.0));
         assert!(step.terminate_simulation);
     }
 }
