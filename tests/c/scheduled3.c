@@ -1,5 +1,5 @@
 /* An FMU of FMI 3.0.2 for scheduled execution with three model partitions, each with its digit:
- * 1, every 0.5 s: at its third activation it starts the countdown of partition 3, 0.2 s;
+ * 1, every 0.5 s: at its third activation it starts the countdown of partition 3, 0.2 s, with a negative u -0.2 s;
  * 2, when it is asked for: adds the input u to `sum`;
  * 3, after the countdown: the clock `done` ticks.
  * `order` has the digits of the activations, the first one in front.
@@ -71,7 +71,7 @@ EXPORT fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReferenc
     demand(tasks->mode == INITIALIZATION || tasks->mode == ACTIVATION, "fmi3GetIntervalDecimal");
     for (size_t k = 0; k < n; k++) {
         demand(vr[k] == LATER, "fmi3GetIntervalDecimal of another clock");
-        intervals[k] = 0.2;
+        intervals[k] = tasks->u < 0 ? -0.2 : 0.2;
         qualifiers[k] = tasks->counts ? fmi3IntervalChanged : fmi3IntervalNotYetKnown;
         tasks->counts = false;
     }

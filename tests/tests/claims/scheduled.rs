@@ -43,3 +43,16 @@ fn model_partitions_run_at_the_ticks_of_their_clocks_by_priority() {
         assert_eq!(changes("b.sum"), [(0.0, 0.0), (1.2, 7.0)]);
     }
 }
+
+#[test]
+fn a_negative_interval_of_a_clock_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = format!("a={}", scheduled::write(folder.path()).display());
+    let out = folder.path().display().to_string();
+    let run = ["run", "--fmu", &fmu, "--set", "a.u=-1", "--stop-time", "1.5", "--step", "0.4"];
+    let output = tests::run(&[&run[..], &["--out", &out]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let warning = "a: fmi3GetIntervalDecimal gives the clock with the value reference 3 the interval -0.2 s at t = 1 s";
+    assert_eq!(message.matches(warning).count(), 1, "{message}");
+}

@@ -109,6 +109,12 @@ impl<F: Copy> Base<F> {
         !is_lost
     }
 
+    /// Warns of an answer of the FMU that is used although it is not allowed.
+    #[cold]
+    pub(crate) fn warn(&self, text: &str) {
+        tracing::warn!("{}: {text}", self.place.instance());
+    }
+
     /// Lets the calls from now on get copies of arrays, with canaries.
     pub(crate) fn guard_arrays(&mut self) {
         self.guards = true;

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use fmu_description::number::seconds as rounded;
 use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDescription};
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,8 @@ struct TimedClock {
     ticks: u64,
     /// Time of the next tick in s, if it is known.
     next: Option<f64>,
+    /// Whether an interval that is not allowed was a warning.
+    warned: bool,
 }
 
 /// The state of all clocks in a serialised state.
@@ -274,7 +277,8 @@ impl Clocks {
         Ok(())
     }
 
-    /// Asks for the intervals that an event at `time`, in s, may have changed, and moves the next ticks.
+    /// Asks for the intervals that an event at `time`, in s, may have changed, and moves the next ticks. The first
+    /// interval of a clock that is not allowed is a warning.
     pub(super) fn ask_intervals(
         &mut self,
         component: &mut Component,
@@ -292,6 +296,18 @@ impl Clocks {
                 let (interval, qualifier) = component.get_interval(clock.reference)?;
                 if qualifier != CHANGED {
                     continue;
+                }
+                // A countdown of 0 s ends at once.
+                let periodic = clock.is_periodic();
+                let is_allowed = if periodic { interval > 0.0 } else { interval >= 0.0 };
+                if !is_allowed && !std::mem::replace(&mut clock.warned, true) {
+                    let expected = if periodic { "a positive one" } else { "at least 0 s" };
+                    component.base.warn(&format!(
+                        "fmi3GetIntervalDecimal gives the clock with the value reference {} the interval {interval} s \
+                         at t = {} s, expected {expected}; its ticks are wrong",
+                        clock.reference,
+                        rounded(time)
+                    ));
                 }
                 clock.next = Some(time + interval);
                 if clock.is_periodic() && interval.to_bits() != clock.interval.to_bits() {
@@ -427,8 +443,7 @@ mod tests {
 
     fn clock(interval: f64, fraction: Option<(u64, u64)>) -> TimedClock {
         let attributes = ClockType::default();
-        let (reference, first, ticks, next) = (1, 0.0, 0, None);
-        TimedClock { reference, attributes, interval, fraction, first, ticks, next }
+        TimedClock { reference: 1, attributes, interval, fraction, ..TimedClock::default() }
     }
 
     /// The products of the rounded intervals are 333333.3333333333 and 700000.0000000001.
