@@ -54,12 +54,12 @@ pub enum FmuError {
         expected: &'static str,
     },
     /// The FMU has no interface, or lacks the requested one.
-    #[error(
-        "{path}: the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
-    )]
+    #[error("{path}: the FMU lacks an interface, expected the element {expected}")]
     NoInterface {
         /// The FMU.
         path: PathBuf,
+        /// The elements of which one is required.
+        expected: &'static str,
     },
     /// The library of an FMU with `needsExecutionTool` does not load or instantiate; the missing tool may be the cause.
     #[error("the FMU may need {tool} to be installed (needsExecutionTool is true)\n{source}")]
@@ -182,7 +182,8 @@ impl Fmu {
         let description = &unpacked.description;
         let stepped = description.stepped();
         if stepped.is_none() && description.model_exchange.is_none() {
-            return Err(FmuError::NoInterface { path: path.to_owned() });
+            let expected = "CoSimulation or ModelExchange";
+            return Err(FmuError::NoInterface { path: path.to_owned(), expected });
         }
         let library = stepped.map(|flags| {
             let library = unpacked.library(&flags.model_identifier)?;
@@ -224,10 +225,10 @@ impl Fmu {
         Ok(view.map_err(unsupported)?.description)
     }
 
-    /// Returns the error of an FMU without the requested interface, with the name of its file: its folder may be
+    /// Returns the error of an FMU without the `expected` element, with the name of its file: its folder may be
     /// temporary.
-    pub(crate) fn no_interface(&self) -> FmuError {
-        FmuError::NoInterface { path: PathBuf::from(&self.content.name) }
+    pub(crate) fn no_interface(&self, expected: &'static str) -> FmuError {
+        FmuError::NoInterface { path: PathBuf::from(&self.content.name), expected }
     }
 
     /// Reserves an FMU that allows one instance only for the instance `name`; [`FmuError::OnlyOnce`] if it has one.
@@ -288,7 +289,8 @@ impl Fmu {
                 let library = Library::open(&self.loading(&library), interface);
                 Arc::new(library.map_err(|error| with_tool_hint(description, error))?)
             }
-            _ => return Err(self.no_interface()),
+            (Interface::CoSimulation, ..) => return Err(self.no_interface("CoSimulation")),
+            (Interface::ModelExchange, ..) => return Err(self.no_interface("ModelExchange")),
         };
         let resources = file_uri(&unpacked.resources())?;
         let names = self.names();

@@ -1,5 +1,6 @@
 //! Instances for co-simulation and scheduled execution.
 
+use fmu_description::Version;
 use fmu_description::location::file_uri;
 
 use super::{Inner, Instance};
@@ -47,14 +48,16 @@ impl Fmu {
                 let component = self.component(Interface::CoSimulation, name)?;
                 Ok(Inner::V2(crate::v2::Instance::new(component)))
             }
-            None => Err(self.no_interface()),
+            None if description.version() == Version::V3 => {
+                Err(self.no_interface("CoSimulation or ScheduledExecution"))
+            }
+            None => Err(self.no_interface("CoSimulation")),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use fmu_description::Version;
     use fmu_description::package::{Package, TemporaryFolder};
 
     use super::*;
@@ -73,6 +76,7 @@ mod tests {
         package.write(&file).unwrap();
         let error = Fmu::open_quietly(&file).unwrap().instantiate("m").err().unwrap();
         assert!(matches!(error, FmuError::NoInterface { .. }), "{error}");
-        assert!(error.to_string().starts_with("M.fmu: "), "{error}");
+        let expected = "M.fmu: the FMU lacks an interface, expected the element CoSimulation or ScheduledExecution";
+        assert_eq!(error.to_string(), expected);
     }
 }

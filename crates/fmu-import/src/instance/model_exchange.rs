@@ -38,7 +38,7 @@ impl Fmu {
     fn equations_of_version_1(&self, name: &str) -> Result<crate::v1::Instance, FmuError> {
         let (unpacked, description) = (&self.content.unpacked, self.description());
         let Some(flags) = &description.model_exchange else {
-            return Err(self.no_interface());
+            return Err(self.no_interface("ModelExchange"));
         };
         let (identifier, interface) = (&flags.model_identifier, Interface::ModelExchange);
         let hint = |error| with_tool_hint(description, error);
@@ -54,7 +54,7 @@ impl Fmu {
     fn equations_of_version_3(&self, name: &str) -> Result<crate::v3::Instance, FmuError> {
         let (unpacked, description) = (&self.content.unpacked, self.description());
         let Some(flags) = &description.model_exchange else {
-            return Err(self.no_interface());
+            return Err(self.no_interface("ModelExchange"));
         };
         let hint = |error| with_tool_hint(description, error);
         let interface = v3::Interface::ModelExchange;
