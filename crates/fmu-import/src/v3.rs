@@ -145,7 +145,7 @@ impl Instance {
 
     /// Sets structural parameters in Configuration Mode, which resizes the arrays whose dimensions refer to them.
     /// `description` is the description of the FMU, with whole arrays. Does not call the FMU if the new sizes are
-    /// impossible. The FMU keeps its sizes if a value is refused.
+    /// impossible. The FMU keeps its sizes if a value is refused. States that were saved before are discarded.
     pub(crate) fn configure(
         &mut self,
         description: &ModelDescription,
@@ -168,6 +168,8 @@ impl Instance {
         let exited = if configures { self.component.exit_configuration_mode() } else { Ok(()) };
         set.and(exited)?;
         // The elements have new positions.
+        self.component.free_states();
+        self.slots.clear();
         self.state.held = vec![None; view.shadows];
         self.state.memory.clear();
         self.clocked = ClockedRuns::new(&view);

@@ -59,7 +59,8 @@ pub trait Slave: Send {
     /// Sets structural parameters (FMI 3.0) in configuration mode, before
     /// [`Slave::enter_initialization_mode`]: value references and values; a Boolean is 0 or 1.
     ///
-    /// Arrays change their sizes, so [`Slave::description`] has other variables afterwards.
+    /// Arrays change their sizes, so [`Slave::description`] has other variables afterwards, and states that were saved
+    /// before are discarded.
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         Err(absent("fmi3EnterConfigurationMode"))
     }

@@ -66,7 +66,7 @@ macro_rules! states {
             }
 
             /// Frees all saved states.
-            pub(super) fn free_states(&mut self) {
+            pub(crate) fn free_states(&mut self) {
                 for mut state in std::mem::take(&mut self.base.saved) {
                     self.free_state(&mut state);
                 }

@@ -49,6 +49,20 @@ fn a_structural_parameter_changes_the_size_of_arrays() {
     assert_eq!(names.filter(|name| name.starts_with("b[")).count(), 4);
 }
 
+/// A state has the values of its arrays.
+#[test]
+fn a_state_from_before_a_change_of_sizes_is_discarded() {
+    let mut loaded = Loaded::third("plain");
+    let size = loaded.reference("n");
+    loaded.slave.save_state(0).unwrap();
+    loaded.slave.configure(&[size], &[4]).unwrap();
+    let error = loaded.slave.restore_state(0).unwrap_err().to_string();
+    assert!(error.contains("the slot is empty"), "{error}");
+    loaded.slave.save_state(0).unwrap();
+    loaded.slave.restore_state(0).unwrap();
+    loaded.initialised().set_real("a[4]", 1.5);
+}
+
 #[test]
 fn events_within_a_step_are_handled_and_the_step_is_finished() {
     let mut loaded = Loaded::third("plain");
