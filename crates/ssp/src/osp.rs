@@ -137,7 +137,7 @@ impl Loader {
     /// step that does not exceed the stated step, at least one base step; another step than stated gives a warning.
     fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
         let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
-        let ticks = |time: f64| (time / TICK).round();
+        let ticks = |time: f64| (time / TICK.min(base)).round();
         let multiple = (ticks(stated) / ticks(base)).floor().max(1.0);
         let step = multiple * base;
         if (ticks(step) - ticks(stated)).abs() >= 1.0 {

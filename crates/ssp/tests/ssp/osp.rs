@@ -69,6 +69,16 @@ fn simulators_initial_values_and_times_are_read_and_connections_run_from_outputs
     }
 }
 
+/// libcosim counts nanoseconds, of which this base step is a quarter.
+#[test]
+fn a_step_is_a_multiple_also_of_a_base_step_below_a_nanosecond() {
+    let bench = bench();
+    let text = osp(&PAIR.replace("2.03e-3", "1e-9"), "", "").replace("1e-3", "2.5e-10");
+    let opened = open(&bench.file("System.xml", text)).unwrap();
+    assert_eq!(opened.steps, [("a".to_owned(), 1e-9)]);
+    assert!(!opened.warnings.join("\n").contains("steps every"), "{:?}", opened.warnings);
+}
+
 #[test]
 fn two_initial_values_of_one_variable_are_named_and_the_last_one_counts() {
     let bench = bench();
