@@ -90,10 +90,14 @@ impl Literal {
                 let named = |name: &String| description.types.iter().find(|one| one.name == *name);
                 let items = kind.declared_type.as_ref().and_then(named);
                 let items = items.map_or(&[][..], |one| &one.items[..]);
-                let item =
-                    items.iter().find(|(name, _)| matches!(self, Self::Text(text) if text == name));
-                let number = item.and_then(|(_, number)| i32::try_from(*number).ok());
-                number.map(f64::from).ok_or_else(|| {
+                #[expect(clippy::cast_precision_loss, reason = "a rounded number does not fit")]
+                let items = items.iter().map(|(name, number)| (name, *number as f64));
+                let fits = |item: &(_, f64)| fits_integer(item.1, &variable.kind, description);
+                let items: Vec<(&String, f64)> = items.filter(fits).collect();
+                let item = items
+                    .iter()
+                    .find(|(name, _)| matches!(self, Self::Text(text) if text == *name));
+                item.map(|(_, number)| *number).ok_or_else(|| {
                     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
                     format!("a whole number or one of {}", names.join(", "))
                 })

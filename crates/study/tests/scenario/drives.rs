@@ -225,6 +225,21 @@ fn integers_of_every_width_follow_a_file_within_their_range() {
     }
 }
 
+/// 2^40 is a double, 2^53 + 1 is not.
+#[test]
+fn an_item_of_more_than_32_bits_is_set_by_its_name() {
+    let set = |item: &str| {
+        let entry = format!("variable = \"fmu.size\", at = 0, value = \"{item}\"");
+        scenario(&format!("scenario.set = [{{ {entry} }}]"))
+    };
+    let (mut system, calls) = of_fmi_3();
+    let mut prepared = set("huge").resolve(&system, &setup(here())).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.0).unwrap();
+    assert_eq!(take(&calls), ["integer [6] [1099511627776]"]);
+    let refused = set("beyond").resolve(&system, &setup(here())).unwrap_err().to_string();
+    assert!(refused.ends_with("expected a whole number or one of small, huge"), "{refused}");
+}
+
 #[test]
 fn the_unit_of_a_value_is_converted_to_that_of_a_float32() {
     let (mut system, calls) = of_fmi_3();

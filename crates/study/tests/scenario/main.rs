@@ -132,6 +132,9 @@ fn of_fmi_3() -> (System, Calls) {
     let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="Listener" instantiationToken="t">
         <CoSimulation modelIdentifier="L"/>
         <UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit></UnitDefinitions>
+        <TypeDefinitions><EnumerationType name="Size"><Item name="small" value="1"/>
+        <Item name="huge" value="1099511627776"/><Item name="beyond" value="9007199254740993"/>
+        </EnumerationType></TypeDefinitions>
         <ModelVariables>
         <Float64 name="time" valueReference="0" causality="independent"/>
         <Int8 name="small" valueReference="1" causality="input" start="0"/>
@@ -140,7 +143,9 @@ fn of_fmi_3() -> (System, Calls) {
         <Float32 name="single" valueReference="4" causality="input" unit="m" start="0">
         <Alias name="also single"/></Float32>
         <Float64 name="rise" valueReference="5" causality="input" unit="degC" relativeQuantity="true"
-        start="0"/></ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        start="0"/>
+        <Enumeration name="size" valueReference="6" causality="input" declaredType="Size" start="1"/>
+        </ModelVariables><ModelStructure/></fmiModelDescription>"#;
     let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
     let mut system = System::default();
     system.add("fmu", Box::new(Listener { description, calls: calls.clone() })).unwrap();
