@@ -20,8 +20,8 @@ pub(crate) fn just_before(time: f64) -> f64 {
 pub struct Scenario {
     /// Driven variables.
     pub drives: Drives,
-    /// Faults on connections, each with the input of its connection. A fault acts on the value
-    /// after the transformation of the connection.
+    /// Faults on connections, each with the input of its connection, of which each has one chain. A fault acts on the
+    /// value after the transformation of the connection.
     pub faults: Vec<(Port, FaultChain)>,
 }
 

@@ -19,6 +19,8 @@ mod start;
 mod tasks;
 mod trace;
 
+use std::collections::HashSet;
+
 use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
@@ -93,8 +95,8 @@ impl Exchange {
     ///
     /// # Errors
     ///
-    /// Returns an error, and changes no fault, if an input has no connection, or if it is a String, a binary or a clock
-    /// that ticks in event mode.
+    /// Returns an error, and changes no fault, if an input has no connection, if it is a String, a binary or a clock
+    /// that ticks in event mode, or if two chains are given with it.
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
@@ -104,6 +106,13 @@ impl Exchange {
         if let Some((input, _)) = wrong {
             return Err(contradiction(format!(
                 "{} has a fault, expected a connected input that is no String and no clock",
+                system.name(*input)
+            )));
+        }
+        let mut inputs = HashSet::new();
+        if let Some((input, _)) = faults.iter().find(|(input, _)| !inputs.insert(*input)) {
+            return Err(contradiction(format!(
+                "{} has two chains of faults, expected one with all its faults",
                 system.name(*input)
             )));
         }

@@ -64,8 +64,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if [`Simulation::new`] does, or if a fault has no connection or is on a String, a
-    /// binary or a clock.
+    /// Returns an error if [`Simulation::new`] does, if a fault has no connection or is on a String, a binary or a
+    /// clock, or if an input has two chains of faults.
     pub fn with_scenario(
         system: System,
         algorithm: &Algorithm,

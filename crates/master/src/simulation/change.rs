@@ -31,7 +31,8 @@ impl Simulation {
     /// # Errors
     ///
     /// Returns an error, and keeps the scenario, if a driven variable or a fault is missing, if a fault
-    /// has changed, or if a fault has no connection or is on a String, a binary or a clock.
+    /// has changed, if a fault has no connection or is on a String, a binary or a clock, or if an input has two chains
+    /// of faults.
     pub fn change_scenario(&mut self, mut scenario: Scenario) -> Result<(), SystemError> {
         let engine = &mut self.engine;
         scenario.limit_faults(&engine.system);

@@ -87,6 +87,19 @@ fn a_structural_parameter_that_is_a_real_is_refused_and_not_set_to_zero() {
     assert_eq!(message, expected);
 }
 
+#[test]
+fn two_chains_of_faults_of_one_input_are_refused() {
+    let system = ring();
+    let input = system.port("b.in1").unwrap();
+    let fault = (Window { from: 0.0, until: None }, Fault::Stuck(Some(5.0)));
+    let chain = FaultChain::new(vec![fault], 1.0).unwrap();
+    let faults = vec![(input, chain.clone()), (input, chain)];
+    let scenario = Scenario { faults, ..Scenario::default() };
+    let run = Simulation::with_scenario(system, &Algorithm::new(1.0), &until(1.0), scenario);
+    let message = run.err().unwrap().to_string();
+    assert_eq!(message, "b.in1 has two chains of faults, expected one with all its faults");
+}
+
 /// The value at which it sticks, and 1 for the step.
 #[test]
 fn a_fault_of_an_integer_of_64_bits_has_values_beyond_32_bits() {
