@@ -212,7 +212,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Makes one communication step.
+    /// Makes one communication step. Does nothing if the run is finished.
     ///
     /// With fixed steps and without repetition this is one sweep over the slaves. Otherwise the
     /// step ends where the step control or an event requires it. At the end, faults and driven
@@ -224,6 +224,9 @@ impl Simulation {
     /// finite, if the iteration or the step control fails, or if events do not settle. Some slaves may
     /// then be at the start of the step and others at its end.
     pub fn step(&mut self) -> Result<(), SystemError> {
+        if self.is_finished() {
+            return Ok(());
+        }
         let Self { engine, coupler, control, events, .. } = self;
         let start = engine.grid.time;
         let planned = control.plan(engine);

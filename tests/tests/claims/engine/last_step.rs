@@ -58,6 +58,21 @@ fn no_step_ends_an_ulp_beyond_the_stop_time_with_any_algorithm() {
 }
 
 #[test]
+fn no_fmu_is_asked_for_a_step_after_the_end() {
+    let new = || system([f64::sin, every], whole);
+    for (name, algorithm) in algorithms(0.1, &new().0) {
+        let (system, asked) = new();
+        let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+        let count = asked.lock().unwrap().len();
+        simulation.step().unwrap();
+        assert_eq!((simulation.time(), asked.lock().unwrap().len()), (1.0, count), "{name}");
+    }
+}
+
+#[test]
 fn no_step_of_a_resumed_run_ends_an_ulp_beyond_the_stop_time() {
     for (step, stop) in BEYOND {
         let new = || system([f64::sin, every], whole);
