@@ -188,7 +188,9 @@ impl System {
             let count = elements.len();
             return Err(wrong(format!("{count} values or one for all, found {}", values.len())));
         }
-        for (position, (_, port)) in elements.into_iter().enumerate() {
+        for (position, (indices, _)) in elements.into_iter().enumerate() {
+            // A structural parameter moves the ports of further elements.
+            let port = self.port(&format!("{name}{indices}"))?;
             self.set_port(port, values[position % values.len()])?;
         }
         Ok(())

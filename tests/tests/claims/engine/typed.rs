@@ -100,6 +100,62 @@ fn two_chains_of_faults_of_one_input_are_refused() {
     assert_eq!(message, "b.in1 has two chains of faults, expected one with all its faults");
 }
 
+/// The elements of an array of structural parameters are the sizes of `a` and `b`; `a` is declared before them.
+struct Sizes {
+    description: ModelDescription,
+    sizes: [i64; 2],
+}
+
+impl Sizes {
+    fn new(sizes: [i64; 2]) -> Self {
+        let inputs = |name: &str, first: i64, size: i64| -> String {
+            let input = |k: i64| {
+                let reference = first + k;
+                format!(
+                    r#"<Float64 name="{name}[{k}]" valueReference="{reference}" causality="input" start="0"/>"#
+                )
+            };
+            (1..=size).map(input).collect()
+        };
+        let size = |k: i64| {
+            format!(
+                r#"<UInt64 name="n[{k}]" valueReference="{k}" causality="structuralParameter" start="1"/>"#
+            )
+        };
+        let variables = [inputs("a", 10, sizes[0]), size(1), size(2), inputs("b", 20, sizes[1])];
+        Self { description: of_fmi_3(&variables.concat()).description, sizes }
+    }
+}
+
+impl Slave for Sizes {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Done {
+        self.sizes[references[0] as usize - 1] = values[0];
+        *self = Self::new(self.sizes);
+        Ok(())
+    }
+    fn get_real(&mut self, _: &[u32], _: &mut [f64]) -> Done {
+        Ok(())
+    }
+    fn set_real(&mut self, _: &[u32], _: &[f64]) -> Done {
+        Ok(())
+    }
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+        Ok(StepResult::Whole)
+    }
+}
+
+#[test]
+fn an_array_of_structural_parameters_is_set_whole_although_its_elements_move() {
+    let mut system = System::default();
+    system.add("s", Box::new(Sizes::new([1, 1]))).unwrap();
+    system.set("s.n", "4 3").unwrap();
+    let exists = |name: &str| system.port(name).is_ok();
+    assert_eq!(["s.a[4]", "s.a[5]", "s.b[3]", "s.b[4]"].map(exists), [true, false, true, false]);
+}
+
 /// The value at which it sticks, and 1 for the step.
 #[test]
 fn a_fault_of_an_integer_of_64_bits_has_values_beyond_32_bits() {
