@@ -24,11 +24,12 @@ const EVALUATIONS: u32 = 100;
 
 /// Initialises all slaves: settings, initialization mode, values of connections, end of
 /// initialization mode. Settings follow `fmi2SetupExperiment`, because some FMUs reset them in this
-/// call.
+/// call. With `allow_nan` a loop may have values that are not finite.
 pub(crate) fn initialise(
     system: &mut System,
     experiment: &Experiment,
     scenario: &mut Scenario,
+    allow_nan: bool,
 ) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
@@ -41,7 +42,7 @@ pub(crate) fn initialise(
     }
     system.repeat_settings(start)?;
     scenario.drives.write(system, start)?;
-    solve_connections(system, scenario, start)?;
+    solve_connections(system, scenario, start, allow_nan)?;
     for (name, slave) in &mut system.slaves {
         slave.exit_initialization_mode().map_err(|source| call(name, start, source))?;
     }
@@ -67,8 +68,9 @@ fn solve_connections(
     system: &mut System,
     scenario: &Scenario,
     start: f64,
+    allow_nan: bool,
 ) -> Result<(), SystemError> {
-    let mut graph = Graph::new(system, &scenario.faults);
+    let mut graph = Graph { allow_nan, ..Graph::new(system, &scenario.faults) };
     for component in 0..graph.components.len() {
         let nodes = graph.components.nodes(component).to_vec();
         if graph.components.is_loop(component) {
@@ -98,6 +100,8 @@ struct Graph<'a> {
     /// `System::initial`.
     connections: Vec<Vec<usize>>,
     components: Components,
+    /// Whether the values of a loop need not be finite.
+    allow_nan: bool,
 }
 
 impl<'a> Graph<'a> {
@@ -136,7 +140,7 @@ impl<'a> Graph<'a> {
         }
         let components = components(outputs.len(), &edges);
         let faults = faults.iter().map(|(input, fault)| (*input, fault)).collect();
-        Self { faults, outputs, connections, components }
+        Self { faults, outputs, connections, components, allow_nan: false }
     }
 
     fn read(&self, system: &mut System, node: usize, time: f64) -> Result<Value, SystemError> {
@@ -264,6 +268,9 @@ impl<'a> Graph<'a> {
                     "it has no solution or many: its matrix is singular (condition {condition:.1e})"
                 ),
             };
+            if self.allow_nan && g.iter().any(|value| !value.is_finite()) {
+                return self.evaluate(system, nodes, &g, time).map(|_| ());
+            }
             return Err(self.unsolved(system, nodes, time, why));
         }
     }

@@ -93,7 +93,7 @@ impl Simulation {
         system.discrete = algorithm.discrete.iter().copied().collect();
         system.hand_over_events(algorithm.repeats(), experiment.start_time)?;
         scenario.limit_faults(&system);
-        initialise(&mut system, experiment, &mut scenario)?;
+        initialise(&mut system, experiment, &mut scenario, algorithm.allow_nan)?;
         let (instants, ending) = first_instant(&mut system, &mut scenario, algorithm, experiment)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
         if !algorithm.repeats() {

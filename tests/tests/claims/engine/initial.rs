@@ -61,3 +61,18 @@ fn a_singular_loop_is_refused_with_the_names_of_its_outputs() {
                     is singular (condition ";
     assert!(message.starts_with(expected), "{message}");
 }
+
+/// `y_a = NaN - 2 y_b`: both outputs are NaN.
+#[test]
+fn a_loop_of_values_that_are_nan_is_refused_unless_that_is_allowed() {
+    let mut network = problems::algebraic_loop(-2.0, 1.5);
+    network.blocks[0].start.fill(f64::NAN);
+    let system = network.system(ABLE, &Arc::default());
+    let error = Simulation::new(system, &Algorithm::new(0.1), &until(1.0)).err().unwrap();
+    assert!(error.to_string().starts_with("the loop through a.y0, b.y0 at t = 0 s: "), "{error}");
+    let system = network.system(ABLE, &Arc::default());
+    let algorithm = Algorithm { allow_nan: true, ..Algorithm::new(0.1) };
+    let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+    let outputs = network.outputs(simulation.system());
+    assert!(outputs.iter().all(|output| output.is_nan()), "{outputs:?}");
+}
