@@ -59,11 +59,20 @@ def test_the_module_has_the_design_of_the_example(designed):
     assert ours == expected
 
 
-@pytest.mark.parametrize("link", ["", "#compensate=false&leak=3.5&blocked=30&blocked_from=410&offset=-12&noise=1.5", "#leak=20&noise=0"])
+LINKS = [
+    "",
+    "#compensate=false&leak=3.5&blocked=30&blocked_from=410&offset=-12&noise=1.5",
+    "#leak=20&noise=0",
+    "#leak=1e-7&noise=2e-8",
+]
+
+
+@pytest.mark.parametrize("link", LINKS)
 def test_1000_s_of_the_page_are_those_of_the_command_bit_for_bit(aso_ftc, open_page, designed, tmp_path, link):
     page = open_page(link)
     run = run_of(page)
     text = page.evaluate("document.getElementById('native').textContent")
+    assert ('f_1" = -1e-13\n' in text) == ("leak=1e-7" in link), text
     text = text.replace('"dist/', f'"{ROOT}/dist/').replace('"results/', f'"{designed}/')
     file, results = tmp_path / "tanks.toml", tmp_path / "results.csv"
     file.write_text(text, encoding="utf-8")

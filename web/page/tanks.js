@@ -14,13 +14,13 @@
     "controller.f_hat[3]", "controller.fault_detected", "controller.fault_isolated", "controller.t_detected", "controller.t_onset",
   ];
   const SET_POINTS = [0.4, 0.2, 0.3]; // m
-  // `scale`: from the unit of the page to that of the FMU, as a power of ten. `sign`: of the value in the FMU.
+  // `scale`: from the unit of the page to that of the FMU, as the exponent of ten. `sign`: of the value in the FMU.
   const FIELDS = [
-    { id: "leak", label: "Leak in the line of pump 1", unit: "mL/s", value: 8, most: 20, step: 0.5, variable: "f_1", sign: "-", scale: "e-6" },
+    { id: "leak", label: "Leak in the line of pump 1", unit: "mL/s", value: 8, most: 20, step: 0.5, variable: "f_1", sign: "-", scale: -6 },
     { id: "leak_from", label: "The leak starts at", unit: "s", value: 200, most: STOP, step: 10, variable: "t_fault_1" },
-    { id: "blocked", label: "Blocked part of pump 2", unit: "%", value: 0, most: 60, step: 1, variable: "E_2", scale: "e-2" },
+    { id: "blocked", label: "Blocked part of pump 2", unit: "%", value: 0, most: 60, step: 1, variable: "E_2", scale: -2 },
     { id: "blocked_from", label: "The blockage starts at", unit: "s", value: 200, most: STOP, step: 10, variable: "t_fault_2" },
-    { id: "offset", label: "Sensor 1 reads too much by", unit: "mm", value: 0, least: -40, most: 40, step: 1, variable: "b_1", scale: "e-3" },
+    { id: "offset", label: "Sensor 1 reads too much by", unit: "mm", value: 0, least: -40, most: 40, step: 1, variable: "b_1", scale: -3 },
     { id: "offset_from", label: "The offset starts at", unit: "s", value: 200, most: STOP, step: 10, variable: "t_bias" },
     { id: "noise", label: "Noise of each sensor, standard deviation", unit: "mm", value: 2, most: 4, step: 0.5 },
   ];
@@ -45,8 +45,15 @@
 
   // --- The run ---
 
-  function stated(field) {
-    return values[field.id] === 0 ? "0" : `${field.sign ?? ""}${values[field.id]}${field.scale ?? ""}`;
+  // The text of a number times a power of ten; small numbers have an exponent themselves.
+  function scaled(number, power = 0) {
+    const [digits, exponent = "0"] = `${number}`.split("e");
+    const sum = Number(exponent) + power;
+    return sum === 0 ? digits : `${digits}e${sum}`;
+  }
+
+  function stated({ id: name, sign = "", scale }) {
+    return values[name] === 0 ? "0" : `${sign}${scaled(values[name], scale)}`;
   }
 
   // The variables of both FMUs that are set, and their values.
@@ -57,7 +64,7 @@
   const noisy = () => (values.noise > 0 ? [1, 2, 3].map((k) => `controller.y_${k}`) : []);
 
   function run(compensate) {
-    writeText([...settings(compensate).map(([name, value]) => `${name}=${value}`), ...noisy().map((input) => `noise ${input}=${values.noise}e-3`)].join("\n"), wasm);
+    writeText([...settings(compensate).map(([name, value]) => `${name}=${value}`), ...noisy().map((input) => `noise ${input}=${scaled(values.noise, -3)}`)].join("\n"), wasm);
     if (wasm.start(STEP, STOP) !== 0) throw new Error(readText(wasm));
     const first = rowsOf(wasm);
     if (wasm.advance(STOP / STEP, 1) !== 0) throw new Error(readText(wasm));
@@ -70,7 +77,7 @@
       '[fmus]\nplant = "dist/ThreeTank.fmu"\ncontroller = "results/TankDetection.fmu"\n',
       `[settings]\n${settings(values.compensate).map(([name, value]) => `"${name}" = ${value}`).join("\n")}\n`,
       `[algorithm]\nstep = ${STEP}\n\n[experiment]\nstop-time = ${STOP}\n`,
-      ...noisy().map((input) => `[[scenario.fault]]\nconnection = "${input}"\nnoise = { deviation = ${values.noise}e-3, from = 0 }\n`),
+      ...noisy().map((input) => `[[scenario.fault]]\nconnection = "${input}"\nnoise = { deviation = ${scaled(values.noise, -3)}, from = 0 }\n`),
     ].join("\n");
   }
 
