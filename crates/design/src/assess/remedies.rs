@@ -253,6 +253,11 @@ impl Reason {
             }
         };
         let chosen = green.or_else(|| harmless().find(reached));
+        let untried = if limits.parameters.is_empty() {
+            ""
+        } else {
+            "; parameters of the FMU within their tolerances were not tried"
+        };
         let (trial, change) = match (chosen, least) {
             (Some(trial), _) => {
                 let peaks = trial.peaks();
@@ -261,14 +266,14 @@ impl Reason {
                 } else {
                     ""
                 };
-                (trial, format!("with {}, the peak of S is {peaks}{stable}", trial.words))
+                (trial, format!("with {}, the peak of S is {peaks}{stable}{untried}", trial.words))
             }
             (None, _) if !is_complete => return None,
             (None, Some(trial)) => {
                 let peaks = trial.peaks();
                 let change = format!(
                     "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, meets the limit; \
-                     with {}, the peak of S is {peaks}",
+                     with {}, the peak of S is {peaks}{untried}",
                     trials.len(),
                     trial.words
                 );
@@ -295,21 +300,45 @@ impl Reason {
 
 #[cfg(test)]
 mod tests {
+    use plant_file::parameters::{ParameterTolerance, Tolerance};
+
     use super::*;
 
-    #[test]
-    fn without_any_trial_a_remedy_says_that_none_is_stable_if_all_were_tried() {
-        let limits = RobustnessLimits {
+    fn limits(parameters: Vec<ParameterTolerance>) -> RobustnessLimits {
+        RobustnessLimits {
             tolerance: [0.1; 4],
             entries: Vec::new(),
-            parameters: Vec::new(),
+            parameters,
             cases: 0,
             seed: 1,
             noise: Vec::new(),
             noise_is_stated: false,
             amber: 2.0,
             red: 4.0,
-        };
+        }
+    }
+
+    #[test]
+    fn a_remedy_says_that_parameters_of_the_fmu_were_not_tried() {
+        let (name, tolerance) = ("mass".to_owned(), Tolerance::Relative(0.1));
+        let mass = ParameterTolerance { name, tolerance, place: 0..0 };
+        for (parameters, is_said) in [(Vec::new(), false), (vec![mass], true)] {
+            let trial = Trial {
+                lines: Vec::new(),
+                words: "another observer".to_owned(),
+                judged: Judged { points: Vec::new(), is_unstable: false },
+                distance: 1.0,
+            };
+            let reason = Reason { text: "unstable".to_owned(), aim: Aim::Stable };
+            let present = Present { peaks: Vec::new(), is_unstable: true };
+            let remedy = reason.remedy(&[trial], true, &present, &limits(parameters)).unwrap();
+            assert_eq!(remedy.change.contains("were not tried"), is_said, "{}", remedy.change);
+        }
+    }
+
+    #[test]
+    fn without_any_trial_a_remedy_says_that_none_is_stable_if_all_were_tried() {
+        let limits = limits(Vec::new());
         let change = |is_complete| {
             let reason = Reason { text: "unstable".to_owned(), aim: Aim::Stable };
             let present = Present { peaks: Vec::new(), is_unstable: true };
