@@ -53,8 +53,8 @@ pub(super) struct Live {
     /// The file that repeats the run, in the folder of the results. It has another name for a resumed run, so that it
     /// does not replace the file of the run before the checkpoint.
     file: PathBuf,
-    /// Whether this run has written the file.
-    is_written: bool,
+    /// What is logged at the first write, if there is a file of an earlier run.
+    replacement: Option<String>,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,
 }
@@ -87,6 +87,8 @@ impl Live {
             None => folder.join(file),
         };
         let shown = relative(&file, folder);
+        let replacement =
+            file.exists().then(|| format!("{shown}: replaces the changes of an earlier run"));
         let repeat = run_command("", &shown);
         let settable = settable(run.simulation.system());
         let unrecorded = settable.iter().filter(|port| !ports.contains(port));
@@ -122,7 +124,7 @@ impl Live {
             paused: Duration::ZERO,
             remarks: vec![first],
             file,
-            is_written: false,
+            replacement,
             stopped: false,
         })
     }
@@ -220,12 +222,8 @@ impl Live {
     /// Writes the file that repeats the run, and logs that it replaces one of an earlier run; an error is also logged.
     fn write(&mut self, run: &Run) -> Result<(), String> {
         let text = self.repetition(run).map_err(|error| error.sentence())?;
-        if !std::mem::replace(&mut self.is_written, true) && self.file.exists() {
-            let file = self.file.display();
-            tracing::info!(
-                target: logging::RESULTS_FILE,
-                "{file}: replaces the changes of an earlier run"
-            );
+        if let Some(replacement) = self.replacement.take() {
+            tracing::info!(target: logging::RESULTS_FILE, "{replacement}");
         }
         files::whole::write(&self.file, text.as_bytes()).map_err(|error| {
             let message = format!("done, but {} cannot be written: {error}", self.file.display());

@@ -113,7 +113,9 @@ impl Table {
         columns.extend(positions);
         let (path, all) = (&self.path, &self.columns);
         let mut counts = HashMap::new();
-        all.iter().for_each(|column| *counts.entry(column.name.as_str()).or_insert(0) += 1);
+        for column in all {
+            *counts.entry(column.name.as_str()).or_insert(0) += 1;
+        }
         let names = columns.iter().map(|position| all[*position].name.as_str());
         if let Some(name) = names.filter(|name| !name.is_empty()).find(|name| counts[name] > 1) {
             let reason = format!("two columns have the name {name:?}, expected different names");
