@@ -8,7 +8,8 @@
  * indicator.
  *
  * The instantiation token selects a misbehaviour: "lie" returns early with a time before the step,
- * "stay" returns early for ever, "discard" discards steps above 0.03 s, "huge" gives `big` a value
+ * "stay" returns early for ever, "late" returns early from each step, a unit in the last place after its
+ * end, "discard" discards steps above 0.03 s, "huge" gives `big` a value
  * beyond 63 bits, "no event mode" does not instantiate with eventModeUsed, "terminate" ends at 0.5 s. With
  * "intermediate" it asks for u in the middle and at the end of a step, and y follows by Simpson's rule.
  *
@@ -280,6 +281,10 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool neve
     }
     if (slave->event_mode && now->next_event <= end + 1e-9) {
         demand(now->next_event > end - 1e-9, "the step crosses the announced event");
+    }
+    if (strcmp(slave->token, "late") == 0) {
+        *early = true;
+        end = nextafter(end, INFINITY);
     }
     now->y += (end - now->time) * mean(slave, time, end);
     now->time = *reached = end;

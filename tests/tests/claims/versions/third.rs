@@ -205,6 +205,20 @@ fn impossible_answers_to_a_step_are_errors_that_say_what_was_expected() {
     assert!(error.to_string().contains("returned early 1000 times at t = 0 s"), "{error}");
 }
 
+/// A unit in the last place of 1000 s is 1.1e-13 s, and the step is 1e-6 s.
+#[test]
+fn an_early_return_that_rounding_makes_late_is_at_the_end_of_the_step() {
+    let mut loaded = Loaded::third("late");
+    let experiment = Experiment { start_time: 1e3, ..Experiment::default() };
+    loaded.slave.setup_experiment(&experiment).unwrap();
+    loaded.slave.enter_initialization_mode().unwrap();
+    loaded.slave.exit_initialization_mode().unwrap();
+    assert_eq!(loaded.step(1e3, 1e-6), Ok(StepResult::Whole));
+    assert_eq!(loaded.step(1e3 + 1e-6, 1e-6), Ok(StepResult::Whole));
+    // der(y) = 1.
+    assert!((loaded.real("y") - 2e-6).abs() < 1e-12);
+}
+
 #[test]
 fn an_fmu_that_lacks_the_event_mode_it_promises_runs_without() {
     let mut loaded = ready("no event mode");
