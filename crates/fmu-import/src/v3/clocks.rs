@@ -119,6 +119,23 @@ impl TimedClock {
         matches!(self.attributes.interval_variability, Constant | Fixed | Tunable)
     }
 
+    /// Returns the interval in s that the description states, if it does.
+    fn stated_interval(&self) -> Option<f64> {
+        let attributes = &self.attributes;
+        seconds(attributes.interval_decimal, attributes.interval_counter, attributes.resolution)
+    }
+
+    /// Returns whether the FMU is asked for the interval in an event, in which the clock `has_ticked` or not. The
+    /// importer alone changes a stated interval.
+    fn is_asked(&self, has_ticked: bool) -> bool {
+        match self.attributes.interval_variability {
+            IntervalVariability::Countdown => true,
+            IntervalVariability::Changing => has_ticked,
+            IntervalVariability::Tunable => has_ticked && self.stated_interval().is_none(),
+            _ => false,
+        }
+    }
+
     fn is_due(&self, time: f64) -> bool {
         self.next.is_some_and(|next| next <= time + ROUNDING * self.interval.max(time.abs()))
     }
@@ -153,12 +170,7 @@ impl Clocks {
     /// does not state. An interval that is not positive or a negative shift of a periodic clock is an error.
     pub(super) fn start(&mut self, component: &mut Component, start: f64) -> Result<(), CallError> {
         for clock in &mut self.timed {
-            let attributes = &clock.attributes;
-            let stated = seconds(
-                attributes.interval_decimal,
-                attributes.interval_counter,
-                attributes.resolution,
-            );
+            let (attributes, stated) = (&clock.attributes, clock.stated_interval());
             let shift =
                 seconds(attributes.shift_decimal, attributes.shift_counter, attributes.resolution);
             if !clock.is_periodic() {
@@ -285,14 +297,7 @@ impl Clocks {
         time: f64,
     ) -> Result<(), CallError> {
         for clock in &mut self.timed {
-            let ask = match clock.attributes.interval_variability {
-                IntervalVariability::Countdown => true,
-                IntervalVariability::Changing | IntervalVariability::Tunable => {
-                    self.event_ticks.contains(&clock.reference)
-                }
-                _ => false,
-            };
-            if ask {
+            if clock.is_asked(self.event_ticks.contains(&clock.reference)) {
                 let (interval, qualifier) = component.get_interval(clock.reference)?;
                 if qualifier != CHANGED {
                     continue;
@@ -457,5 +462,23 @@ mod tests {
         assert_eq!(fraction(2.5), Some((25, 10)));
         assert_eq!(fraction(1e-30), None);
         assert_eq!(clock(1e-30, None).tick(4).to_bits(), 4e-30_f64.to_bits());
+    }
+
+    /// The table of clock types in section 2.2.8.2 of FMI 3.0.2.
+    #[test]
+    fn the_fmu_is_asked_in_events_for_intervals_that_it_may_change() {
+        use IntervalVariability::{Changing, Constant, Countdown, Fixed, Tunable};
+        let is_asked = |interval_variability, interval_decimal| {
+            let attributes =
+                ClockType { interval_variability, interval_decimal, ..ClockType::default() };
+            let clock = TimedClock { attributes, ..TimedClock::default() };
+            [false, true].map(|has_ticked| clock.is_asked(has_ticked))
+        };
+        assert_eq!(is_asked(Countdown, None), [true, true]);
+        assert_eq!(is_asked(Changing, None), [false, true]);
+        assert_eq!(is_asked(Tunable, None), [false, true]);
+        assert_eq!(is_asked(Tunable, Some(0.1)), [false, false]);
+        assert_eq!(is_asked(Fixed, None), [false, false]);
+        assert_eq!(is_asked(Constant, Some(0.1)), [false, false]);
     }
 }
