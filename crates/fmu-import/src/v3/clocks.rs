@@ -14,8 +14,10 @@ use super::refusal::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// A difference of times below this fraction of the interval, or of the time, is rounding.
+/// A difference of times below this fraction of the interval, or of the time, is rounding, up to [`MOST`].
 const ROUNDING: f64 = 1e-9;
+/// Largest difference in s that is rounding, unless the times have larger units in the last place.
+const MOST: f64 = 1e-6;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
@@ -137,7 +139,9 @@ impl TimedClock {
     }
 
     fn is_due(&self, time: f64) -> bool {
-        self.next.is_some_and(|next| next <= time + ROUNDING * self.interval.max(time.abs()))
+        let rounding = (ROUNDING * self.interval.max(time.abs())).min(MOST);
+        let rounding = rounding.max(4.0 * f64::EPSILON * time.abs());
+        self.next.is_some_and(|next| next <= time + rounding)
     }
 }
 
@@ -462,6 +466,15 @@ mod tests {
         assert_eq!(fraction(2.5), Some((25, 10)));
         assert_eq!(fraction(1e-30), None);
         assert_eq!(clock(1e-30, None).tick(4).to_bits(), 4e-30_f64.to_bits());
+    }
+
+    /// One unit in the last place of these times is 2.4e-7 s.
+    #[test]
+    fn in_seconds_since_1970_a_clock_is_due_at_its_tick_only() {
+        let tick = 1.7e9 + 0.1;
+        let clock = TimedClock { next: Some(tick), ..clock(0.1, Some((1, 10))) };
+        assert!(clock.is_due(tick) && clock.is_due(tick - 2.4e-7));
+        assert!(!clock.is_due(tick - 1e-4) && !clock.is_due(1.7e9));
     }
 
     /// The table of clock types in section 2.2.8.2 of FMI 3.0.2.
