@@ -161,3 +161,11 @@ def test_a_clock_of_each_type_ticks_when_the_model_says(aso_ftc, root, tmp_path)
     assert ticks("b.n_fixed") == pytest.approx([0.15 * k for k in range(7)])
     assert ticks("b.n_triggered") == pytest.approx([0.32, 0.695])
     assert [row["b.n_triggered"] for row in rows if row["b.n_triggered"]] == ["1", "2"]
+    # FMI 3.0.2, section 2.2.8.2: an interval may be 0. The countdown then ends at the instant at which it starts.
+    command = ["run", system, "--stop-time", "1", "--step", "0.1", "--set", "a.period=0.125", "--set", "a.delay=0"]
+    done = aso_ftc(*command, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert ticks("a.n_countdown") == pytest.approx([0.25, 0.625, 1.0])
+    assert ticks("b.n_triggered") == pytest.approx([0.25, 0.625, 1.0])

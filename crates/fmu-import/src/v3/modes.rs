@@ -220,7 +220,8 @@ impl Events for Instance {
         self.tick()
     }
 
-    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it.
+    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it. Clocks to which
+    /// the event gives an interval of 0 s then tick for the next update.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         self.tick()?;
         if self.is_scheduled() {
@@ -230,8 +231,10 @@ impl Events for Instance {
         self.read_clocked()?;
         let mut info = self.component.update_discrete_states()?;
         self.state.clocks.end_ticks();
-        if !info.discrete_states_need_update {
+        if !info.discrete_states_need_update && !info.terminate_simulation {
             self.state.clocks.ask_intervals(&mut self.component, self.state.time)?;
+            self.tick()?;
+            info.discrete_states_need_update = self.state.clocks.any_active();
         }
         self.state.terminate |= info.terminate_simulation;
         self.state.next_event = info.next_event_time;
