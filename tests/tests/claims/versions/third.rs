@@ -205,6 +205,11 @@ fn impossible_answers_to_a_step_are_errors_that_say_what_was_expected() {
     assert!(error.to_string().contains("returned early 1000 times at t = 0 s"), "{error}");
 }
 
+#[test]
+fn logging_is_switched_on_for_all_categories_without_a_list() {
+    assert_eq!(ready("plain").slave.set_debug_logging(true), Ok(()));
+}
+
 /// A unit in the last place of 1000 s is 1.1e-13 s, and the step is 1e-6 s.
 #[test]
 fn an_early_return_that_rounding_makes_late_is_at_the_end_of_the_step() {

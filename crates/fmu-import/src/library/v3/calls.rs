@@ -21,7 +21,7 @@ modes! {
 }
 
 impl Component {
-    /// Calls `fmi3SetDebugLogging` for these categories; none means all.
+    /// Calls `fmi3SetDebugLogging` for these categories; none means all, and a null list (FMI 3.0.2, section 2.3.1).
     pub(crate) fn set_debug_logging(
         &mut self,
         on: bool,
@@ -32,8 +32,9 @@ impl Component {
         self.base.log_call(NAME, || format!("{on}, {categories:?}"));
         let texts: Vec<_> = categories.iter().map(|category| c_string(category)).collect();
         let pointers: Vec<_> = texts.iter().map(|text| text.as_ptr()).collect();
+        let list = if pointers.is_empty() { std::ptr::null() } else { pointers.as_ptr() };
         // SAFETY: the instance is alive; terminated strings, as many as stated.
-        let status = unsafe { function(self.base.pointer, on, pointers.len(), pointers.as_ptr()) };
+        let status = unsafe { function(self.base.pointer, on, pointers.len(), list) };
         self.base.check(NAME, status)
     }
 
