@@ -193,6 +193,18 @@ fn a_step_that_stays_pending_is_cancelled_or_abandoned_after_the_time_limit() {
     }
 }
 
+/// Section 4.2.4: the FMU ends the process if an instance is freed while its step is pending.
+#[test]
+fn a_pending_step_about_which_the_fmu_does_not_answer_is_cancelled() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = CFmu::that("pend").without(&["fmi2GetStatus"]);
+    let opened = Fmu::open(&fmu.write(folder.path(), "slave")).unwrap();
+    let mut slave = opened.instantiate("slave").unwrap();
+    initialise(&mut slave).unwrap();
+    let error = slave.do_step(0.0, 0.5, true).unwrap_err();
+    assert_eq!((error.function, error.failure), ("fmi2GetStatus", Failure::Missing));
+}
+
 /// Section 2.1.3: the FMU ends the process if a function of any instance is called afterwards.
 #[test]
 fn after_a_fatal_error_no_instance_is_freed() {

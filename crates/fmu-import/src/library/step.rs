@@ -148,7 +148,7 @@ macro_rules! finish_step {
     ) => {
         impl Component {
             /// Evaluates a step whose status is not OK: waits while it is pending, up to the time limit, and asks for
-            /// the time reached if it was discarded.
+            /// the time reached if it was discarded. Cancels a step about which the FMU does not answer.
             #[cold]
             fn finish_step(
                 &mut self,
@@ -165,7 +165,12 @@ macro_rules! finish_step {
                     }
                     std::thread::sleep(pause);
                     pause = (2 * pause).min(PAUSE);
-                    status = self.status()?;
+                    let answer = self.status();
+                    let fatal = Failure::Status(Status::Fatal);
+                    if answer.as_ref().is_err_and(|error| error.failure != fatal) {
+                        self.cancel();
+                    }
+                    status = answer?;
                 }
                 if status != Status::Discard as c_int {
                     return self.base.check($do_step, status).map(|()| StepResult::Whole);
