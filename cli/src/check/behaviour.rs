@@ -228,7 +228,7 @@ impl<S: Slave> Trial<'_, S> {
         if name == "first" {
             self.check_start_values(&mut slave)?;
         }
-        let trajectory = self.steps(&mut slave, 0, self.count);
+        let trajectory = self.steps(&mut slave, 0, self.count, true);
         self.check_process(&mut slave, "in its steps");
         let trajectory = trajectory?;
         if name == "first" {
@@ -273,12 +273,19 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Returns the outputs now and after each of `count` steps from communication point `from`. A partial step ends the
-    /// steps with a note; after a failure, returns `None`.
-    fn steps(&mut self, slave: &mut S, from: u32, count: u32) -> Option<Trajectory> {
+    /// Returns the outputs now and after each of `count` steps from communication point `from`; `never_back` is whether
+    /// no earlier state is restored afterwards. A partial step ends the steps with a note; after a failure, returns
+    /// `None`.
+    fn steps(
+        &mut self,
+        slave: &mut S,
+        from: u32,
+        count: u32,
+        never_back: bool,
+    ) -> Option<Trajectory> {
         let mut trajectory = vec![self.read_outputs(slave)?];
         for k in from..from + count {
-            match slave.do_step(self.time(k), self.step_size(), true) {
+            match slave.do_step(self.time(k), self.step_size(), never_back) {
                 Ok(StepResult::Whole | StepResult::Event { .. }) => {
                     trajectory.push(self.read_outputs(slave)?);
                 }
@@ -419,7 +426,7 @@ impl<S: Slave> Trial<'_, S> {
         }
         let serialize = flags.can_serialize_fmu_state;
         let Some(mut slave) = self.initialize("states", None, None) else { return };
-        let before = self.steps(&mut slave, 0, STEPS);
+        let before = self.steps(&mut slave, 0, STEPS, false);
         if before.is_none_or(|trajectory| trajectory.len() <= STEPS as usize) {
             return;
         }
@@ -432,7 +439,7 @@ impl<S: Slave> Trial<'_, S> {
                 return self.report(&error, "though canSerializeFMUstate is true", "2.1.8");
             }
         };
-        let Some(first) = self.steps(&mut slave, STEPS, STEPS) else { return };
+        let Some(first) = self.steps(&mut slave, STEPS, STEPS, false) else { return };
         if let Err(error) = slave.restore_state(0) {
             return self.report(&error, "for a state of the same instance", "2.1.8");
         }
@@ -448,7 +455,7 @@ impl<S: Slave> Trial<'_, S> {
     /// Repeats the steps after the saved state and compares the outputs with the `first` ones; returns false if a step
     /// failed.
     fn repeat_steps(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
-        let second = self.steps(slave, STEPS, STEPS);
+        let second = self.steps(slave, STEPS, STEPS, false);
         let gap = second.as_ref().map_or(0.0, |second| distance(first, second));
         if gap > 0.0 {
             let what = format!(

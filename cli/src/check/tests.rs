@@ -32,6 +32,8 @@ enum Fault {
     LostState,
     RoundedState,
     NoState,
+    /// No fault: it discards saved states when a step says that none is restored (`noSetFMUStatePriorToCurrentPoint`).
+    DiscardsStates,
     ReadAfterTheEnd,
     Step,
 }
@@ -89,7 +91,10 @@ impl Slave for Sum {
         Ok(())
     }
 
-    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
+        if self.fault == Fault::DiscardsStates && never_back {
+            self.saved = f64::NAN;
+        }
         if self.fault == Fault::Step && time > 0.5 {
             return Err(refused("fmi2DoStep", "tired"));
         }
@@ -164,6 +169,11 @@ fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
 #[test]
 fn a_correct_slave_has_no_findings() {
     assert_eq!(findings(Fault::Nothing), []);
+}
+
+#[test]
+fn states_are_tried_in_steps_before_which_they_may_be_restored() {
+    assert_eq!(findings(Fault::DiscardsStates), []);
 }
 
 #[test]
