@@ -89,11 +89,11 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
 }
 
 /// Returns the variables that keep their start value during the initialization: parameters, inputs,
-/// constants.
+/// constants. Clocked ones cannot be read after it.
 pub(super) fn start_variables(
     description: &ModelDescription,
 ) -> impl Iterator<Item = &ScalarVariable> {
-    description.variables.iter().filter(|variable| {
+    description.variables.iter().filter(|variable| variable.clocks.is_empty()).filter(|variable| {
         matches!(variable.causality, Causality::Parameter | Causality::Input)
             || variable.variability == Variability::Constant
     })
@@ -114,6 +114,22 @@ pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn start_values_of_clocked_variables_are_not_compared() {
+        let description = ModelDescription::parse(
+            r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+<CoSimulation modelIdentifier="M" hasEventMode="true"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent"/>
+<Clock name="c" valueReference="1" causality="input" intervalVariability="triggered"/>
+<Float64 name="a" valueReference="2" causality="input" start="5" clocks="1"/>
+<Float64 name="b" valueReference="3" causality="input" start="5"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"#,
+        );
+        let description = description.unwrap();
+        let names = start_variables(&description).map(|variable| variable.name.as_str());
+        assert_eq!(names.collect::<Vec<_>>(), ["c", "b"]);
+    }
 
     #[test]
     fn start_values_agree_to_the_last_digit_and_infinite_ones_only_if_they_are_equal() {
