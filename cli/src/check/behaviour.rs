@@ -195,10 +195,19 @@ impl<S: Slave> Trial<'_, S> {
             None => messages,
         };
         self.findings.add(Error, error.function, what, &why, section);
-        if error.messages.is_empty() && matches!(error.failure, Failure::Status(_)) {
+        let is_silent = error.messages.is_empty() && self.explains_errors();
+        if is_silent && matches!(error.failure, Failure::Status(_)) {
             let why = "Nobody learns what was wrong.";
             self.findings.add(Warning, error.function, "fails without a message", why, "2.1.3");
         }
+    }
+
+    /// Whether the FMU sends messages about its errors with logging off. One of FMI 3.0 may send only messages of
+    /// categories that are switched on, as the importer does for those of statuses (FMI 3.0.2, section 2.3.1).
+    fn explains_errors(&self) -> bool {
+        let mut categories = self.description.log_categories.iter();
+        self.description.version() != Version::V3
+            || categories.any(|category| category.name == "logStatusError")
     }
 
     fn experiment(&self) -> DefaultExperiment {

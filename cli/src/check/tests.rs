@@ -18,6 +18,18 @@ const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid=
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
 </fmiModelDescription>"#;
 
+/// The same in FMI 3.0.
+const XML_3: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="Sum" instantiationToken="t">
+<CoSimulation modelIdentifier="Sum"/>
+<LogCategories/>
+<DefaultExperiment startTime="0" stopTime="1" tolerance="1e-5" stepSize="0.125"/>
+<ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent"/>
+<Float64 name="u" valueReference="1" causality="input" start="2"/>
+<Float64 name="y" valueReference="2" causality="output"/>
+</ModelVariables><ModelStructure><Output valueReference="2"/></ModelStructure>
+</fmiModelDescription>"#;
+
 /// The fault of a slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
@@ -36,6 +48,7 @@ enum Fault {
     DiscardsStates,
     ReadAfterTheEnd,
     Step,
+    SilentStep,
 }
 
 /// A slave whose output is the integral of its input.
@@ -98,6 +111,9 @@ impl Slave for Sum {
         if self.fault == Fault::Step && time > 0.5 {
             return Err(refused("fmi2DoStep", "tired"));
         }
+        if self.fault == Fault::SilentStep {
+            return Err(refused("fmi2DoStep", ""));
+        }
         if self.fault == Fault::SecondEndsEarlier && self.number == 2 && time >= 0.5 {
             return Ok(StepResult::Part { reached: time, terminated: false });
         }
@@ -148,7 +164,12 @@ fn findings(fault: Fault) -> Vec<Finding> {
 }
 
 fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
-    let description = ModelDescription::parse(XML).unwrap();
+    tried_as(XML, fault)
+}
+
+/// Returns the result and the findings of a slave with this description.
+fn tried_as(xml: &str, fault: Fault) -> (TrialResult, Vec<Finding>) {
+    let description = ModelDescription::parse(xml).unwrap();
     let mut number = 0;
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> {
         number += 1;
@@ -199,6 +220,20 @@ fn each_fault_is_found_with_its_section() {
             all.iter().find(|finding| finding.place == place && finding.what.contains(words));
         let actual = actual.unwrap_or_else(|| panic!("{fault:?}: {all:#?}"));
         assert_eq!((actual.severity, actual.section), (severity, Some(section)), "{actual}");
+    }
+}
+
+/// FMI 3.0.2, section 2.3.1: with logging off, only messages of categories that are switched on may be sent.
+#[test]
+fn an_error_without_a_message_is_a_warning_unless_no_category_allows_one() {
+    let category = r#"<LogCategories><Category name="logStatusError"/></LogCategories>"#;
+    let stated = XML_3.replace("<LogCategories/>", category);
+    let unstated = XML_3.replace("<LogCategories/>", "");
+    for (xml, is_warning) in [(XML, true), (stated.as_str(), true), (unstated.as_str(), false)] {
+        let (_, all) = tried_as(xml, Fault::SilentStep);
+        assert!(all.iter().any(|finding| finding.severity == Severity::Error), "{all:#?}");
+        let is_silent = |finding: &Finding| finding.what == "fails without a message";
+        assert_eq!(all.iter().any(is_silent), is_warning, "{xml}");
     }
 }
 
