@@ -210,7 +210,7 @@ fn each_fault_is_found_with_its_section() {
         (Fault::SecondEndsEarlier, Warning, "fmi2DoStep", "other outputs, from step 5", "2.1"),
         (Fault::LostState, Error, "fmi2SetFMUstate", "differ from those before", "2.1.8"),
         (Fault::LostState, Error, "fmi2DeSerializeFMUstate", "differ", "2.1.8"),
-        (Fault::RoundedState, Warning, "fmi2SetFMUstate", "by 1.0e-9 of their size", "2.1.8"),
+        (Fault::RoundedState, Warning, "fmi2SetFMUstate", "by 5.0e-10 of their size", "2.1.8"),
         (Fault::NoState, Error, "fmi2GetFMUstate", "canGetAndSetFMUstate is true", "2.1.8"),
         (Fault::ReadAfterTheEnd, Warning, "fmi2GetReal", "after fmi2Terminate", "4.2.4"),
         (Fault::Step, Error, "fmi2DoStep", "at t = 0.625 s", "4.2.2"),

@@ -40,21 +40,24 @@ impl Value {
         }
     }
 
-    /// Returns the difference relative to the larger of two real numbers; 0 for equal values, infinite for others
-    /// that are not finite real numbers.
+    /// Returns the difference of two real numbers; 0 for equal values, infinite for others that are not finite real
+    /// numbers.
     fn difference(&self, other: &Value) -> f64 {
         match (&self.0, &other.0) {
             _ if self == other => 0.0,
             (Real(one), Real(other)) => {
-                let relative = (one - other).abs() / one.abs().max(other.abs());
-                // Positive and negative zero are equal.
-                if (one - other).abs() <= 0.0 {
-                    0.0
-                } else {
-                    Some(relative).filter(|distance| !distance.is_nan()).unwrap_or(f64::INFINITY)
-                }
+                let difference = (one - other).abs();
+                if difference.is_nan() { f64::INFINITY } else { difference }
             }
             _ => f64::INFINITY,
+        }
+    }
+
+    /// Returns the magnitude of a finite real number; 0 for other values.
+    fn size(&self) -> f64 {
+        match self.0 {
+            Real(value) if value.is_finite() => value.abs(),
+            _ => 0.0,
         }
     }
 
@@ -63,14 +66,19 @@ impl Value {
     }
 }
 
-/// Returns the largest difference between two trajectories of outputs, relative to the size of the
-/// values; infinite if the lengths differ, or values that are not finite real numbers.
+/// Returns the largest difference between two trajectories of outputs, relative to the largest value of each output in
+/// them; infinite if the lengths differ, or values that are not finite real numbers.
 pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     if one.len() != other.len() {
         return f64::INFINITY;
     }
-    let pairs = one.iter().flatten().zip(other.iter().flatten());
-    pairs.map(|(one, other)| one.difference(other)).fold(0.0, f64::max)
+    let of_output = |output: usize| {
+        let pairs = one.iter().zip(other).map(|(one, other)| (&one[output], &other[output]));
+        let sizes = pairs.clone().map(|(one, other)| one.size().max(other.size()));
+        let size = sizes.fold(f64::MIN_POSITIVE, f64::max);
+        pairs.map(|(one, other)| one.difference(other) / size).fold(0.0, f64::max)
+    };
+    (0..one.first().map_or(0, Vec::len)).map(of_output).fold(0.0, f64::max)
 }
 
 /// Reads one variable.
@@ -114,6 +122,26 @@ pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The second output is zero but for rounding at its end, as an error that decays.
+    #[test]
+    fn trajectories_are_compared_by_the_size_of_each_output() {
+        let rows = |all: &[[f64; 2]]| -> Vec<Vec<Value>> {
+            all.iter().map(|row| row.map(|number| Value(Real(number))).to_vec()).collect()
+        };
+        let trajectory = rows(&[[8.0, 1.0], [4.0, 1e-17]]);
+        for (other, expected) in [
+            ([[8.0, 1.0], [4.0, -1e-17]], 2e-17),
+            ([[8.0, 1.0], [4.5, 1e-17]], 0.0625),
+            ([[8.0, 1.0], [4.0, f64::NAN]], f64::INFINITY),
+            ([[8.0, 1.0], [f64::INFINITY, 1e-17]], f64::INFINITY),
+        ] {
+            let actual = distance(&trajectory, &rows(&other));
+            assert_eq!(actual.to_bits(), f64::to_bits(expected), "{other:?}: {actual}");
+        }
+        assert_eq!(distance(&rows(&[[0.0; 2]]), &rows(&[[-0.0; 2]])).to_bits(), 0);
+        assert!(distance(&trajectory, &trajectory[..1]).is_infinite());
+    }
 
     #[test]
     fn start_values_of_clocked_variables_are_not_compared() {
