@@ -29,8 +29,8 @@ const fn platform(
     Platform { folder, format, machine, suffix }
 }
 
-const PLATFORMS: [Platform; 15] = {
-    use Architecture::{Aarch64, I386, X86_64};
+const PLATFORMS: [Platform; 18] = {
+    use Architecture::{Aarch64, Arm, I386, X86_64};
     use BinaryFormat::{Elf, MachO, Pe};
     [
         platform("win32", Pe, I386, ".dll"),
@@ -39,6 +39,9 @@ const PLATFORMS: [Platform; 15] = {
         platform("linux64", Elf, X86_64, ".so"),
         platform("darwin32", MachO, I386, ".dylib"),
         platform("darwin64", MachO, X86_64, ".dylib"),
+        platform("aarch32-windows", Pe, Arm, ".dll"),
+        platform("aarch32-linux", Elf, Arm, ".so"),
+        platform("aarch32-darwin", MachO, Arm, ".dylib"),
         platform("x86-windows", Pe, I386, ".dll"),
         platform("x86_64-windows", Pe, X86_64, ".dll"),
         platform("aarch64-windows", Pe, Aarch64, ".dll"),
@@ -337,5 +340,31 @@ fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     if let Some((_, version)) = newest {
         let what = format!("needs glibc {version} or later");
         findings.add(Note, path, what, "It does not load on older systems.", "");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// FMI 3.0.2, section 2.5.1.4.1: four architectures and three systems.
+    #[test]
+    fn libraries_of_each_platform_tuple_are_checked() {
+        let description = ModelDescription::parse(
+            r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+<CoSimulation modelIdentifier="M"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"#,
+        );
+        let description = description.unwrap();
+        for architecture in ["aarch32", "aarch64", "x86", "x86_64"] {
+            for (system, suffix) in [("darwin", ".dylib"), ("linux", ".so"), ("windows", ".dll")] {
+                let name = format!("binaries/{architecture}-{system}/M{suffix}");
+                let findings = check(&|_: &str| Ok(b"no library".to_vec()), &[name], &description);
+                let what = findings.iter().map(|finding| finding.what.as_str());
+                let what = what.collect::<Vec<_>>().join("; ");
+                assert!(what.starts_with("expected a shared library, found"), "{what}");
+            }
+        }
     }
 }
