@@ -169,7 +169,8 @@ impl<S: Slave> Trial<'_, S> {
     /// Adds a finding for an instance that could not be created, or whose former instance could not be freed.
     fn report_refusal(&mut self, error: &anyhow::Error) {
         match error.downcast_ref::<CallError>() {
-            Some(error) if error.function == "fmi2FreeInstance" => {
+            // The functions that free the former instance and its states.
+            Some(error) if error.function.contains("Free") => {
                 self.report(error, "after fmi2Terminate", "4.2.4");
             }
             Some(error) => self.report(error, "when an instance is made", "2.1.5"),

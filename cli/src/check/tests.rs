@@ -167,22 +167,20 @@ fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
     tried_as(XML, fault)
 }
 
+/// Returns the slave number `number` of a trial.
+fn sum(description: &ModelDescription, fault: Fault, number: u32) -> Sum {
+    let description = description.clone();
+    let u = if fault == Fault::StartValue { 3.0 } else { 2.0 };
+    Sum { description, fault, number, u, y: 0.0, end: 0.0, saved: 0.0, terminated: false }
+}
+
 /// Returns the result and the findings of a slave with this description.
 fn tried_as(xml: &str, fault: Fault) -> (TrialResult, Vec<Finding>) {
     let description = ModelDescription::parse(xml).unwrap();
     let mut number = 0;
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> {
         number += 1;
-        Ok(Sum {
-            description: description.clone(),
-            fault,
-            number,
-            u: if fault == Fault::StartValue { 3.0 } else { 2.0 },
-            y: 0.0,
-            end: 0.0,
-            saved: 0.0,
-            terminated: false,
-        })
+        Ok(sum(&description, fault, number))
     };
     behaviour::check(&description, false, &mut make)
 }
@@ -257,6 +255,25 @@ fn the_answer_states_the_trial_or_the_reason_of_its_failure() {
     assert_eq!(here.to_string(), "no: fmi2DoStep: returned fmi2Error at t = 0.625 s");
     let answer = Answer::new(here, &ModelDescription::default(), &all).to_string();
     assert!(answer.ends_with("no other tool is known to refuse it"), "{answer}");
+}
+
+#[test]
+fn a_crash_in_the_freeing_of_the_former_instance_is_one_after_its_end() {
+    let description = ModelDescription::parse(XML_3.replace("<LogCategories/>", "")).unwrap();
+    let mut made = 0;
+    let mut make = |_: &str, former: Option<Sum>| -> anyhow::Result<Sum> {
+        made += 1;
+        if former.is_some() {
+            let failure = Failure::Killed(11, "SIGSEGV");
+            let function = "fmi3FreeInstance";
+            return Err(CallError { function, failure, messages: Vec::new() }.into());
+        }
+        Ok(sum(&description, Fault::Nothing, made))
+    };
+    let (_, all) = behaviour::check(&description, false, &mut make);
+    let freed = all.iter().find(|finding| finding.place == "fmi3FreeInstance").unwrap();
+    assert!(freed.what.ends_with("after fmi2Terminate"), "{freed}");
+    assert_eq!(freed.section, Some("4.2.4"));
 }
 
 #[test]
