@@ -120,7 +120,9 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     if let Some(values) = array(node)? {
         return Ok(Some(ParameterValue::Array(node.name.clone(), values)));
     }
-    let text = || Ok::<_, SspError>(node.required("value")?.to_owned());
+    // SSP 2.0 also states a text in an element `Value`.
+    let only = node.child("Value")?;
+    let text = || Ok::<_, SspError>(only.unwrap_or(node).required("value")?.to_owned());
     Ok(Some(match node.name.as_str() {
         "Real" | "Float64" | "Float32" => {
             ParameterValue::Real(node.needed("value", Node::number)?, node.stated("unit"))
@@ -139,13 +141,13 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
 }
 
 /// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a
-/// single value.
+/// single value or text.
 fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
     if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
         let values = node.children_named("Value").map(|value| value.required("value"));
         let values: Vec<String> =
             values.map(|value| value.map(str::to_owned)).collect::<Result<_, SspError>>()?;
-        return Ok(Some(values).filter(|values| !values.is_empty()));
+        return Ok(Some(values).filter(|values| values.len() > 1));
     }
     let is_type = schema::TYPES.contains(&node.name.as_str());
     let values = node.words("value").map(str::to_owned).collect::<Vec<_>>();

@@ -152,6 +152,15 @@ fn a_component_without_a_source_is_its_connectors_only() {
 }
 
 #[test]
+fn one_element_with_a_text_states_a_single_value() {
+    let values = r#"<ssv:Parameter name="a"><ssv:String><ssv:Value value="x y"/></ssv:String></ssv:Parameter>
+<ssv:Parameter name="b"><ssv:Enumeration><ssv:Value value="on"/></ssv:Enumeration></ssv:Parameter>"#;
+    let set = read_ssv(newer(&ssv(values)).as_bytes()).unwrap();
+    assert_eq!(set.parameters[0].value, ParameterValue::String("x y".to_owned()));
+    assert_eq!(set.parameters[1].value, ParameterValue::Enumeration("on".to_owned(), None));
+}
+
+#[test]
 fn what_is_of_ssp_2_is_written_as_ssp_2_and_reads_back() {
     let connectors = "c constant\ns structuralParameter\nl local\nx unspecified\n\
         a output <ssc:Dimension size=\"2\"/><ssc:Dimension/>\nk input <ssc:Clock/>\n\
