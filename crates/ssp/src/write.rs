@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use fmu_description::package::Unpacked;
+use fmu_description::unit::BaseUnit;
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable};
 
-use super::conversion::items_of;
+use super::conversion::{Measure, items_of};
 use super::error::{SspError, missing};
 use super::flatten::kind_of;
 use super::render::{render_ssd, render_ssv};
@@ -233,8 +234,9 @@ impl Exporter {
         })
     }
 
-    /// Returns the name of the unit of a variable, if it has one; an error if the variable does not exist.
-    fn unit(&self, terminal: &Terminal) -> Result<Option<&str>, SspError> {
+    /// Returns the name and definition of the unit of a variable, if it has one; an error if the variable does not
+    /// exist.
+    fn unit(&self, terminal: &Terminal) -> Result<Option<(String, Option<BaseUnit>)>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {
             missing(terminal.to_string(), "an element of the assembly", &terminal.element)
@@ -243,10 +245,7 @@ impl Exporter {
             let expected = format!("a variable of {}", description.model_name);
             missing(terminal.to_string(), expected, "none of that name")
         })?;
-        Ok(match &variable.kind {
-            Kind::Real(real) | Kind::Float32(real) => real.unit.as_deref(),
-            _ => None,
-        })
+        Ok(Measure::of_variable(variable, description).unit)
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use fmu_description::package::{Package, platforms};
 use fmu_description::unit::BaseUnit;
 use slave::Transformation as Change;
 use ssp::structure::{
@@ -17,7 +18,7 @@ use ssp::{
     write,
 };
 
-use crate::bench::{Bench, links, settings};
+use crate::bench::{Bench, component, connection, description, links, root, settings};
 
 fn definitions() -> Definitions {
     let base = BaseUnit { m: 1, s: -2, factor: 0.1, offset: -0.5, ..BaseUnit::default() };
@@ -257,6 +258,26 @@ fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
     let third = bench.path("third.ssp");
     write(&opened.assembly, Some(0.5), &third).unwrap();
     assert_eq!(links(&open(&third).unwrap().assembly), links(&opened.assembly));
+}
+
+#[test]
+fn a_unit_that_two_fmus_define_differently_is_converted_once_in_what_is_written() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", "y output Real unit=\"m\"");
+    let text = description("b", "u input Real unit=\"m\"");
+    let mut package =
+        Package::new(text.replace("<BaseUnit m=\"1\"/>", "<BaseUnit m=\"1\" factor=\"1000\"/>"));
+    package.add(format!("binaries/{}/b.so", platforms()[0]), "not a library");
+    package.write(&bench.path("b.fmu")).unwrap();
+    let elements =
+        component("a", "a.fmu", "y output", "") + &component("b", "b.fmu", "u input", "");
+    let opened = bench.open(&root(&elements, &connection("a.y", "b.u", "", "")), "").unwrap();
+    let path = bench.path("x.ssp");
+    write(&opened.assembly, None, &path).unwrap();
+    // 1 m is 0.001 of the unit of 1000 m.
+    let expected = ["a.y -> b.u * 0.001 + 0.0"];
+    assert_eq!(links(&opened.assembly), expected);
+    assert_eq!(links(&open(&path).unwrap().assembly), expected);
 }
 
 #[test]
