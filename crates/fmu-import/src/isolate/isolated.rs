@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use fmu_description::package::Unpacked;
-use fmu_description::{ModelDescription, Version};
+use fmu_description::{Causality, ModelDescription, Version};
 
 use super::channel::{Channel, Side, WaitResult};
 use super::function::Function;
@@ -31,6 +31,8 @@ const END_LIMIT: Duration = Duration::from_secs(2);
 const FREE_LIMIT: Duration = Duration::from_secs(10);
 /// Time limit for a new process to become a worker.
 const START_LIMIT: Duration = Duration::from_secs(20);
+/// Least number of variables that the shared memory is made for if structural parameters may enlarge arrays.
+const ROOM_FOR_ARRAYS: usize = 1 << 16;
 
 /// An instance in a process of its own.
 ///
@@ -85,7 +87,7 @@ impl Isolated {
         let describe = options.integration.as_ref().map(|integration| integration.describe);
         let description = description_of_instance(stated, &sizes, describe)
             .map_err(|reason| IsolateError::Refused { instance: name.to_owned(), reason })?;
-        let count = description.as_ref().unwrap_or(stated).variables.len();
+        let count = room_of(description.as_ref().unwrap_or(stated));
         refuse_in_worker()?;
         let (shared, memory) =
             Shared::create(count).map_err(system("cannot create shared memory"))?;
@@ -382,6 +384,13 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
 /// A function that returns the description of an integrated instance from the description of the instance.
 pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 
+/// Returns the number of variables that the shared memory is made for. Pages that no call needs take no memory.
+fn room_of(description: &ModelDescription) -> usize {
+    let (variables, structural) = (&description.variables, Causality::StructuralParameter);
+    let resizes = variables.iter().any(|variable| variable.causality == structural);
+    variables.len().max(if resizes { ROOM_FOR_ARRAYS } else { 0 })
+}
+
 /// Returns the description of an instance if it differs from that of its FMU. On failure returns the
 /// reason.
 pub(super) fn description_of_instance(
@@ -396,4 +405,27 @@ pub(super) fn description_of_instance(
     };
     let described = describe.map(|describe| describe(scalar.as_ref().unwrap_or(description)));
     Ok(described.or(scalar))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_that_a_structural_parameter_enlarges_is_set_in_one_call() {
+        let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+<CoSimulation modelIdentifier="M"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent"/>
+<UInt64 name="n" valueReference="1" causality="structuralParameter" variability="fixed" start="2"/>
+<Float64 name="a" valueReference="2" causality="input" start="0"><Dimension valueReference="1"/></Float64>
+</ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let stated = ModelDescription::parse(xml).unwrap();
+        let described = |sizes| description_of_instance(&stated, &sizes, None).unwrap().unwrap();
+        let (shared, _) = Shared::create(room_of(&described(HashMap::new()))).unwrap();
+        // Each element has its value reference and its value.
+        let all = described(HashMap::from([(1, 100_000)])).variables;
+        let elements = all.iter().filter(|variable| variable.name.starts_with("a[")).count();
+        assert_eq!(elements, 100_000);
+        assert!(shared.area().len() >= 2 * elements, "{} words", shared.area().len());
+    }
 }
