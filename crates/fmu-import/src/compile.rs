@@ -316,7 +316,7 @@ impl<'a> Build<'a> {
             Some(value) => format!("-D{name}={value}"),
             None => format!("-D{name}"),
         }));
-        command.arg("-o").arg(object).arg(self.sources.join(file));
+        command.arg("-o").arg(object).arg(source_file(&self.sources, file));
         self.run(&mut command, file)
     }
 
@@ -337,6 +337,13 @@ impl<'a> Build<'a> {
     }
 }
 
+/// Returns the path of a stated source file. Some exporters include the folder `sources` in its name.
+fn source_file(sources: &Path, file: &str) -> PathBuf {
+    let stated = sources.join(file);
+    let without = file.strip_prefix("sources/").map(|file| sources.join(file));
+    without.filter(|path| !stated.is_file() && path.is_file()).unwrap_or(stated)
+}
+
 /// Hashes the names and contents of all files of a folder.
 fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) -> io::Result<()> {
     let mut paths: Vec<PathBuf> =
@@ -351,4 +358,20 @@ fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_source_file_may_include_the_folder() {
+        let folder = TemporaryFolder::new().unwrap();
+        let (file, nested) = (folder.path().join("a.c"), folder.path().join("sources/a.c"));
+        fs::write(&file, "").unwrap();
+        assert_eq!(source_file(folder.path(), "sources/a.c"), file);
+        fs::create_dir(folder.path().join("sources")).unwrap();
+        fs::write(&nested, "").unwrap();
+        assert_eq!(source_file(folder.path(), "sources/a.c"), nested);
+    }
 }
