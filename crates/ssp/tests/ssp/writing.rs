@@ -18,7 +18,7 @@ use ssp::{
     write,
 };
 
-use crate::bench::{Bench, component, connection, description, links, root, settings};
+use crate::bench::{self, Bench, connection, description, links, root, settings};
 
 fn definitions() -> Definitions {
     let base = BaseUnit { m: 1, s: -2, factor: 0.1, offset: -0.5, ..BaseUnit::default() };
@@ -269,8 +269,8 @@ fn a_unit_that_two_fmus_define_differently_is_converted_once_in_what_is_written(
         Package::new(text.replace("<BaseUnit m=\"1\"/>", "<BaseUnit m=\"1\" factor=\"1000\"/>"));
     package.add(format!("binaries/{}/b.so", platforms()[0]), "not a library");
     package.write(&bench.path("b.fmu")).unwrap();
-    let elements =
-        component("a", "a.fmu", "y output", "") + &component("b", "b.fmu", "u input", "");
+    let elements = bench::component("a", "a.fmu", "y output", "")
+        + &bench::component("b", "b.fmu", "u input", "");
     let opened = bench.open(&root(&elements, &connection("a.y", "b.u", "", "")), "").unwrap();
     let path = bench.path("x.ssp");
     write(&opened.assembly, None, &path).unwrap();
