@@ -80,7 +80,8 @@ fn draft(sources: &[PathBuf], options: &LogOptions, out: &Path) -> Result<Draft,
         return Err(Error::Invalid("expected the file of a plant, found none".to_owned()));
     };
     let ending = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    if log::is_log(source, &ending) || !options.inputs.is_empty() {
+    let is_plant = ["fmu", "mat"].contains(&ending.as_str());
+    if log::is_log(source, &ending) || !options.inputs.is_empty() && !is_plant {
         return log::draft(sources, options);
     }
     if let Some(other) = others.first() {
@@ -89,13 +90,23 @@ fn draft(sources: &[PathBuf], options: &LogOptions, out: &Path) -> Result<Draft,
             "{source} is one plant, expected no further file {other}: several files are several logs, tables with a column `time`"
         )));
     }
-    match ending.as_str() {
-        "fmu" => fmu::draft(source, out),
-        "mat" => mat::draft(source),
-        "csv" | "tsv" | "txt" => labelled::draft(source),
-        _ => Err(Error::Invalid(format!(
-            "{}: expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv) of matrices or of signals (also .parquet)",
-            source.display()
+    let draft = match ending.as_str() {
+        "fmu" => fmu::draft(source, out)?,
+        "mat" => mat::draft(source)?,
+        "csv" | "tsv" | "txt" => labelled::draft(source)?,
+        _ => {
+            return Err(Error::Invalid(format!(
+                "{}: expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv) of matrices or of signals (also .parquet)",
+                source.display()
+            )));
+        }
+    };
+    match options.stated() {
+        None => Ok(draft),
+        Some(option) => Err(Error::Invalid(format!(
+            "{}: {option} belongs to a log, a table with a column `time`; found {}: expected the command without it",
+            source.display(),
+            draft.origin
         ))),
     }
 }
@@ -124,4 +135,27 @@ fn bandwidths(path: &Path, text: &str, budget: &Budget) -> Result<Option<Bandwid
     let file = bandwidths::chosen(&file, budget)?;
     let both = file.feedback.bandwidth().zip(file.observer.bandwidth());
     Ok(both.map(|(feedback, observer)| Bandwidths { feedback, observer }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_of_logs_are_refused_for_matrices() {
+        let book = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/plant-file");
+        let sources = [book.join("trolley.csv")];
+        let refusal = |options: &LogOptions| {
+            let read = draft(&sources, options, Path::new("plant.toml"));
+            read.err().map_or_else(String::new, |error| error.to_string())
+        };
+        assert_eq!(refusal(&LogOptions::default()), "");
+        let outputs = LogOptions { outputs: vec!["y".to_owned()], ..LogOptions::default() };
+        let order = LogOptions { order: Some(3), ..LogOptions::default() };
+        for (options, name) in [(outputs, "--outputs"), (order, "--order")] {
+            let message = refusal(&options);
+            let expected = format!("trolley.csv: {name} belongs to a log");
+            assert!(message.contains(&expected), "{message}");
+        }
+    }
 }

@@ -29,6 +29,18 @@ pub struct LogOptions {
     pub order: Option<usize>,
 }
 
+impl LogOptions {
+    /// Returns the name of the first option that is stated; None if there is none.
+    pub(super) fn stated(&self) -> Option<&'static str> {
+        let options = [
+            ("--inputs", !self.inputs.is_empty()),
+            ("--outputs", !self.outputs.is_empty()),
+            ("--order", self.order.is_some()),
+        ];
+        options.into_iter().find(|(_, is_stated)| *is_stated).map(|(name, _)| name)
+    }
+}
+
 /// Identifies the plant. Logs after the first one must have the same columns and sample time.
 pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Error> {
     let logs = read::logs(paths, options)?;
