@@ -53,6 +53,7 @@ pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), Pl
     let refused = [
         ("family", !file.family.is_empty()),
         ("schedule", file.is_scheduled()),
+        ("loop", file.loop_shape.is_some()),
         ("reconfiguration", file.reconfiguration.is_some()),
         ("fallback", file.fallback.is_some()),
         ("reference", referred.is_some_and(|h_d| h_d.amax() > 0.0)),
@@ -145,5 +146,19 @@ mod tests {
             let error = refused(from, to);
             assert!(error.contains(expected), "{from} -> {to}: {error}");
         }
+    }
+
+    /// An FMU has D without an entry `D` in the file, which `[loop]` excludes.
+    #[test]
+    fn the_shape_of_a_loop_with_the_feedthrough_of_an_fmu_is_refused() {
+        let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\nfilter = 60\n\
+                    loop.bandwidth = 1\n";
+        let source = Source::new(Path::new("plant.toml"), text.to_owned());
+        let parsed = source.parse().expect("a table");
+        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).expect("a plant file");
+        let mut linear = LinearPlant::of(&file).expect("a plant");
+        linear.d[(0, 0)] = 2.0;
+        let refusal = check(&file, &linear).expect_err("a refusal").to_string();
+        assert!(refusal.contains("`loop` is not possible then"), "{refusal}");
     }
 }
