@@ -9,7 +9,7 @@ use linearise::{Linearise, linearise};
 
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named};
-use crate::plant::linear::significant;
+use crate::plant::linear::direct_terms;
 
 /// Reads the continuous inputs and outputs of the FMU; `out` is the plant file that will name it.
 ///
@@ -36,7 +36,7 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
         ..Named::default()
     };
     // An output that contains a command, a force for example, is rarely what a sensor measures.
-    let d = significant(linear.matrices.d.clone(), &linear.matrices.c);
+    let [d, _] = direct_terms(&linear);
     let contains = |at: &usize| d.row(*at).amax() > 0.0;
     let (with_command, free): (Vec<_>, Vec<_>) = (0..linear.outputs.len()).partition(contains);
     let (measured, left_out) =

@@ -9,7 +9,7 @@ use control::hold::zero_order_hold;
 use control::rank::Mode;
 use control::{Domain, Error, StateSpace};
 use fmu_import::Fmu;
-use linearise::{Linearisation, Linearise, LineariseError, linearise};
+use linearise::{Linearisation, Linearise, LineariseError, Method, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use crate::plant::delays::{self, DelayedPlant, delayed};
@@ -24,7 +24,7 @@ use plant_file::signals::Signal;
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;
 
-/// Part of the largest entry of a row of C below which an entry of D counts as zero.
+/// Part of the largest entry of a row of C below which an entry of D or G counts as zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
@@ -253,11 +253,11 @@ fn linearised(
         let both = signals.iter().zip(from_fmu);
         both.map(|(signal, known_signal)| signal.clone().or(known(known_signal))).collect()
     };
-    let linearise::Matrices { a, b, c, d, f, g } = &linearised.matrices;
-    let d = significant(d.clone(), c);
+    let linearise::Matrices { a, b, c, f, .. } = &linearised.matrices;
+    let [d, g] = direct_terms(&linearised);
     let undelayed = system([a, b, c, &d], Domain::Continuous);
     let delays = delays::of(file);
-    let matrices = delayed(file, &undelayed, [f, g])?;
+    let matrices = delayed(file, &undelayed, [f, &g])?;
     let (faults, models) = faults(file, &linearised, &matrices)?;
     let DelayedPlant { a, b, c, d, .. } = &matrices;
     let states: Vec<_> = linearised.states.iter().map(known).collect();
@@ -466,15 +466,54 @@ fn entry(
     }
 }
 
-/// Returns D with zeros for entries that are rounding errors beside the row of `c`.
-pub(crate) fn significant(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
-    for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
-        let negligible = NEGLIGIBLE * of_states.amax();
-        row.apply(|entry| {
-            if entry.abs() <= negligible {
-                *entry = 0.0;
-            }
-        });
+/// Returns D and G with zeros for entries that are rounding errors beside the row of C, or not larger than the error of
+/// their differences.
+pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
+    let linearise::Matrices { c, d, g, .. } = &linearised.matrices;
+    let errors = match &linearised.method {
+        Method::FiniteDifferences { errors, .. } => Some(errors),
+        Method::DirectionalDerivatives { .. } => None,
+    };
+    let significant = |values: &DMatrix<f64>, errors: Option<&DMatrix<f64>>| {
+        values.map_with_location(|row, column, entry| {
+            let error = errors.map_or(0.0, |errors| errors[(row, column)]);
+            let negligible = error.max(NEGLIGIBLE * c.row(row).amax());
+            if entry.abs() <= negligible { 0.0 } else { entry }
+        })
+    };
+    [significant(d, errors.map(|errors| &errors.d)), significant(g, errors.map(|errors| &errors.g))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of D = [2, 1e-7] and G = [1e-7], each to 1e-6, only the first entry is not zero.
+    #[test]
+    fn a_direct_term_within_the_error_of_its_difference_is_none() {
+        let row = |entries: &[f64]| DMatrix::from_row_slice(1, entries.len(), entries);
+        let matrices = |d: &[f64], g: &[f64]| linearise::Matrices {
+            a: row(&[-1.0]),
+            b: row(&[1.0, 1.0]),
+            f: row(&[1.0]),
+            c: row(&[1.0]),
+            d: row(d),
+            g: row(g),
+        };
+        let step = 0.1;
+        let how =
+            linearise::Differences::OfSteps { step, count: 8, heights: Vec::new(), missed: 0.0 };
+        let errors = Box::new(matrices(&[1e-6, 1e-6], &[1e-6]));
+        let linearised = Linearisation {
+            matrices: matrices(&[2.0, 1e-7], &[1e-7]),
+            states: Vec::new(),
+            inputs: Vec::new(),
+            faults: Vec::new(),
+            outputs: Vec::new(),
+            rates: Vec::new(),
+            residual: 0.0,
+            method: Method::FiniteDifferences { how, errors },
+        };
+        assert_eq!(direct_terms(&linearised), [row(&[2.0, 0.0]), row(&[0.0])]);
     }
-    d
 }

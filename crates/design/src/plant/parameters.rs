@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::plant::delays::{self, JUDGED};
 use crate::plant::linear;
-use crate::plant::linear::significant;
 use crate::report::robustness::Parameter;
 use plant_file::parameters::{ParameterTolerance, Tolerance};
 use plant_file::{PlantFile, PlantFmu};
@@ -91,8 +90,8 @@ impl<'a> ParameterFamily<'a> {
         })?;
         let measured = linearised.outputs.iter().map(|signal| signal.value);
         let measured = DVector::from_iterator(linearised.outputs.len(), measured);
-        let linearise::Matrices { a, b, c, d, .. } = linearised.matrices;
-        let d = significant(d, &c);
+        let [d, _] = linear::direct_terms(&linearised);
+        let linearise::Matrices { a, b, c, .. } = linearised.matrices;
         let plant = StateSpace { a, b, c, d, domain: Domain::Continuous };
         Ok((plant, DVector::from_vec(linearised.rates), measured))
     }
