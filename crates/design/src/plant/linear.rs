@@ -58,6 +58,8 @@ pub(crate) struct LinearPlant {
     pub(crate) origin: String,
     /// For an FMU: the relative distance of the operating point from an equilibrium.
     pub(crate) residual: Option<f64>,
+    /// For an FMU: the largest error of an entry, relative to the largest entry of its row; None if none is known.
+    pub(crate) inaccuracy: Option<f64>,
 }
 
 impl LinearPlant {
@@ -192,6 +194,7 @@ impl LinearPlant {
                     }
                     .to_owned(),
                     residual: None,
+                    inaccuracy: None,
                     domain,
                     a,
                     b,
@@ -273,6 +276,7 @@ fn linearised(
         models,
         origin: format!("{model}, linearised by {}.", linearised.method),
         residual: Some(linearised.residual),
+        inaccuracy: inaccuracy(&linearised),
         domain: Domain::Continuous,
         a: a.clone(),
         b: b.clone(),
@@ -466,6 +470,17 @@ fn entry(
     }
 }
 
+/// Returns the largest error of an entry, relative to the largest entry of its row: that of differences, or the
+/// contradiction of directional derivatives to differences; None if no error is known.
+fn inaccuracy(linearised: &Linearisation) -> Option<f64> {
+    match &linearised.method {
+        Method::FiniteDifferences { .. } => linearised.relative_error(),
+        Method::DirectionalDerivatives { disagreement, .. } => {
+            disagreement.as_ref().map(|worst| worst.relative)
+        }
+    }
+}
+
 /// Returns D and G with zeros for entries that are rounding errors beside the row of C, or not larger than the error of
 /// their differences.
 pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
@@ -488,32 +503,54 @@ pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
 mod tests {
     use super::*;
 
-    /// Of D = [2, 1e-7] and G = [1e-7], each to 1e-6, only the first entry is not zero.
-    #[test]
-    fn a_direct_term_within_the_error_of_its_difference_is_none() {
-        let row = |entries: &[f64]| DMatrix::from_row_slice(1, entries.len(), entries);
-        let matrices = |d: &[f64], g: &[f64]| linearise::Matrices {
-            a: row(&[-1.0]),
-            b: row(&[1.0, 1.0]),
-            f: row(&[1.0]),
+    fn row(entries: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(1, entries.len(), entries)
+    }
+
+    /// x' = A x + 2 u_1 + u_2, y = x + D u + G f, with errors of these sizes of A, and of D and G.
+    fn differences([a, d, g]: [&[f64]; 3], [of_a, of_direct]: [f64; 2]) -> Linearisation {
+        let matrices = linearise::Matrices {
+            a: row(a),
+            b: row(&[2.0, 1.0]),
+            f: row(&[0.0]),
             c: row(&[1.0]),
             d: row(d),
             g: row(g),
         };
-        let step = 0.1;
-        let how =
-            linearise::Differences::OfSteps { step, count: 8, heights: Vec::new(), missed: 0.0 };
-        let errors = Box::new(matrices(&[1e-6, 1e-6], &[1e-6]));
-        let linearised = Linearisation {
-            matrices: matrices(&[2.0, 1e-7], &[1e-7]),
-            states: Vec::new(),
-            inputs: Vec::new(),
-            faults: Vec::new(),
+        let errors = linearise::Matrices {
+            a: row(&[of_a]),
+            b: row(&[0.0; 2]),
+            f: row(&[0.0]),
+            c: row(&[0.0]),
+            d: row(&[of_direct; 2]),
+            g: row(&[of_direct]),
+        };
+        let signal =
+            linearise::Signal { name: String::new(), unit: None, value: 0.0, typical: 1.0 };
+        let how = linearise::Differences::OfEquations { steps: Vec::new() };
+        Linearisation {
+            matrices,
+            states: vec![signal.clone()],
+            inputs: vec![signal.clone(); 2],
+            faults: vec![signal],
             outputs: Vec::new(),
             rates: Vec::new(),
             residual: 0.0,
-            method: Method::FiniteDifferences { how, errors },
-        };
+            method: Method::FiniteDifferences { how, errors: Box::new(errors) },
+        }
+    }
+
+    /// Of D = [2, 1e-7] and G = [1e-7], each to 1e-6, only the first entry is not zero.
+    #[test]
+    fn a_direct_term_within_the_error_of_its_difference_is_none() {
+        let linearised = differences([&[-1.0], &[2.0, 1e-7], &[1e-7]], [0.0, 1e-6]);
         assert_eq!(direct_terms(&linearised), [row(&[2.0, 0.0]), row(&[0.0])]);
+    }
+
+    /// x' = |x| + 2 u_1 + u_2: the difference at 0 is 0, and may be off by 1, half of the largest entry.
+    #[test]
+    fn the_inaccuracy_at_a_kink_is_half_of_its_jump_relative_to_the_row() {
+        let linearised = differences([&[0.0], &[0.0; 2], &[0.0]], [1.0, 0.0]);
+        assert_eq!(inaccuracy(&linearised), Some(0.5));
     }
 }

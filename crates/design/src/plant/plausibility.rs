@@ -5,6 +5,7 @@ use files::PlaceError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::plant::linear::LinearPlant;
+use crate::report::number::rounded;
 use control::faults::ExtendedPlant;
 use plant_file::signals::Signal;
 use plant_file::signals::{joined, signal_names};
@@ -15,6 +16,19 @@ use plant_file::{FAULTS, PlantFile};
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Errors of a linearisation above this part of the largest entry of a row are a warning.
+const INACCURATE: f64 = 0.01;
+
+/// Returns a warning if the plant is an FMU whose matrices are not accurate; None otherwise.
+pub(crate) fn inaccurate(file: &PlantFile<'_>, linear: &LinearPlant) -> Option<PlaceError> {
+    let error = linear.inaccuracy.filter(|error| *error > INACCURATE && error.is_finite())?;
+    let message = format!(
+        "entries of the linearised FMU have an error of up to {} of the largest one in their row, as at the edge of a \
+         friction, a limit or a play; expected another operating point, or parameters without these",
+        rounded(error)
+    );
+    Some(file.error(&["operating_point", "plant"], message))
+}
 
 /// Checks that the limits of each actuator and the range of each measurement contain its operating point; returns a
 /// warning for each actuator at a limit.

@@ -18,7 +18,7 @@ use plant_file::requirements::Requirement;
 use plant_file::{FAULTS, PlantFile};
 
 use crate::plant::linear::LinearPlant;
-use crate::plant::plausibility::{check_faults, check_limits};
+use crate::plant::plausibility::{check_faults, check_limits, inaccurate};
 use crate::plant::{attainable, delays, feedthrough, filters};
 use crate::solve::existence::{check_controllable, check_detectable};
 use crate::solve::family::{self, Family, Member, common_feedback};
@@ -85,6 +85,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<SolveResult, crat
     delays::check(file, &linear.delays, &linear.undelayed)?;
     let mut warnings = check_limits(file, &linear)?;
     warnings.extend(file.model.only_samples().map(|reason| file.error(&["matrices", "A"], reason)));
+    warnings.extend(inaccurate(file, &linear));
     warnings.extend(attainable::warnings(file, &linear)?);
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;
