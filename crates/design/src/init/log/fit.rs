@@ -14,6 +14,9 @@ pub(super) const SHORT: usize = 20;
 /// The logarithm of the growth of an error over a simulation, from which on the simulation is not used.
 const GROWTH: f64 = 1.0;
 
+/// A variance below this part of the mean square of the samples is rounding.
+const ROUNDING: f64 = 1e-15;
+
 /// The fit of one measurement, 100 % for predictions without error, 0 for those as good as the mean.
 pub(super) struct Fit {
     /// The fit of a simulation, which has the inputs only; None if its errors grow.
@@ -28,12 +31,12 @@ pub(super) fn estimation(log: &Log) -> Range<usize> {
 }
 
 /// Returns the samples of a log that are used to judge the estimate: the last quarter.
-fn validation(log: &Log) -> Range<usize> {
+pub(super) fn validation(log: &Log) -> Range<usize> {
     estimation(log).end..log.record.len()
 }
 
 /// Returns for each measurement the mean squared error of predictions `horizon` samples ahead, relative to the variance
-/// of the samples; on the part of the logs that was not used to estimate.
+/// of the samples, at least [`ROUNDING`] of their mean square; on the part of the logs that was not used to estimate.
 pub(super) fn relative_errors(
     logs: &[Log],
     model: &IdentifiedModel,
@@ -48,7 +51,8 @@ pub(super) fn relative_errors(
         let deviations = centred(&samples.into());
         for output in 0..outputs {
             errors[output] += differences.row(output).norm_squared();
-            variances[output] += deviations.row(output).norm_squared();
+            let rounding = ROUNDING * samples.row(output).norm_squared();
+            variances[output] += deviations.row(output).norm_squared().max(rounding);
         }
     }
     let ratio = |(error, variance): (&f64, &f64)| error / variance.max(f64::MIN_POSITIVE);
@@ -83,4 +87,27 @@ fn can_be_simulated(logs: &[Log], model: &IdentifiedModel) -> Result<bool, contr
     #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
     let growth = radius.ln() * longest as f64;
     Ok(growth < GROWTH)
+}
+
+#[cfg(test)]
+mod tests {
+    use control::identification::{Record, Subspace, Windows};
+
+    use super::*;
+    use crate::init::draft::Named;
+
+    /// y[k+1] = 3 + u[k] / 2, with a command that stays the same in the last quarter.
+    #[test]
+    fn an_exact_model_of_a_measurement_at_rest_has_the_full_fit() -> Result<(), control::Error> {
+        let command = |k: usize| if k < 280 { f64::from(u8::from(k * k % 7 < 3)) } else { 0.7 };
+        let inputs = DMatrix::from_fn(1, 400, |_, k| command(k));
+        let outputs = DMatrix::from_fn(1, 400, |_, k| 3.0 + 0.5 * command(k.saturating_sub(1)));
+        let record = Record { inputs, outputs };
+        let windows = Windows::new(&record, 3, 0..300)?;
+        let model = Subspace::new(&windows, false)?.model(1)?;
+        let log = Log { period: 1.0, inputs: Vec::new(), outputs: vec![Named::default()], record };
+        let fit = fits(&[log], &model)?.swap_remove(0).predicted;
+        assert!((fit - 100.0).abs() < 0.01, "{fit}");
+        Ok(())
+    }
 }

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::init::draft::Named;
 use crate::init::log::estimate::Estimate;
-use crate::init::log::fit::{Fit, estimation};
+use crate::init::log::fit::{Fit, estimation, validation};
 use crate::init::log::read::Log;
 
 /// The fewest samples of a log.
@@ -95,6 +95,7 @@ pub(super) fn warnings(
         Ok(_) => {}
         Err(reason) => warnings.push(format!("the uncertainty of the plant is unknown: {reason}")),
     }
+    warnings.extend(rest(logs));
     warnings.extend(excitation(logs, estimate));
     if estimate.continuous.d.amax() > 0.0 {
         warnings.push(
@@ -105,6 +106,19 @@ pub(super) fn warnings(
     }
     warnings.extend(sampling(estimate, logs[0].period));
     warnings
+}
+
+/// Returns a warning if no command changes in the samples that choose the order and judge the estimate.
+fn rest(logs: &[Log]) -> Option<String> {
+    let is_constant = |log: &Log| {
+        let commands = log.record.inputs.columns_range(validation(log));
+        commands.row_iter().all(|row| row.max() - row.min() <= CONSTANT * row.amax())
+    };
+    logs.iter().all(is_constant).then(|| {
+        "no command changes in the last quarter of the log, which chooses the order and judges the estimate: a log with \
+         changes up to its end, or --order, is needed"
+            .to_owned()
+    })
 }
 
 /// Returns a warning if the commands excite fewer directions than the order needs.
@@ -138,4 +152,25 @@ fn sampling(estimate: &Estimate, period: f64) -> Option<String> {
              would identify it more precisely"
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use control::identification::Record;
+
+    use super::*;
+
+    #[test]
+    fn a_log_whose_commands_rest_in_the_last_quarter_is_doubtful() {
+        let log = |last_change: usize| {
+            let command = |k: usize| if k < last_change { 2.0 } else { 2.5 };
+            let inputs = DMatrix::from_fn(1, 200, |_, k| command(k));
+            let record = Record { outputs: inputs.clone(), inputs };
+            Log { period: 1.0, inputs: Vec::new(), outputs: Vec::new(), record }
+        };
+        // The last quarter starts with sample 150.
+        assert!(rest(&[log(150)]).is_some());
+        assert_eq!(rest(&[log(151)]), None);
+        assert_eq!(rest(&[log(150), log(199)]), None);
+    }
 }
