@@ -188,6 +188,15 @@ def test_arrays_of_one_dimension_and_decimal_commas_are_the_same_plant(aso_ftc, 
     assert done.returncode == 2 and "found none; those in a struct are not read" in done.stderr
 
 
+def test_matlab_variables_that_are_not_read_are_a_warning(aso_ftc, tmp_path):
+    a, b, c = PLANTS["double integrator"]
+    savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c, "E": np.diag([1.0, 2.0]), "dt": 0.1})
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    message = "of the file only A, B, C, D, Ts are read, not E, dt"
+    assert done.returncode == 0 and f"warning: {message}" in done.stderr, done.stderr
+    assert f"# Warning: {message}" in (tmp_path / "plant.toml").read_text(encoding="utf-8")
+
+
 def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_path):
     a, b, c = PLANTS["helicopter"]
     savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c[:1]})

@@ -27,7 +27,7 @@ pub struct NewPlantFile {
     pub text: String,
     /// Why no controller was found for the plant, if there is none.
     pub refusal: Option<String>,
-    /// What may make an identified plant useless.
+    /// What may make the plant useless.
     pub warnings: Vec<String>,
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Draft {
     pub(super) identification: Identification,
 }
 
-/// What an identification found out about its plant; empty for other plants.
+/// What an identification found out about its plant; of other plants only warnings.
 #[derive(Default)]
 pub(super) struct Identification {
     /// Time, s, between the samples of the log.
@@ -131,7 +131,7 @@ impl Draft {
         for warning in &self.identification.warnings {
             let _ = writeln!(text, "# Warning: {warning}.");
         }
-        if !self.identification.notes.is_empty() {
+        if !self.identification.notes.is_empty() || !self.identification.warnings.is_empty() {
             *text += "\n";
         }
         if let Some(period) = self.identification.sample_time {

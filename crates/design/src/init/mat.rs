@@ -9,7 +9,11 @@ use nalgebra::DMatrix;
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named, shown};
 
-/// Reads A, B and C, D if the file has it, and the sample time `Ts` if the matrices are sampled.
+/// The variables that are read.
+const READ: [&str; 5] = ["A", "B", "C", "D", "Ts"];
+
+/// Reads A, B and C, D if the file has it, and the sample time `Ts` if the matrices are sampled; warns of other numeric
+/// variables, such as E of a descriptor system or `dt`.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let file = File::open(path).map_err(Error::file("read", path))?;
     let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
@@ -63,8 +67,21 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         measurements: numbered("y", p),
         left_out: Vec::new(),
         has_feedthrough: d.amax() > 0.0,
-        identification: Identification::default(),
+        identification: Identification {
+            warnings: not_read(&content).into_iter().collect(),
+            ..Identification::default()
+        },
         model: Model::Matrices { a, b, c, d, states: numbered("x", n), sampled },
+    })
+}
+
+/// Returns the warning of numeric variables that are not read; None if there are none.
+fn not_read(content: &MatFile) -> Option<String> {
+    let names = content.arrays().iter().map(Array::name);
+    let others: Vec<_> = names.filter(|name| !name.is_empty() && !READ.contains(name)).collect();
+    (!others.is_empty()).then(|| {
+        let (read, others) = (READ.join(", "), others.join(", "));
+        format!("of the file only {read} are read, not {others}; expected a plant without these")
     })
 }
 
