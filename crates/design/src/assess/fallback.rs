@@ -219,8 +219,8 @@ pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String
     let mut amber = |text: String| reasons.push((Level::Amber, text + " (amber)"));
     if let (Err(reason), false) = (&report.whole, report.whole_left_out) {
         amber(format!(
-            "the fall-back is not proven for losses that change with time: {reason}; constant losses \
-             are stable"
+            "the fall-back is not proven for losses that change with time: {reason}; {LOSSES} constant \
+             losses of each actuator alone were tested, and are stable"
         ));
     }
     for case in &report.cases {
@@ -240,4 +240,31 @@ pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String
         }
     }
     reasons
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::family::CommonCertificate;
+
+    #[test]
+    fn the_constant_losses_that_were_tested_are_counted() {
+        let report = FallbackReport {
+            loss: 0.5,
+            method: String::new(),
+            decay: 1.0,
+            compensates: true,
+            k_x: Vec::new(),
+            gain_norm: 1.0,
+            intact_gain_norm: 1.0,
+            intact_decay: 1.0,
+            feedback: CommonCertificate { p: Vec::new(), margin: 1.0 },
+            whole: Err("no P was found".to_owned()),
+            whole_left_out: false,
+            cases: Vec::new(),
+        };
+        let reasons = reasons(&report, 4.0);
+        let expected = "no P was found; 10 constant losses of each actuator alone were tested";
+        assert!(reasons[0].1.contains(expected), "{}", reasons[0].1);
+    }
 }
