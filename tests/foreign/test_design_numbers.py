@@ -309,6 +309,10 @@ def test_the_responses_to_changes_of_faults_are_those_of_scipy(case):
             assert values[::7] == pytest.approx(expected, abs=band), curve["name"]
             assert abs(values).max() <= abs(curve["peak"]) * (1 + 1e-12)
             assert abs(values).max() == pytest.approx(abs(curve["peak"]), rel=1e-2)
+            if curve["settling_time"] is None:
+                # Only rounding moves the signal.
+                assert abs(values).max() <= 1e-12 * steps["size"], curve["name"]
+                continue
             distance = abs(values - values[-1])
             last = np.flatnonzero(distance > 0.02 * distance.max())[-1]
             assert times[last] <= curve["settling_time"] <= times[last + 1]

@@ -169,6 +169,7 @@ pub(super) fn curve<'a>(
         rounded(curve.peak_time),
         rounded(curve.settling_time)
     );
+    let settled = Some(curve.settling_time).filter(|time| time.is_finite()).map(Mark::At);
     let place = plots.add(Plot {
         id,
         quantity: Quantity::Time,
@@ -177,7 +178,7 @@ pub(super) fn curve<'a>(
         title,
         places: &curve.times,
         lines: vec![Line { name, values: &curve.values }],
-        marks: size.map(Mark::Size).into_iter().chain([Mark::At(curve.settling_time)]).collect(),
+        marks: size.map(Mark::Size).into_iter().chain(settled).collect(),
     });
     html! {
         figure {

@@ -220,10 +220,12 @@ fn slowest(name: &str, system: &Loop, plane: Plane) -> Markup {
     }
 }
 
-/// Shows the longest settling time of all curves after changes of faults; nothing without curves.
+/// Shows the longest settling time of all curves after changes of faults; nothing without curves that settle.
 fn settling(report: &Report) -> Markup {
     let curves = report.steps.iter().flat_map(|step| &step.curves);
-    let last = curves.max_by(|a, b| a.settling_time.total_cmp(&b.settling_time));
+    // A signal that only rounding moves never settles.
+    let settled = curves.filter(|curve| curve.settling_time.is_finite());
+    let last = settled.max_by(|a, b| a.settling_time.total_cmp(&b.settling_time));
     html! {
         @if let Some(curve) = last {
             (key("Settled after a change of a fault", &html! {

@@ -295,7 +295,8 @@ pub struct EstimationErrors {
     /// Lasting error of a constant fault of 1.
     pub constant: f64,
     /// Time in s after a sudden fault of 1 from which the distance of the error from its lasting value is at most 2 %
-    /// of the largest such distance.
+    /// of the largest such distance; null if it never is.
+    #[schemars(with = "Option<f64>")]
     pub step_settling: f64,
     /// Largest error after a sudden fault of 1.
     pub step_peak: f64,
@@ -457,7 +458,9 @@ pub struct ReferenceStep {
     pub rise_time: Option<f64>,
     /// Largest value beyond the reference, as a part of the step; 0 if there is none.
     pub overshoot: f64,
-    /// Settling time in s: from then on the output that follows differs from the reference by at most 2 % of the step.
+    /// Settling time in s: from then on the output that follows differs from the reference by at most 2 % of the step;
+    /// null if it never settles.
+    #[schemars(with = "Option<f64>")]
     pub settling_time: f64,
     /// The difference of the reference from the output after a long time, as a part of the step.
     pub steady_state_error: f64,
@@ -500,7 +503,8 @@ pub struct Curve {
     /// Time of the largest absolute value, in s.
     pub peak_time: f64,
     /// Settling time in s: from then on the distance of the signal from its final value is at most 2 % of the largest
-    /// such distance.
+    /// such distance; null if it never is, as in a signal that only rounding moves.
+    #[schemars(with = "Option<f64>")]
     pub settling_time: f64,
     /// Times in s.
     pub times: Vec<f64>,

@@ -11,8 +11,8 @@ pub struct Transient {
     pub peak: f64,
     /// The time of the peak.
     pub peak_time: f64,
-    /// The time after which z stays within the band around its final value; zero if it always does, the last time
-    /// of the response if it is outside to the end.
+    /// The time after which z stays within the band around its final value; zero if it always does, infinite if it
+    /// is outside to the end of the response.
     pub settling_time: f64,
     /// The limit of z for large times.
     pub final_value: f64,
@@ -71,10 +71,13 @@ impl TimeResponse {
         Some((self.time[k] + part * step, begin + rise * (end - begin) + curve))
     }
 
-    /// The time at which z enters the band for the last time; k is the last point outside.
+    /// The time at which z enters the band for the last time, infinite if it does not; k is the last point outside.
     fn entry(&self, output: usize, k: usize, band: f64) -> f64 {
-        if self.slope.ncols() == 0 || k + 1 == self.time.len() {
-            return self.time[(k + 1).min(self.time.len() - 1)];
+        if k + 1 == self.time.len() {
+            return f64::INFINITY;
+        }
+        if self.slope.ncols() == 0 {
+            return self.time[k + 1];
         }
         let distance = |k: usize| (self.output[(output, k)] - self.final_value[output]).abs();
         let part = (distance(k) - band) / (distance(k) - distance(k + 1));

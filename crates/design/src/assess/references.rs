@@ -248,7 +248,7 @@ fn reaches(points: &[(f64, f64)], level: f64) -> Option<f64> {
     Some(before + (level - low) / (value - low) * (time - before))
 }
 
-/// Returns the time after which the points stay within the band around one; the last time if the last point is outside.
+/// Returns the time after which the points stay within the band around one; infinite if the last point is outside.
 fn settled(points: &[(f64, f64)]) -> f64 {
     let outside = |point: &(f64, f64)| (point.1 - 1.0).abs() > SETTLED;
     let Some(last) = points.iter().rposition(outside) else {
@@ -256,7 +256,7 @@ fn settled(points: &[(f64, f64)]) -> f64 {
     };
     let (time, value) = points[last];
     let Some((after, inside)) = points.get(last + 1) else {
-        return time;
+        return f64::INFINITY;
     };
     let edge = if value > 1.0 { 1.0 + SETTLED } else { 1.0 - SETTLED };
     time + ((edge - value) / (inside - value)).clamp(0.0, 1.0) * (after - time)
@@ -328,5 +328,6 @@ mod tests {
         assert!((rise - (1.0 + 0.4 / 0.6 - 0.2)).abs() < 1e-12, "{rise}");
         assert!((settled(&points) - (2.0 + 0.08 / 0.09)).abs() < 1e-12);
         assert_eq!(rise_time(&points[..2]), None);
+        assert!(settled(&points[..3]).is_infinite());
     }
 }

@@ -252,7 +252,7 @@ pub(crate) fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix
 }
 
 /// Returns the value with the largest modulus, its time, and the time from which the points stay
-/// within the band around the final value.
+/// within the band around the final value, infinite if the last point is outside.
 fn transient(points: &[(f64, f64)], final_value: f64) -> (f64, f64, f64) {
     let largest = |best: (f64, f64), point: &(f64, f64)| {
         if point.1.abs() > best.1.abs() { *point } else { best }
@@ -261,7 +261,8 @@ fn transient(points: &[(f64, f64)], final_value: f64) -> (f64, f64, f64) {
     let distance = |point: &(f64, f64)| (point.1 - final_value).abs();
     let band = SETTLED * points.iter().map(distance).fold(0.0, f64::max);
     let outside = points.iter().rposition(|point| distance(point) > band);
-    let settled = outside.map_or(0.0, |at| points[(at + 1).min(points.len() - 1)].0);
+    let inside = |at: usize| points.get(at + 1).map_or(f64::INFINITY, |point| point.0);
+    let settled = outside.map_or(0.0, inside);
     (peak, peak_time, settled)
 }
 

@@ -40,6 +40,15 @@ fn a_lag_settles_after_the_logarithm_of_the_band() {
     assert!((actual.final_value - 2.0).abs() < 1e-15);
 }
 
+/// The lag goes to 2, not to 3, and is never within 2 % of 3, the largest distance from it.
+#[test]
+fn a_response_outside_of_the_band_to_its_end_does_not_settle() {
+    let lag = single(matrix(1, 1, &[-5.0]), &[10.0], &[1.0], CONTINUOUS);
+    let mut trace = step_response(&lag, 0).unwrap();
+    trace.final_value[0] = 3.0;
+    assert!(trace.transient(0, 0.02).settling_time.is_infinite());
+}
+
 /// 1 - e^-t + 1 - e^(-1e5 t): both parts are resolved, with a few hundred points.
 #[test]
 fn fast_and_slow_parts_are_both_resolved() {
