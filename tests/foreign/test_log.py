@@ -185,6 +185,14 @@ def test_semicolons_with_decimal_commas_and_parquet_are_the_same_log(identify, t
     assert others == [first, first]
 
 
+def test_times_in_another_unit_are_the_same_times(identify, tmp_path):
+    signals = columns(*log(TANKS, noise=0.02))
+    first, _ = identify(write(tmp_path / "log.csv", signals))
+    for unit, seconds in (("ms", 1e-3), ("min", 60)):
+        other = {f"time [{unit}]": signals["time"] / seconds} | {name: signals[name] for name in signals if name != "time"}
+        assert identify(write(tmp_path / f"{unit}.csv", other))[0] == first
+
+
 def test_a_stated_order_is_used(identify, tmp_path):
     path = write(tmp_path / "log.csv", columns(*log(SHAFT, noise=0.01)))
     assert len(identify(path, "--order", 3)[0]["A"]) == 3
@@ -232,6 +240,11 @@ REFUSED = {
         "expected --inputs and --outputs, names of its columns valve1, valve2, y1, y2",
     ),
     "order": (lambda signals: None, ["--order", "0"], "order is 0"),
+    "unit": (
+        lambda signals: {name.replace("time", "time [K]"): column for name, column in signals.items()},
+        [],
+        "the time is in K, expected s or another unit of time",
+    ),
 }
 
 

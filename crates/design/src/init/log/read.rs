@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use control::identification::Record;
+use fmu_description::unit::{BaseUnit, Unit};
 use nalgebra::DMatrix;
 use results::Table;
 
@@ -78,9 +79,10 @@ impl Log {
         let columns = Columns(table);
         let (inputs, outputs) = columns.choose(options)?;
         let positions = [&inputs[..], &outputs[..]].concat();
+        let seconds = columns.seconds()?;
         let (mut times, mut values) = (Vec::new(), Vec::new());
         let visited = table.visit(&positions, &mut |time, row| {
-            times.push(time);
+            times.push(seconds * time);
             values.extend_from_slice(row);
         });
         visited.map_err(|error| files::sentence(&error))?;
@@ -115,6 +117,16 @@ impl Columns<'_> {
         let column = &self.0.columns()[position];
         let name = named(&column.name);
         Named { unit: column.unit.clone().or(name.unit), ..name }
+    }
+
+    /// Returns the length in s of the unit of the times, 1 if none is stated; an error if it is no unit of time.
+    fn seconds(&self) -> Result<f64, String> {
+        let Some(text) = self.name(self.0.time()).unit else { return Ok(1.0) };
+        let second = BaseUnit { s: 1, ..BaseUnit::default() };
+        let base = Unit::parse(&text).ok().and_then(|unit| unit.base);
+        let conversion = base.and_then(|base| base.conversion(&second));
+        let refusal = || format!("the time is in {text}, expected s or another unit of time");
+        conversion.map(|(factor, _)| factor).ok_or_else(refusal)
     }
 
     /// Returns the positions of all columns but the time.
