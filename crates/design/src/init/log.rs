@@ -8,6 +8,7 @@ mod read;
 use std::path::PathBuf;
 
 use control::StateSpace;
+use fmu_description::unit::Unit;
 
 use crate::Error;
 use crate::init::draft::{Draft, Identification, Model, Named, shown};
@@ -86,16 +87,18 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     })
 }
 
-/// Returns the states: the measurements and, at the positions `rates`, their rates; without `rates` `x1`, `x2` and so
-/// on.
+/// Returns the states: the measurements and, at the positions `rates`, their rates, without a unit if FMI has none for
+/// it (degC/s); without `rates` `x1`, `x2` and so on.
 fn states(rates: Option<&[usize]>, outputs: &[Named], order: usize) -> Vec<Named> {
     let Some(rates) = rates else {
         let one = |at| Named { name: format!("x{at}"), ..Named::default() };
         return (1..=order).map(one).collect();
     };
+    let per_second =
+        |unit: &String| Some(format!("{unit}/s")).filter(|unit| Unit::parse(unit).is_ok());
     let rate = |output: &Named| Named {
         name: format!("{}_rate", output.name),
-        unit: output.unit.as_ref().map(|unit| format!("{unit}/s")),
+        unit: output.unit.as_ref().and_then(per_second),
         ..Named::default()
     };
     outputs.iter().cloned().chain(rates.iter().map(|&at| rate(&outputs[at]))).collect()
@@ -128,4 +131,23 @@ fn notes(logs: &[Log], estimate: &Estimate, fits: &[Fit]) -> Vec<String> {
 /// Rounds to eight significant digits, which are more than an identification determines.
 fn rounded(value: f64) -> f64 {
     format!("{value:.7e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plant file with the unit degC/s is refused: degC has an offset.
+    #[test]
+    fn the_rate_of_a_temperature_in_degrees_celsius_has_no_unit() {
+        let named = |name: &str, unit: &str| Named {
+            name: name.to_owned(),
+            unit: Some(unit.to_owned()),
+            ..Named::default()
+        };
+        let outputs = [named("oven", "degC"), named("valve", "m")];
+        let states = states(Some(&[0, 1]), &outputs, 4);
+        let units: Vec<_> = states.iter().map(|state| state.unit.as_deref()).collect();
+        assert_eq!(units, [Some("degC"), Some("m"), None, Some("m/s")]);
+    }
 }
