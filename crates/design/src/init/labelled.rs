@@ -52,7 +52,8 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
             })
         };
         let values = cells[1..].iter().zip(&columns).map(number).collect::<Result<Vec<_>, _>>()?;
-        rows.push((named(derivative(&cells[0])), values));
+        let row = named(&cells[0]);
+        rows.push((Named { name: derivative(&row.name).to_owned(), ..row }, values));
     }
     split(&rows, &columns, file)
 }
@@ -97,10 +98,10 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
     })
 }
 
-/// Returns x for `der(x)` and `x'`; other cells are returned unchanged.
-fn derivative(cell: &str) -> &str {
-    let inner = cell.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
-    inner.or_else(|| cell.strip_suffix('\'')).unwrap_or(cell)
+/// Returns x for `der(x)` and `x'`; other names are returned unchanged.
+fn derivative(name: &str) -> &str {
+    let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
+    inner.or_else(|| name.strip_suffix('\'')).unwrap_or(name)
 }
 
 /// Reads a signal from a cell: `name` or `name [unit]`.
@@ -124,5 +125,18 @@ mod tests {
     fn a_log_in_a_file_of_tables_is_told_the_ending_of_logs() {
         let refused = table("time\tu\ty\n0\t1\t2\n", "log.tsv").err().unwrap();
         assert!(refused.ends_with("a .csv file with a column `time`"), "{refused}");
+    }
+
+    /// x_1' = x_2 and x_2' = -0.5 x_2 + 0.5 u, the first with the unit of the derivative.
+    #[test]
+    fn a_derivative_with_a_unit_is_that_of_a_state() {
+        let text = ",position [m],speed [m/s],force [N]\nder(position) [m/s],0,1,0\n\
+                    speed,0,-0.5,0.5\ny [m],1,0,0\n";
+        let Model::Matrices { a, b, c, .. } = table(text, "trolley.csv").unwrap().model else {
+            panic!("matrices")
+        };
+        assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
+        assert_eq!(b, DMatrix::from_row_slice(2, 1, &[0.0, 0.5]));
+        assert_eq!(c, DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
     }
 }
