@@ -98,15 +98,22 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
     })
 }
 
-/// Returns x for `der(x)` and `x'`; other names are returned unchanged.
+/// Returns x for `der(x)` and `x'`; other names, also those in apostrophes, are returned unchanged.
 fn derivative(name: &str) -> &str {
     let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
-    inner.or_else(|| name.strip_suffix('\'')).unwrap_or(name)
+    let is_quoted = name.starts_with('\'') && !name.ends_with("''");
+    inner.or_else(|| name.strip_suffix('\'').filter(|_| !is_quoted)).unwrap_or(name)
 }
 
-/// Reads a signal from a cell: `name` or `name [unit]`.
+/// Reads a signal from a cell: `name` or `name [unit]`. Digits in brackets directly behind the name, `q[2]` or
+/// `q[1,2]`, are the index of an element.
 pub(super) fn named(cell: &str) -> Named {
+    let is_index = |name: &str, text: &str| {
+        let all = text.split(',').all(|index| index.parse::<u32>().is_ok());
+        all && !name.is_empty() && !name.ends_with(char::is_whitespace)
+    };
     let parts = cell.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
+    let parts = parts.filter(|(name, text)| !is_index(name, text));
     let (name, unit) =
         parts.map_or((cell, None), |(name, unit)| (name, Some(unit.trim().to_owned())));
     Named {
@@ -138,5 +145,20 @@ mod tests {
         assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
         assert_eq!(b, DMatrix::from_row_slice(2, 1, &[0.0, 0.5]));
         assert_eq!(c, DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
+    }
+
+    #[test]
+    fn an_index_is_no_unit_and_an_apostrophe_around_a_name_no_derivative() {
+        for (cell, name, unit) in [
+            ("q[2]", "q[2]", None),
+            ("q[1,2] [m]", "q[1,2]", Some("m")),
+            ("part [1]", "part", Some("1")),
+            ("speed[m/s]", "speed", Some("m/s")),
+        ] {
+            let signal = named(cell);
+            assert_eq!((signal.name.as_str(), signal.unit.as_deref()), (name, unit), "{cell}");
+        }
+        let names = ["x'", "'level 1'", "'level 1''", "der('level 1')"].map(derivative);
+        assert_eq!(names, ["x", "'level 1'", "'level 1'", "'level 1'"]);
     }
 }
