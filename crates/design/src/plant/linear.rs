@@ -8,6 +8,7 @@ use control::faults::{Fault as Model, FaultEntry, FaultKind};
 use control::hold::zero_order_hold;
 use control::rank::Mode;
 use control::{Domain, Error, StateSpace};
+use fmu_description::unit::Unit;
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, Method, linearise};
 use nalgebra::{DMatrix, DVector};
@@ -26,6 +27,9 @@ pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Part of the largest entry of a row of C below which an entry of D or G counts as zero.
 const NEGLIGIBLE: f64 = 1e-9;
+
+/// Relative difference of two units, and distance of their zeros, below which they are the same.
+const SAME_UNIT: f64 = 1e-6;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
 /// known in its samples only.
@@ -247,6 +251,8 @@ fn linearised(
     fmu: &plant_file::PlantFmu,
 ) -> Result<LinearPlant, crate::Error> {
     let (model, linearised) = linearisation(file, fmu)?;
+    check_units(file, &file.actuators, &linearised.inputs)?;
+    check_units(file, &file.measurements, &linearised.outputs)?;
     let known = |signal: &linearise::Signal| Signal {
         unit: signal.unit.clone(),
         operating: Some(signal.value),
@@ -286,6 +292,33 @@ fn linearised(
         delays,
         delay_order: file.delay_order,
     })
+}
+
+/// Checks that the units that the file states for signals of the FMU are those of the FMU, in which the matrices are.
+fn check_units(
+    file: &PlantFile<'_>,
+    signals: &[Signal],
+    from_fmu: &[linearise::Signal],
+) -> Result<(), PlaceError> {
+    let base = |text: &String| Unit::parse(text).ok()?.base;
+    for (signal, known) in signals.iter().zip(from_fmu) {
+        let (Some(stated), Some(unit)) = (&signal.unit, &known.unit) else { continue };
+        let Some((one, other)) = base(stated).zip(base(unit)) else { continue };
+        let is_same = one.conversion(&other).is_some_and(|(factor, offset)| {
+            (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
+        });
+        if !is_same {
+            let name = &signal.name;
+            let message =
+                format!("the FMU has `{name}` in {unit}; expected this unit, found {stated}");
+            let place = signal.places[0].clone();
+            return Err(place.map_or_else(
+                || file.error(&["actuators", "measurements"], &message),
+                |place| file.error_at(&place, &message),
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn system([a, b, c, d]: [&DMatrix<f64>; 4], domain: Domain) -> StateSpace {
@@ -501,6 +534,10 @@ pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
     use super::*;
 
     fn row(entries: &[f64]) -> DMatrix<f64> {
@@ -552,5 +589,27 @@ mod tests {
     fn the_inaccuracy_at_a_kink_is_half_of_its_jump_relative_to_the_row() {
         let linearised = differences([&[0.0], &[0.0; 2], &[0.0]], [1.0, 0.0]);
         assert_eq!(inaccuracy(&linearised), Some(0.5));
+    }
+
+    /// N m and N.m are one unit; rad and deg, K and degC are not.
+    #[test]
+    fn a_signal_of_an_fmu_has_the_unit_of_the_fmu() {
+        let refusal = |stated: &str, unit: &str| {
+            let text = format!(
+                "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+                 measurements = [{{ name = \"y\", unit = \"{stated}\" }}]\n"
+            );
+            let source = Source::new(Path::new("plant.toml"), text);
+            let parsed = source.parse().unwrap();
+            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+            let (name, unit) = ("y".to_owned(), Some(unit.to_owned()));
+            let output = linearise::Signal { name, unit, value: 0.0, typical: 1.0 };
+            let refusal = check_units(&file, &file.measurements, &[output]).err();
+            refusal.map(|error| error.message().to_owned())
+        };
+        assert_eq!(refusal("N.m", "N m"), None);
+        let message = "the FMU has `y` in rad; expected this unit, found deg";
+        assert_eq!(refusal("deg", "rad").as_deref(), Some(message));
+        assert!(refusal("degC", "K").is_some() && refusal("m", "s").is_some());
     }
 }
