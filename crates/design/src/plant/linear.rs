@@ -294,20 +294,24 @@ fn linearised(
     })
 }
 
+/// Whether two units are the same, or FMI does not know one of them.
+pub(crate) fn is_one_unit(one: &str, other: &str) -> bool {
+    let base = |text: &str| Unit::parse(text).ok()?.base;
+    let Some((one, other)) = base(one).zip(base(other)) else { return true };
+    one.conversion(&other).is_some_and(|(factor, offset)| {
+        (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
+    })
+}
+
 /// Checks that the units that the file states for signals of the FMU are those of the FMU, in which the matrices are.
 fn check_units(
     file: &PlantFile<'_>,
     signals: &[Signal],
     from_fmu: &[linearise::Signal],
 ) -> Result<(), PlaceError> {
-    let base = |text: &String| Unit::parse(text).ok()?.base;
     for (signal, known) in signals.iter().zip(from_fmu) {
         let (Some(stated), Some(unit)) = (&signal.unit, &known.unit) else { continue };
-        let Some((one, other)) = base(stated).zip(base(unit)) else { continue };
-        let is_same = one.conversion(&other).is_some_and(|(factor, offset)| {
-            (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
-        });
-        if !is_same {
+        if !is_one_unit(stated, unit) {
             let name = &signal.name;
             let message =
                 format!("the FMU has `{name}` in {unit}; expected this unit, found {stated}");

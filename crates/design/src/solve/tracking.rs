@@ -13,7 +13,7 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use crate::plant::linear::LinearPlant;
+use crate::plant::linear::{LinearPlant, is_one_unit};
 use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::references::References;
@@ -53,8 +53,8 @@ pub(crate) enum TrackingAction {
     Feedforward(DMatrix<f64>),
 }
 
-/// Checks that the plant can hold each reference at every constant value, and that integral action with `h_infinity`
-/// has a required decay rate.
+/// Checks that the reference of a measurement has its unit, that the plant can hold each reference at every constant
+/// value, and that integral action with `h_infinity` has a required decay rate.
 pub(crate) fn check_references(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -62,6 +62,21 @@ pub(crate) fn check_references(
     let Some(References { signals, h, places, integral, .. }) = &file.references else {
         return Ok(());
     };
+    for ((signal, row), place) in signals.iter().zip(h.row_iter()).zip(places) {
+        let mut terms = row.iter().zip(&linear.measurements).filter(|(weight, _)| **weight != 0.0);
+        if let (Some((weight, measurement)), None) = (terms.next(), terms.next())
+            && (weight - 1.0).abs() == 0.0
+            && let (Some(stated), Some(unit)) = (&signal.unit, &measurement.unit)
+            && !is_one_unit(stated, unit)
+        {
+            let message = format!(
+                "the measurement `{}` is in {unit}, and its reference is compared with it; expected this unit, found \
+                 {stated}",
+                measurement.name
+            );
+            return Err(file.error_at(place, message));
+        }
+    }
     let count = signals.len();
     let names = signal_names(signals);
     let commands = linear.actuators.len();
@@ -295,5 +310,34 @@ impl DesignLoop {
         };
         let whole = complete_controller(plant, gains, filter, domain)?;
         Ok(Self { plant: faulty, controller: whole.commands })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
+    use super::*;
+
+    /// A combination has a unit of its own: 0.001 of millimetres are metres.
+    #[test]
+    fn the_reference_of_a_measurement_has_its_unit() {
+        let refusal = |track: &str| {
+            let text = format!(
+                "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+                 measurements = [{{ name = \"y\", unit = \"mm\" }}]\nreference.track = [{{ {track} }}]\n"
+            );
+            let source = Source::new(Path::new("plant.toml"), text);
+            let parsed = source.parse().unwrap();
+            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+            let refusal = check_references(&file, &LinearPlant::of(&file).unwrap()).err();
+            refusal.map(|error| error.message().to_owned())
+        };
+        assert_eq!(refusal("measurement = \"y\", unit = \"mm\""), None);
+        assert_eq!(refusal("combination = { y = 0.001 }, name = \"r\", unit = \"m\""), None);
+        let message = refusal("measurement = \"y\", unit = \"m\"").unwrap();
+        assert!(message.ends_with("expected this unit, found m"), "{message}");
     }
 }
