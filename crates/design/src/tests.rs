@@ -30,7 +30,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 65] = [
+const REFUSALS: [(&str, &str, &str); 66] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -127,6 +127,11 @@ const REFUSALS: [(&str, &str, &str); 65] = [
         "C = ",
         "faults = [{ name = \"f\", sensor = \"y1\", loss_of = \"u1\" }]\nC = ",
         "a fault has only one of actuator, sensor, loss_of, input",
+    ),
+    (
+        "C = ",
+        "actuators = [{ name = \"u\", unit = \"N\" }]\nfaults = [{ name = \"f\", actuator = \"u\", unit = \"kN\" }]\nC = ",
+        "4:48: faults[1].unit: the fault adds to a signal in N, found kN",
     ),
     ("C = ", "states = [\"p\", \"p\"]\nC = ", "3:16: states[2]: the name `p` is there twice"),
     ("C = ", "states = [\"p\"]\nC = ", "3:10: states: expected 2 states, the rows of A, found 1"),

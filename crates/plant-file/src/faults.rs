@@ -4,7 +4,7 @@ use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::matrix;
 use crate::read::{is_first, positive, positive_within, refuse};
-use crate::signals::{Signal, description, name, position, positions, unit};
+use crate::signals::{Signal, description, is_one_unit, name, position, positions, unit};
 
 /// The assumed dynamics of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,13 +151,20 @@ fn fault(
     let table = entry.table()?;
     table.allow(&FAULT)?;
     let entry_point = entry_point(&table, actuators, measurements, column)?;
-    let unit = unit(&table)?.or_else(|| match entry_point {
-        EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-            actuators[at].unit.clone()
-        }
-        EntryPoint::Sensor(at) => measurements[at].unit.clone(),
+    let signal = match entry_point {
+        EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => Some(&actuators[at]),
+        EntryPoint::Sensor(at) => Some(&measurements[at]),
         EntryPoint::Column(_) | EntryPoint::Input(_) => None,
-    });
+    };
+    let of_signal = signal.and_then(|signal| signal.unit.clone());
+    let stated = unit(&table)?;
+    if let (Some(stated), Some(expected), Some(entry)) = (&stated, &of_signal, table.get("unit"))
+        && !is_one_unit(stated, expected)
+    {
+        let message = format!("the fault adds to a signal in {expected}, found {stated}");
+        return Err(entry.error(message));
+    }
+    let unit = stated.or(of_signal);
     Ok(Fault {
         name: name(&table.require("name", "the name of the fault")?)?,
         unit,

@@ -154,6 +154,19 @@ pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     }
 }
 
+/// Relative difference of two units, and distance of their zeros, below which they are the same.
+const SAME_UNIT: f64 = 1e-6;
+
+/// Whether two units are the same, or FMI does not know one of them.
+#[must_use]
+pub fn is_one_unit(one: &str, other: &str) -> bool {
+    let base = |text: &str| Unit::parse(text).ok()?.base;
+    let Some((one, other)) = base(one).zip(base(other)) else { return true };
+    one.conversion(&other).is_some_and(|(factor, offset)| {
+        (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
+    })
+}
+
 /// Reads `delay_order`, the number of states with which the observer approximates each delay; an error if no signal has
 /// a delay.
 pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize, PlaceError> {

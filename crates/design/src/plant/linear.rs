@@ -8,7 +8,6 @@ use control::faults::{Fault as Model, FaultEntry, FaultKind};
 use control::hold::zero_order_hold;
 use control::rank::Mode;
 use control::{Domain, Error, StateSpace};
-use fmu_description::unit::Unit;
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, Method, linearise};
 use nalgebra::{DMatrix, DVector};
@@ -20,16 +19,13 @@ use plant_file::detection::{Disturbance, DisturbanceEntry};
 use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
 use plant_file::pid::Pid;
 use plant_file::requirements::Requirement;
-use plant_file::signals::Signal;
+use plant_file::signals::{Signal, is_one_unit};
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Part of the largest entry of a row of C below which an entry of D or G counts as zero.
 const NEGLIGIBLE: f64 = 1e-9;
-
-/// Relative difference of two units, and distance of their zeros, below which they are the same.
-const SAME_UNIT: f64 = 1e-6;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
 /// known in its samples only.
@@ -294,15 +290,6 @@ fn linearised(
     })
 }
 
-/// Whether two units are the same, or FMI does not know one of them.
-pub(crate) fn is_one_unit(one: &str, other: &str) -> bool {
-    let base = |text: &str| Unit::parse(text).ok()?.base;
-    let Some((one, other)) = base(one).zip(base(other)) else { return true };
-    one.conversion(&other).is_some_and(|(factor, offset)| {
-        (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
-    })
-}
-
 /// Checks that the units that the file states for signals of the FMU are those of the FMU, in which the matrices are.
 fn check_units(
     file: &PlantFile<'_>,
@@ -469,6 +456,15 @@ fn faults(
                 return Err(file.error_at(&fault.place, message).into());
             }
         };
+        if let (Some(stated), Some(unit)) = (&fault.unit, &signal.unit)
+            && !is_one_unit(stated, unit)
+        {
+            let message = format!(
+                "fault `{}`: the FMU has `{}` in {unit}; expected this unit, found {stated}",
+                fault.name, signal.name
+            );
+            return Err(file.error_at(&fault.place, message).into());
+        }
         fault.unit = fault.unit.take().or_else(|| signal.unit.clone());
         models.push(model);
     }

@@ -13,13 +13,12 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use crate::plant::linear::{LinearPlant, is_one_unit};
+use crate::plant::linear::LinearPlant;
 use control::blocks::beside;
 use plant_file::PlantFile;
 use plant_file::references::References;
 use plant_file::requirements::Requirement;
-use plant_file::signals::Signal;
-use plant_file::signals::signal_names;
+use plant_file::signals::{Signal, is_one_unit, signal_names};
 use plant_file::variants::Variant;
 
 /// Relative error of a constant reference below which it counts as reached.
