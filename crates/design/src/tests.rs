@@ -696,6 +696,20 @@ fn the_bound_of_the_rate_of_a_fault_is_per_second() {
     assert!(notes.ends_with(", at most 2, rate at most 0.5 per s, jumps by 1"), "{notes}");
 }
 
+/// The nominal trolley has a drag and a force, the member a spring, too; positions and speeds are exact.
+#[test]
+fn the_entries_of_a_member_of_a_family_vary_and_not_those_of_the_plant_of_the_file() {
+    let text = MASS.replace("[0, 0]]", "[0, -0.5]]") + "[[family]]\nA = [[0, 1], [-2, -0.5]]\n";
+    let limits = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
+    let varying = |file: &PlantFile<'_>| {
+        let report = report_within(file, &design(file).unwrap(), limits.clone()).unwrap();
+        let members = report.family.unwrap().members.into_iter();
+        let tolerances = members.filter_map(|member| member.margins?.tolerance);
+        tolerances.map(|tolerance| tolerance.entries).collect::<Vec<_>>()
+    };
+    assert_eq!(read(&text, varying).unwrap(), [2, 3]);
+}
+
 /// The proof ends before the case found, which is in one direction only; without time, or without an entry that varies, it says so.
 #[test]
 fn a_fraction_of_the_tolerances_is_proven() {

@@ -64,7 +64,7 @@ pub(crate) fn member(
     }
     let Margins { points, delay, hold, noise_together, .. } =
         margins(designed, &physical, &closed_loop, limits)?;
-    let tolerance = limits.parameters.is_empty().then(|| by_entries(designed, &physical, limits));
+    let tolerance = limits.parameters.is_empty().then(|| by_entries(linear, &physical, limits));
     let margins = MemberMargins {
         points,
         delay_margin: delay,

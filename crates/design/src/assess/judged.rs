@@ -30,7 +30,7 @@ impl Judged {
         let linear = &solution.linear;
         let points = loop_points(&closed, &linear.actuators, &linear.measurements)?;
         let within = |limits| {
-            by_entries(solution, &physical, limits).map(|tolerance| tolerance.is_unstable())
+            by_entries(linear, &physical, limits).map(|tolerance| tolerance.is_unstable())
         };
         let is_unstable = tolerances.map_or(Ok(false), within)?;
         Ok(Some(Self { points, is_unstable }))

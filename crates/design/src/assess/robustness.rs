@@ -69,7 +69,7 @@ pub(crate) fn robustness(
         },
         || {
             steps.run(Step::Tolerances, || match family {
-                None => by_entries(designed, &physical, limits),
+                None => by_entries(&designed.linear, &physical, limits),
                 Some(family) => {
                     tolerances::by_parameters(designed, &physical, limits, family, &slopes)
                 }

@@ -11,19 +11,20 @@ use crate::assess::matrices::of_plant;
 use crate::assess::robustness::Physical;
 use crate::plant::delays::JUDGED;
 use crate::plant::entries::{EntryTolerances, tolerances};
+use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
 use crate::report::robustness::{ToleranceResult, VaryingEntries};
 use crate::solve::solution::Solution;
 use plant_file::robustness::{MATRICES, RobustnessLimits};
 
-/// Examines the loop for plants whose matrices have other entries, within the tolerances. Returns the part of the
-/// random cases that is stable, none if no entry varies, and the worst case found.
+/// Examines the loop for plants whose matrices differ from those of `linear`, the plant of the loop, within the
+/// tolerances. Returns the part of the random cases that is stable, none if no entry varies, and the worst case found.
 pub(crate) fn by_entries(
-    designed: &Solution,
+    linear: &LinearPlant,
     physical: &Physical,
     limits: &RobustnessLimits,
 ) -> Result<ToleranceResult, crate::Error> {
-    let EntryTolerances { stated, placed } = tolerances(&designed.linear, JUDGED, limits);
+    let EntryTolerances { stated, placed } = tolerances(linear, JUDGED, limits);
     let family = EntryFamily::new(&physical.plant, &placed)?;
     let search = ToleranceSearch { family: &family, controller: &physical.controller };
     let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
@@ -34,7 +35,7 @@ pub(crate) fn by_entries(
     let entries = u32::try_from(stated.entries().count()).unwrap_or(u32::MAX);
     let stable = stable(&test).filter(|_| entries > 0);
     let varying = varying(&stated);
-    Ok(ToleranceResult { entries, varying, stable, ..tolerance_result(designed, limits, &test) })
+    Ok(ToleranceResult { entries, varying, stable, ..tolerance_result(linear, limits, &test) })
 }
 
 /// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
@@ -48,7 +49,7 @@ pub(super) fn by_parameters(
     let seed = u64::from(limits.seed);
     let test = tolerance_test(family, &physical.controller, limits.cases, seed)?;
     let parameters = family.report(&test.deviations, slopes);
-    Ok(ToleranceResult { parameters, ..tolerance_result(designed, limits, &test) })
+    Ok(ToleranceResult { parameters, ..tolerance_result(&designed.linear, limits, &test) })
 }
 
 /// Returns the entries that vary: one item for each entry, and for each group with a common factor.
@@ -77,11 +78,10 @@ fn stable(test: &ToleranceTest) -> Option<f64> {
 }
 
 fn tolerance_result(
-    designed: &Solution,
+    linear: &LinearPlant,
     limits: &RobustnessLimits,
     test: &ToleranceTest,
 ) -> ToleranceResult {
-    let linear = &designed.linear;
     let StateSpace { a, b, c, d, .. } = test.worst.clone();
     let worst = linear.of_plant(&[a, b, c, d]);
     ToleranceResult {
