@@ -29,9 +29,8 @@ impl Judged {
         let closed = physical.closed(&physical.controller)?;
         let linear = &solution.linear;
         let points = loop_points(&closed, &linear.actuators, &linear.measurements)?;
-        let within = |limits| {
-            by_entries(linear, &physical, limits).map(|tolerance| tolerance.is_unstable())
-        };
+        let within =
+            |limits| by_entries(linear, &physical, limits).map(|tolerance| tolerance.is_unstable());
         let is_unstable = tolerances.map_or(Ok(false), within)?;
         Ok(Some(Self { points, is_unstable }))
     }

@@ -134,7 +134,7 @@ mod tests {
         assert!(refused.ends_with("a .csv file with a column `time`"), "{refused}");
     }
 
-    /// x_1' = x_2 and x_2' = -0.5 x_2 + 0.5 u, the first with the unit of the derivative.
+    /// `x_1' = x_2` and `x_2' = -0.5 x_2 + 0.5 u`, the first with the unit of the derivative.
     #[test]
     fn a_derivative_with_a_unit_is_that_of_a_state() {
         let text = ",position [m],speed [m/s],force [N]\nder(position) [m/s],0,1,0\n\

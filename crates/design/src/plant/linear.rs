@@ -544,7 +544,7 @@ mod tests {
         DMatrix::from_row_slice(1, entries.len(), entries)
     }
 
-    /// x' = A x + 2 u_1 + u_2, y = x + D u + G f, with errors of these sizes of A, and of D and G.
+    /// `x' = A x + 2 u_1 + u_2`, `y = x + D u + G f`, with errors of these sizes of A, and of D and G.
     fn differences([a, d, g]: [&[f64]; 3], [of_a, of_direct]: [f64; 2]) -> Linearisation {
         let matrices = linearise::Matrices {
             a: row(a),
@@ -584,7 +584,7 @@ mod tests {
         assert_eq!(direct_terms(&linearised), [row(&[2.0, 0.0]), row(&[0.0])]);
     }
 
-    /// x' = |x| + 2 u_1 + u_2: the difference at 0 is 0, and may be off by 1, half of the largest entry.
+    /// `x' = |x| + 2 u_1 + u_2`: the difference at 0 is 0, and may be off by 1, half of the largest entry.
     #[test]
     fn the_inaccuracy_at_a_kink_is_half_of_its_jump_relative_to_the_row() {
         let linearised = differences([&[0.0], &[0.0; 2], &[0.0]], [1.0, 0.0]);
