@@ -33,7 +33,7 @@ pub struct ChannelMargins {
     /// The frequency of `phase`, in rad per unit of time; zero if |L| is never 1.
     pub phase_frequency: f64,
     /// The delay, in the unit of time, below which the loop is stable; infinite if |L| is never 1. In sampled
-    /// time it is exact for whole samples, see [`super::delay_margin`].
+    /// time for delays of whole samples, of which longer ones may be stable, see [`super::delay_margin`].
     pub delay: f64,
 }
 

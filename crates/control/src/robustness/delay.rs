@@ -4,7 +4,7 @@ use super::crossing::{Evaluation, narrow};
 use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point, held_plant};
-use crate::blocks::block_2x2;
+use crate::blocks::{beside, block_2x2, stacked};
 use crate::eigen::complex_eigenvalues;
 use crate::response::KnownResponse;
 use crate::stability::instability;
@@ -14,10 +14,9 @@ use std::f64::consts::{PI, TAU};
 
 /// Number of whole samples up to which the delay of a sampled loop is refined.
 const REFINED_SAMPLES: u32 = 20;
-/// Number of parts of a sample at which loops with up to `LARGE` states are tested.
+/// Number of parts of a sample after which loops with a continuous plant are tested.
 const PARTS: u32 = 4;
-const LARGE: usize = 100;
-/// Instability between two stable samples that is no rounding error of modes close to z = 1.
+/// Instability of a tested delay that is no rounding error of modes close to z = 1.
 const CLEAR: f64 = 1e-6;
 
 /// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
@@ -31,10 +30,11 @@ const CLEAR: f64 = 1e-6;
 /// eigenvalues on 60 frequencies for each decade and at the resonances of the closed and of the opened loop, up to
 /// frequencies where T is small, located by bisection.
 ///
-/// In sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for parts of a sample
-/// too. If an eigenvalue of L at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each
-/// sample of delay turns L by half a turn around -1, which adds an unstable eigenvalue of the loop. The result is
-/// then zero, unless the moduli give a limit below one sample.
+/// In sampled time the loop bears every delay of whole samples up to the result, and may bear longer ones, since a
+/// modulus of 1 may ask for a part of a sample: [`sampled_delay_margin`] decides by eigenvalues. If an eigenvalue of L
+/// at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each sample of delay turns L by half
+/// a turn around -1, which adds an unstable eigenvalue of the loop. The result is then zero, unless the moduli give a
+/// limit below one sample.
 ///
 /// # Errors
 ///
@@ -87,12 +87,12 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 /// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
 /// which the loop with the continuous plant becomes unstable.
 ///
-/// `plant`: continuous, or in the samples of the controller, for which the result is rounded down to whole samples;
-/// `controller`: sampled. Over an interval the plant receives first the command
-/// of the sample before, then the new one, so that every delay gives a sampled loop whose
-/// eigenvalues decide. Method: the whole samples by [`delay_margin`]; before them, up to 20 samples and 100 states,
-/// each quarter of a sample, since modes near half of the sample rate may be unstable between two stable samples; the
-/// limit by regula falsi. Above 20 samples it is that of [`delay_margin`].
+/// `plant`: continuous, or in the samples of the controller, for which the result is the largest number of whole
+/// samples at which the loop is stable; `controller`: sampled. Over an interval the plant receives first the command
+/// of the sample before, then the new one, so that every delay gives a sampled loop whose eigenvalues decide. Method:
+/// these eigenvalues for each quarter of a sample up to 20 samples, except for delays that [`delay_margin`] of the loop
+/// with the same part of a sample shows to be stable; then regula falsi below the first unstable one. Above 20 samples
+/// it is the result of [`delay_margin`].
 ///
 /// # Errors
 ///
@@ -113,41 +113,92 @@ pub(super) fn period_of(controller: &StateSpace) -> Result<f64, Error> {
     }
 }
 
-/// The delay margin of a sampled controller from `estimate`, which is exact for whole samples.
+/// [`sampled_delay_margin`] from `estimate`, the [`delay_margin`] of the loop.
 pub(super) fn refine(
     plant: &StateSpace,
     controller: &StateSpace,
     estimate: f64,
 ) -> Result<f64, Error> {
     let period = period_of(controller)?;
-    let whole = (estimate / period).floor();
-    if plant.domain != Domain::Continuous {
-        return Ok(period * whole);
-    }
+    let parts = if plant.domain == Domain::Continuous { PARTS } else { 1 };
+    let step = 1.0 / f64::from(parts);
     let value = |samples: f64| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 21")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 20")]
         let count = samples as usize;
         let dynamics = delayed(plant, controller, period, count, samples.fract())?;
         instability(&dynamics, controller.domain)
     };
-    let mut ends = [whole, whole + 1.0];
-    let is_large = plant.a.nrows() + controller.a.nrows() > LARGE;
-    let most = if is_large { 0 } else { PARTS * REFINED_SAMPLES };
-    let tested = (1..most).filter(|at| at % PARTS > 0).map(|at| f64::from(at) / f64::from(PARTS));
-    for delay in tested.take_while(|delay| whole.is_nan() || *delay < whole) {
-        if value(delay)? > CLEAR {
-            ends = [delay - 1.0 / f64::from(PARTS), delay];
-            break;
+    // The first unstable one of the tested delays.
+    let mut unstable = f64::INFINITY;
+    for part in (0..parts).map(|at| f64::from(at) * step) {
+        let stable = if part > 0.0 {
+            stable_delay(plant, controller, period, part)?
+        } else {
+            (estimate / period).floor()
+        };
+        for delay in (0..=REFINED_SAMPLES).map(|samples| f64::from(samples) + part) {
+            if delay >= unstable {
+                break;
+            }
+            if delay > stable && value(delay)? > CLEAR {
+                unstable = delay;
+            }
         }
     }
-    if ends[0].is_nan() || ends[0] > f64::from(REFINED_SAMPLES) {
-        return Ok(estimate);
+    if unstable.is_infinite() {
+        let samples = (estimate / period).max(f64::from(REFINED_SAMPLES));
+        return Ok(period * if parts > 1 { samples } else { samples.floor() });
     }
-    // Rounding may hide that the loop is stable at the start and unstable at the end.
-    let [start, end] = ends;
+    let start = unstable - step;
+    if parts == 1 {
+        return Ok(period * start);
+    }
+    // Rounding may hide that the loop is stable at the start.
     let start = Evaluation { at: start, value: value(start)?.min(-f64::MIN_POSITIVE) };
-    let end = Evaluation { at: end, value: value(end)?.max(f64::MIN_POSITIVE) };
+    let end = Evaluation { at: unstable, value: value(unstable)? };
     Ok(period * narrow(start, end, value)?.0)
+}
+
+/// The largest of the delays of `part` of a sample, above 0 and below 1, and whole ones for which a sweep of
+/// frequencies shows that the loop is stable; minus infinity if the loop is unstable with the part alone.
+fn stable_delay(
+    plant: &StateSpace,
+    controller: &StateSpace,
+    period: f64,
+    part: f64,
+) -> Result<f64, Error> {
+    let m = plant.b.ncols();
+    let [a, old, new] = hold_late(plant, period, part)?;
+    let late = StateSpace {
+        a: beside(&a, &old).resize_vertically(a.nrows() + m, 0.0),
+        b: stacked(&new, &DMatrix::identity(m, m)),
+        c: beside(&plant.c, &plant.d),
+        d: DMatrix::zeros(plant.c.nrows(), m),
+        domain: controller.domain,
+    };
+    match delay_margin(&Loop::new(late, controller.clone())?) {
+        Err(Error::NotSchur { .. }) => Ok(f64::NEG_INFINITY),
+        delay => Ok(part + (delay? / period).floor()),
+    }
+}
+
+/// Computes A and the effects of the last and of the new command over a sample, of which `part`, 0 to 1, has passed
+/// when the new one comes; for a plant in samples the part is 0.
+fn hold_late(plant: &StateSpace, period: f64, part: f64) -> Result<[DMatrix<f64>; 3], Error> {
+    let (n, m) = plant.b.shape();
+    let none = DMatrix::zeros(n, m);
+    if plant.domain != Domain::Continuous {
+        return Ok([plant.a.clone(), none, plant.b.clone()]);
+    }
+    let (mut a, mut old, mut new) = (DMatrix::identity(n, n), none.clone(), none);
+    if part > 0.0 {
+        (a, old) = hold_inputs(&plant.a, &plant.b, part * period)?;
+    }
+    if part < 1.0 {
+        let (rest, held) = hold_inputs(&plant.a, &plant.b, (1.0 - part) * period)?;
+        (a, old, new) = (&rest * a, rest * old, held);
+    }
+    Ok([a, old, new])
 }
 
 /// The loop whose commands are delayed by `samples` and a part of one, 0 to 1: its states are those of plant and
@@ -161,15 +212,7 @@ fn delayed(
 ) -> Result<DMatrix<f64>, Error> {
     let (n, m) = plant.b.shape();
     let k = controller.a.nrows();
-    let mut a = DMatrix::identity(n, n);
-    let (mut old, mut new) = (DMatrix::zeros(n, m), DMatrix::zeros(n, m));
-    if part > 0.0 {
-        (a, old) = hold_inputs(&plant.a, &plant.b, part * period)?;
-    }
-    if part < 1.0 {
-        let (rest, held) = hold_inputs(&plant.a, &plant.b, (1.0 - part) * period)?;
-        (a, old, new) = (&rest * a, rest * old, held);
-    }
+    let [a, old, new] = hold_late(plant, period, part)?;
     let order = n + k + m * (samples + 1);
     let at = |age: usize| n + k + (age - 1) * m;
     let mut older = DMatrix::zeros(m, order);

@@ -346,6 +346,32 @@ fn a_loop_may_bear_every_whole_sample_of_delay_and_not_a_part_of_one() {
     assert!(grown(0.99 * delay) < 1e-3 && grown(1.01 * delay) > 1e3, "{delay}");
 }
 
+/// y[k+2] = -r y[k+1] - r^2 y[k] + u[k], whose mode turns by a third in each sample, with u[k] = -g y[k-j]. The
+/// frequencies with |L| = 1 ask for 2.37 and 2.97 samples, between which there is no whole one.
+#[test]
+fn the_delay_margin_of_a_plant_in_samples_is_its_largest_number_of_stable_samples() {
+    let (r, g, period) = (0.8_f64, 0.33, 0.1);
+    let domain = Domain::Sampled { period };
+    let plant = StateSpace {
+        a: matrix(2, 2, &[0.0, 1.0, -r * r, -r]),
+        b: matrix(2, 1, &[0.0, 1.0]),
+        c: matrix(1, 2, &[1.0, 0.0]),
+        d: matrix(1, 1, &[0.0]),
+        domain,
+    };
+    let size = |delay: usize| {
+        let mut y = vec![1.0_f64; delay + 2];
+        for k in 0..20_000 {
+            y.push(-r * y[k + delay + 1] - r * r * y[k + delay] - g * y[k]);
+        }
+        y[20_000].abs().max(y[20_001].abs())
+    };
+    assert!((0..=5).all(|delay| size(delay) < 1e-3) && size(6) > 1e3);
+    let controller = gain(&matrix(1, 1, &[-g]), domain);
+    let delay = sampled_delay_margin(&plant, &controller).expect("a delay");
+    assert_near(delay, 5.0 * period, 1e-12, "delay");
+}
+
 /// An integrator with u = -k y, held over h, has the eigenvalue 1 - k h.
 #[test]
 fn an_integrator_may_be_held_for_two_time_constants() {
