@@ -251,28 +251,36 @@ pub(super) fn certify_in(
     system: &StateSpace,
     norm: Norm,
 ) -> Result<Outcome<GainBound>, Error> {
-    let mut search = BoundProblem::new(coordinates, system, norm);
-    let Some((mut smallest, mut p)) = search.minimum() else {
+    let first = BoundProblem::new(coordinates, system, norm);
+    let Some(minimum) = first.minimum() else {
         return Ok(Outcome::Inconclusive(NO_P));
     };
-    for _ in 0..REFINEMENTS {
-        if smallest >= WEAK {
+    let mut searches = vec![(first, minimum)];
+    while let Some((search, (smallest, p))) = searches.last()
+        && *smallest < WEAK
+        && searches.len() <= REFINEMENTS
+    {
+        let Some(refined) = search.coordinates.refined(p) else { break };
+        let next = BoundProblem::new(refined, system, norm);
+        let Some((level, p)) = next.minimum() else { break };
+        let is_smaller = next.scaling.gamma(level) < search.scaling.gamma(*smallest);
+        if !is_smaller {
             break;
         }
-        let Some(refined) = search.coordinates.refined(&p) else { break };
-        let next = BoundProblem::new(refined, system, norm);
-        let Some((level, next_p)) = next.minimum() else { break };
-        (search, smallest, p) = (next, level, next_p);
+        searches.push((next, (level, p)));
     }
-    if let Some(bound) = search.verified(smallest, &p)? {
-        return Ok(Outcome::Optimal(bound));
-    }
-    for relaxation in RELAXED_LEVELS {
-        let (problem, p) = search.problem(Some(smallest * relaxation));
-        if let Outcome::Optimal(solution) = problem.solve()?
-            && let Some(bound) = search.verified(smallest * relaxation, &solution.value(&p))?
-        {
+    // Rounding errors may hide the proof in coordinates that stretch the states by much.
+    for (search, (smallest, p)) in searches.iter().rev() {
+        if let Some(bound) = search.verified(*smallest, p)? {
             return Ok(Outcome::Optimal(bound));
+        }
+        for relaxation in RELAXED_LEVELS {
+            let (problem, p) = search.problem(Some(smallest * relaxation));
+            if let Outcome::Optimal(solution) = problem.solve()?
+                && let Some(bound) = search.verified(smallest * relaxation, &solution.value(&p))?
+            {
+                return Ok(Outcome::Optimal(bound));
+            }
         }
     }
     Ok(Outcome::Inconclusive(NO_P))
