@@ -98,12 +98,13 @@ pub fn common_reachable_set(
     } else {
         None
     };
-    for coordinates in refined.iter().chain([&coordinates]) {
-        if let Some(set) = search.smallest(coordinates)? {
-            return Ok(Outcome::Optimal(set));
-        }
+    // Rounding errors may prevent the proof in coordinates that stretch the states by much.
+    if let Some(refined) = refined
+        && let Ok(Some(set)) = search.smallest(&refined)
+    {
+        return Ok(Outcome::Optimal(set));
     }
-    Ok(Outcome::Inconclusive(NOT_PROVEN))
+    Ok(search.smallest(&coordinates)?.map_or(Outcome::Inconclusive(NOT_PROVEN), Outcome::Optimal))
 }
 
 /// Whether Q in the direction of a row of `outputs` is not large compared with the margin of the inequalities.
