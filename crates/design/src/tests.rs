@@ -131,7 +131,7 @@ const REFUSALS: [(&str, &str, &str); 66] = [
     (
         "C = ",
         "actuators = [{ name = \"u\", unit = \"N\" }]\nfaults = [{ name = \"f\", actuator = \"u\", unit = \"kN\" }]\nC = ",
-        "4:48: faults[1].unit: the fault adds to a signal in N, found kN",
+        "4:48: faults[1].unit: expected N, the unit of `u`, found kN",
     ),
     ("C = ", "states = [\"p\", \"p\"]\nC = ", "3:16: states[2]: the name `p` is there twice"),
     ("C = ", "states = [\"p\"]\nC = ", "3:10: states: expected 2 states, the rows of A, found 1"),
@@ -329,6 +329,20 @@ fn a_plant_with_more_than_64_actuators_is_refused() {
     let refused = read(&text(65), |_| ()).unwrap_err();
     let expected = "plant.toml:2:5: expected at most 64 actuators of a controller, found 65";
     assert!(refused.starts_with(expected), "{refused}");
+}
+
+/// A fault adds to its signal: 1 K and 1 degC are one difference, 1 degF is 5/9 of it.
+#[test]
+fn a_fault_of_a_temperature_may_have_the_unit_of_a_difference() {
+    let with = |unit: &str| {
+        let measured = "measurements = [{ name = \"y\", unit = \"degC\" }]\nfilter = 50\nC = ";
+        let fault = format!("faults = [{{ name = \"f\", sensor = \"y\", unit = \"{unit}\" }}]");
+        let text = MASS.replace("C = ", measured).replace("actuator_faults = \"all\"", &fault);
+        read(&text, |file| file.faults[0].unit.clone().unwrap())
+    };
+    assert_eq!(with("K").as_deref(), Ok("K"));
+    let refused = with("degF").unwrap_err();
+    assert!(refused.contains("expected degC, the unit of `y`, found degF"), "{refused}");
 }
 
 #[test]

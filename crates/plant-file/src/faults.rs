@@ -4,7 +4,9 @@ use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::matrix;
 use crate::read::{is_first, positive, positive_within, refuse};
-use crate::signals::{Signal, description, is_one_unit, name, position, positions, unit};
+use crate::signals::{
+    Signal, description, is_one_unit_of_differences, name, position, positions, unit,
+};
 
 /// The assumed dynamics of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,15 +158,16 @@ fn fault(
         EntryPoint::Sensor(at) => Some(&measurements[at]),
         EntryPoint::Column(_) | EntryPoint::Input(_) => None,
     };
-    let of_signal = signal.and_then(|signal| signal.unit.clone());
     let stated = unit(&table)?;
-    if let (Some(stated), Some(expected), Some(entry)) = (&stated, &of_signal, table.get("unit"))
-        && !is_one_unit(stated, expected)
+    if let (Some(stated), Some(signal), Some(entry)) = (&stated, signal, table.get("unit"))
+        && let Some(expected) = &signal.unit
+        && !is_one_unit_of_differences(stated, expected)
     {
-        let message = format!("the fault adds to a signal in {expected}, found {stated}");
+        let name = &signal.name;
+        let message = format!("expected {expected}, the unit of `{name}`, found {stated}");
         return Err(entry.error(message));
     }
-    let unit = stated.or(of_signal);
+    let unit = stated.or_else(|| signal?.unit.clone());
     Ok(Fault {
         name: name(&table.require("name", "the name of the fault")?)?,
         unit,

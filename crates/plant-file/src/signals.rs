@@ -160,11 +160,22 @@ const SAME_UNIT: f64 = 1e-6;
 /// Whether two units are the same, or FMI does not know one of them.
 #[must_use]
 pub fn is_one_unit(one: &str, other: &str) -> bool {
-    let base = |text: &str| Unit::parse(text).ok()?.base;
-    let Some((one, other)) = base(one).zip(base(other)) else { return true };
-    one.conversion(&other).is_some_and(|(factor, offset)| {
+    conversion(one, other).is_none_or(|(factor, offset)| {
         (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
     })
+}
+
+/// Whether differences have the same values in two units, such as K and degC, or FMI does not know one of them.
+#[must_use]
+pub fn is_one_unit_of_differences(one: &str, other: &str) -> bool {
+    conversion(one, other).is_none_or(|(factor, _)| (factor - 1.0).abs() < SAME_UNIT)
+}
+
+/// Returns factor and offset between two units, NaN for different quantities; `None` if FMI does not know one of them.
+fn conversion(one: &str, other: &str) -> Option<(f64, f64)> {
+    let base = |text: &str| Unit::parse(text).ok()?.base;
+    let (one, other) = (base(one)?, base(other)?);
+    Some(one.conversion(&other).unwrap_or((f64::NAN, f64::NAN)))
 }
 
 /// Reads `delay_order`, the number of states with which the observer approximates each delay; an error if no signal has

@@ -19,7 +19,7 @@ use plant_file::detection::{Disturbance, DisturbanceEntry};
 use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
 use plant_file::pid::Pid;
 use plant_file::requirements::Requirement;
-use plant_file::signals::{Signal, is_one_unit};
+use plant_file::signals::{Signal, is_one_unit, is_one_unit_of_differences};
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;
@@ -457,7 +457,7 @@ fn faults(
             }
         };
         if let (Some(stated), Some(unit)) = (&fault.unit, &signal.unit)
-            && !is_one_unit(stated, unit)
+            && !is_one_unit_of_differences(stated, unit)
         {
             let message = format!(
                 "fault `{}`: the FMU has `{}` in {unit}; expected this unit, found {stated}",
