@@ -61,6 +61,7 @@ pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), Pl
     if let Some((key, _)) = refused.into_iter().find(|(_, stated)| *stated) {
         let advice = match key {
             "reference" => "expected references of measurements without it",
+            "loop" => "expected `feedback` and `observer` in its place",
             _ => "expected a plant without it, for example measurements that are filtered before",
         };
         return Err(file.error(&[key], format!("{fed}; `{key}` is not possible then: {advice}")));
@@ -159,6 +160,7 @@ mod tests {
         let mut linear = LinearPlant::of(&file).expect("a plant");
         linear.d[(0, 0)] = 2.0;
         let refusal = check(&file, &linear).expect_err("a refusal").to_string();
-        assert!(refusal.contains("`loop` is not possible then"), "{refusal}");
+        let expected = "`loop` is not possible then: expected `feedback` and `observer`";
+        assert!(refusal.contains(expected), "{refusal}");
     }
 }
