@@ -243,7 +243,7 @@ REFUSED = {
     "unit": (
         lambda signals: {name.replace("time", "time [K]"): column for name, column in signals.items()},
         [],
-        "the time is in K, expected s or another unit of time",
+        "the time is in K, expected s, ms, min, h or d",
     ),
 }
 

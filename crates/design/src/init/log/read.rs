@@ -122,11 +122,8 @@ impl Columns<'_> {
     /// Returns the length in s of the unit of the times, 1 if none is stated; an error if it is no unit of time.
     fn seconds(&self) -> Result<f64, String> {
         let Some(text) = self.name(self.0.time()).unit else { return Ok(1.0) };
-        let second = BaseUnit { s: 1, ..BaseUnit::default() };
-        let base = Unit::parse(&text).ok().and_then(|unit| unit.base);
-        let conversion = base.and_then(|base| base.conversion(&second));
-        let refusal = || format!("the time is in {text}, expected s or another unit of time");
-        conversion.map(|(factor, _)| factor).ok_or_else(refusal)
+        let refusal = || format!("the time is in {text}, expected s, ms, min, h or d");
+        seconds(&text).ok_or_else(refusal)
     }
 
     /// Returns the positions of all columns but the time.
@@ -207,6 +204,16 @@ impl Columns<'_> {
     }
 }
 
+/// Returns the length in s of a unit, also of a second by another name, and 1 for `-`; None if it is no unit of time.
+fn seconds(unit: &str) -> Option<f64> {
+    if ["sec", "secs", "second", "seconds", "-"].contains(&unit.to_lowercase().as_str()) {
+        return Some(1.0);
+    }
+    let second = BaseUnit { s: 1, ..BaseUnit::default() };
+    let (factor, _) = Unit::parse(unit).ok()?.base?.conversion(&second)?;
+    Some(factor)
+}
+
 /// Returns the sample time; an error if times do not increase, or not by equal steps.
 fn period(times: &[f64]) -> Result<f64, String> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -229,4 +236,26 @@ fn period(times: &[f64]) -> Result<f64, String> {
     #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
     let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
     Ok(rounded(mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Measuring systems write seconds in several ways, of which FMI knows one.
+    #[test]
+    fn a_unit_of_time_has_its_length_in_seconds() {
+        for (unit, expected) in [
+            ("s", Some(1.0)),
+            ("Sec", Some(1.0)),
+            ("seconds", Some(1.0)),
+            ("-", Some(1.0)),
+            ("ms", Some(0.001)),
+            ("h", Some(3600.0)),
+            ("K", None),
+            ("samples", None),
+        ] {
+            assert_eq!(seconds(unit), expected, "{unit}");
+        }
+    }
 }
