@@ -231,13 +231,15 @@ impl Solution {
     }
 
     /// Returns the experiment of the plant file. The default covers ten time constants of the
-    /// slowest feedback eigenvalue in 2000 steps, or in steps of the sample time, at least ten.
+    /// slowest feedback eigenvalue in 2000 steps, or in steps that are stated or of the sample time, at least ten.
     fn experiment(&self, file: &PlantFile<'_>) -> Result<Defaults, crate::Error> {
         let slowest = self.slowest_rate()?;
-        let (shortest, sample_time) = match self.domain {
-            Domain::Continuous => (0.0, None),
-            Domain::Sampled { period } => (10.0 * period, Some(period)),
+        let sample_time = match self.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(period),
         };
+        let steps = [file.step_size, sample_time];
+        let shortest = 10.0 * steps.into_iter().flatten().fold(0.0, f64::max);
         let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest).max(shortest));
         let step_size = file.step_size.or(sample_time);
         let step_size = step_size.unwrap_or_else(|| round(stop_time / 2000.0));
@@ -290,6 +292,8 @@ mod tests {
     fn an_experiment_is_longer_than_a_step() {
         let expected = Defaults { stop_time: 1.0, step_size: Some(0.1) };
         assert_eq!(experiment(""), Ok(expected));
+        let expected = Defaults { stop_time: 20.0, step_size: Some(2.0) };
+        assert_eq!(experiment("experiment = { step_size = 2 }\n"), Ok(expected));
         let refused = experiment("experiment = { stop_time = 0.1 }\n").unwrap_err();
         let expected =
             "plant.toml:8:14: expected a `stop_time` above the step size of 0.1 s, found 0.1 s";
