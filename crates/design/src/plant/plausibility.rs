@@ -23,9 +23,10 @@ const INACCURATE: f64 = 0.01;
 pub(crate) fn inaccurate(file: &PlantFile<'_>, linear: &LinearPlant) -> Option<PlaceError> {
     let error = linear.inaccuracy.filter(|error| *error > INACCURATE && error.is_finite())?;
     let message = format!(
-        "entries of the linearised FMU have an error of up to {} of the largest one in their row, as at the edge of a \
-         friction, a limit or a play; expected another operating point, or parameters without these",
-        rounded(error)
+        "entries of the linearised FMU have errors of up to {} % of the largest entry in their row, as at the edge of \
+         friction, of a limit or of play; expected another operating point, parameters without these, or for an FMU \
+         that is linearised by steps another `linearisation_step`",
+        rounded(100.0 * error)
     );
     Some(file.error(&["operating_point", "plant"], message))
 }
@@ -186,7 +187,27 @@ pub(crate) fn line(file: &PlantFile<'_>, warning: &PlaceError) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
     use super::*;
+
+    /// The relative error of a row of zeros is infinite, and of rounding.
+    #[test]
+    fn errors_of_a_linearisation_above_one_percent_are_a_warning() {
+        let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n";
+        let source = Source::new(Path::new("plant.toml"), text.to_owned());
+        let parsed = source.parse().unwrap();
+        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
+        let mut linear = LinearPlant::of(&file).unwrap();
+        let mut warning = |error: f64| {
+            linear.inaccuracy = Some(error);
+            inaccurate(&file, &linear).map(|warning| warning.message().to_owned())
+        };
+        assert!(warning(0.02).unwrap().contains("errors of up to 2 % of the largest entry"));
+        assert_eq!([warning(0.009), warning(f64::INFINITY)], [None, None]);
+    }
 
     fn columns(rows: usize, values: &[f64]) -> DMatrix<f64> {
         DMatrix::from_row_slice(rows, values.len() / rows, values)
