@@ -70,8 +70,8 @@ pub(crate) fn kalman_design(
     let Some(scale) = scale(file, noise) else {
         return refuse(
             &["observer", "plant"],
-            "`observer.bandwidth` gives covariances up to a common factor; `robustness.noise`, the standard deviation of \
-             each measurement and above 0, states it",
+            "`observer.bandwidth` gives covariances up to a common factor; expected `robustness.noise`, the standard \
+             deviation of each measurement, above 0",
         );
     };
     let n = linear.states.len();
