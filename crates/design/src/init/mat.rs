@@ -32,7 +32,12 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         } else {
             names.join(", ")
         };
-        let missing = || invalid(format!("expected the variables A, B and C, found {listed}"));
+        let missing = || {
+            invalid(format!(
+                "expected the variables A, B and C, found {listed}; a log is a .csv or .parquet file, or results of \
+                 Dymola or OpenModelica"
+            ))
+        };
         matrix(name)?.ok_or_else(missing)
     };
     let (a, mut b, mut c) = (required("A")?, required("B")?, required("C")?);
@@ -81,7 +86,7 @@ fn not_read(content: &MatFile) -> Option<String> {
     let others: Vec<_> = names.filter(|name| !name.is_empty() && !READ.contains(name)).collect();
     (!others.is_empty()).then(|| {
         let (read, others) = (READ.join(", "), others.join(", "));
-        format!("of the file only {read} are read, not {others}; expected a plant without these")
+        format!("of the file only {read} are read, not {others}, which the plant must not depend on")
     })
 }
 
