@@ -35,7 +35,7 @@ pub struct FallbackReport {
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<CommonCertificate>")]
     pub whole: Result<CommonCertificate, String>,
-    /// Whether the search for that P was left out for lack of time.
+    /// Whether the search for that P was left out, or ended, for lack of time.
     pub whole_left_out: bool,
     /// The intact plant, then each actuator that has failed.
     pub cases: Vec<FallbackCase>,
