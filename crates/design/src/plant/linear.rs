@@ -27,6 +27,9 @@ pub(crate) const AT_REST: f64 = 1e-6;
 /// Part of the largest entry of a row of C below which an entry of D or G counts as zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
+/// Part of the largest entry of a row above which the error of a linearisation is more than rounding.
+pub(crate) const INACCURATE: f64 = 0.01;
+
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' if the plant is
 /// known in its samples only.
 ///
@@ -515,21 +518,35 @@ fn inaccuracy(linearised: &Linearisation) -> Option<f64> {
 }
 
 /// Returns D and G with zeros for entries that are rounding errors beside the row of C, or not larger than the error of
-/// their differences.
+/// their differences. An error above [`INACCURATE`] of the row, as at a kink, removes no entry.
 pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
-    let linearise::Matrices { c, d, g, .. } = &linearised.matrices;
+    let Linearisation { states, inputs, faults, matrices, .. } = linearised;
+    let linearise::Matrices { c, d, g, .. } = matrices;
     let errors = match &linearised.method {
         Method::FiniteDifferences { errors, .. } => Some(errors),
         Method::DirectionalDerivatives { .. } => None,
     };
-    let significant = |values: &DMatrix<f64>, errors: Option<&DMatrix<f64>>| {
+    let joined = matrices.joined();
+    let columns = states.iter().chain(inputs).chain(faults);
+    let typical: Vec<f64> = columns.map(|signal| signal.typical).collect();
+    let largest = |row: usize| {
+        let entries = joined.row(states.len() + row);
+        entries.iter().zip(&typical).map(|(entry, size)| entry.abs() * size).fold(0.0, f64::max)
+    };
+    let significant = |values: &DMatrix<f64>, errors: Option<&DMatrix<f64>>, first: usize| {
         values.map_with_location(|row, column, entry| {
             let error = errors.map_or(0.0, |errors| errors[(row, column)]);
-            let negligible = error.max(NEGLIGIBLE * c.row(row).amax());
+            let is_rounding = error * typical[first + column] <= INACCURATE * largest(row);
+            let rounding = if is_rounding { error } else { 0.0 };
+            let negligible = rounding.max(NEGLIGIBLE * c.row(row).amax());
             if entry.abs() <= negligible { 0.0 } else { entry }
         })
     };
-    [significant(d, errors.map(|errors| &errors.d)), significant(g, errors.map(|errors| &errors.g))]
+    let first_fault = states.len() + inputs.len();
+    [
+        significant(d, errors.map(|errors| &errors.d), states.len()),
+        significant(g, errors.map(|errors| &errors.g), first_fault),
+    ]
 }
 
 #[cfg(test)]
@@ -582,6 +599,13 @@ mod tests {
     fn a_direct_term_within_the_error_of_its_difference_is_none() {
         let linearised = differences([&[-1.0], &[2.0, 1e-7], &[1e-7]], [0.0, 1e-6]);
         assert_eq!(direct_terms(&linearised), [row(&[2.0, 0.0]), row(&[0.0])]);
+    }
+
+    /// `y = x + max(u_1, 0)`: the difference at 0 is 1/2, and may be off by 1/2.
+    #[test]
+    fn a_direct_term_with_a_kink_is_kept() {
+        let linearised = differences([&[-1.0], &[0.5, 0.0], &[0.0]], [0.0, 0.5]);
+        assert_eq!(direct_terms(&linearised), [row(&[0.5, 0.0]), row(&[0.0])]);
     }
 
     /// `x' = |x| + 2 u_1 + u_2`: the difference at 0 is 0, and may be off by 1, half of the largest entry.

@@ -4,7 +4,7 @@
 use files::PlaceError;
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant::linear::LinearPlant;
+use crate::plant::linear::{INACCURATE, LinearPlant};
 use crate::report::number::rounded;
 use control::faults::ExtendedPlant;
 use plant_file::signals::Signal;
@@ -16,8 +16,6 @@ use plant_file::{FAULTS, PlantFile};
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Errors of a linearisation above this part of the largest entry of a row are a warning.
-const INACCURATE: f64 = 0.01;
 
 /// Returns a warning if the plant is an FMU whose matrices are not accurate; None otherwise.
 pub(crate) fn inaccurate(file: &PlantFile<'_>, linear: &LinearPlant) -> Option<PlaceError> {
