@@ -86,7 +86,9 @@ fn not_read(content: &MatFile) -> Option<String> {
     let others: Vec<_> = names.filter(|name| !name.is_empty() && !READ.contains(name)).collect();
     (!others.is_empty()).then(|| {
         let (read, others) = (READ.join(", "), others.join(", "));
-        format!("of the file only {read} are read, not {others}, which the plant must not depend on")
+        format!(
+            "of the file only {read} are read, not {others}, which the plant must not depend on"
+        )
     })
 }
 
