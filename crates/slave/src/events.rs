@@ -18,7 +18,7 @@ pub trait Events {
     fn enter_event_mode(&mut self) -> Result<(), CallError>;
 
     /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. Clocks do not tick any more
-    /// after it.
+    /// after it, but for those that it gives an interval of 0 s: they tick for the next iteration.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError>;
 
     /// `fmi3EnterStepMode`, `fmi2EnterContinuousTimeMode`, after the last iteration of an event.

@@ -16,8 +16,11 @@ use slave::CallError;
 
 /// A difference of times below this fraction of the interval, or of the time, is rounding, up to [`MOST`].
 const ROUNDING: f64 = 1e-9;
-/// Largest difference in s that is rounding, unless the times have larger units in the last place.
+/// Largest difference in s that is rounding, besides half of the interval, unless the times have larger units in the
+/// last place.
 const MOST: f64 = 1e-6;
+/// Largest number of ticks of an aperiodic clock in one event; further ones come with the next step.
+const TICKS: usize = 100;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
@@ -26,7 +29,7 @@ const CHANGED: i32 = 2;
 struct TimedClock {
     reference: u32,
     attributes: ClockType,
-    /// Interval in s, if the clock is periodic.
+    /// Interval in s; that of an aperiodic clock is the last one.
     interval: f64,
     /// The interval as numerator and denominator, so that many ticks do not drift.
     fraction: Option<(u64, u64)>,
@@ -138,10 +141,19 @@ impl TimedClock {
         }
     }
 
-    fn is_due(&self, time: f64) -> bool {
-        let rounding = (ROUNDING * self.interval.max(time.abs())).min(MOST);
+    /// Returns whether the clock has to tick at `time` although it is among the clocks `ticks` that ticked in the
+    /// present event: a periodic clock ticks once in an event, another one at most [`TICKS`] times.
+    fn is_due(&self, time: f64, ticks: &[u32]) -> bool {
+        let largest = if self.interval > 0.0 { MOST.min(0.5 * self.interval) } else { MOST };
+        let rounding = (ROUNDING * self.interval.max(time.abs())).min(largest);
         let rounding = rounding.max(4.0 * f64::EPSILON * time.abs());
-        self.next.is_some_and(|next| next <= time + rounding)
+        let most = if self.is_periodic() { 1 } else { TICKS };
+        self.next.is_some_and(|next| next <= time + rounding) && self.count_in(ticks) < most
+    }
+
+    /// Returns how often the clock is among `ticks`.
+    fn count_in(&self, ticks: &[u32]) -> usize {
+        ticks.iter().filter(|tick| **tick == self.reference).count()
     }
 }
 
@@ -180,6 +192,7 @@ impl Clocks {
             if !clock.is_periodic() {
                 let (interval, qualifier) = component.get_interval(clock.reference)?;
                 clock.next = (qualifier == CHANGED).then_some(start + interval);
+                clock.interval = interval;
                 continue;
             }
             let shift = match (stated, shift) {
@@ -228,14 +241,15 @@ impl Clocks {
 
     /// Returns whether a clock has to tick at `time`, or is requested to tick.
     pub(super) fn is_due(&self, time: f64) -> bool {
-        !self.requested.is_empty() || self.timed.iter().any(|clock| clock.is_due(time))
+        let ticks = &self.event_ticks;
+        !self.requested.is_empty() || self.timed.iter().any(|clock| clock.is_due(time, ticks))
     }
 
     /// Moves the clocks that are due at `time` to their next ticks; returns their value references, after those of the
     /// requested clocks.
     fn take_due(&mut self, time: f64) -> Vec<u32> {
-        let mut due = std::mem::take(&mut self.requested);
-        for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time)) {
+        let (mut due, ticks) = (std::mem::take(&mut self.requested), &self.event_ticks);
+        for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time, ticks)) {
             due.push(clock.reference);
             clock.ticks += 1;
             // From the count, so that rounding does not add up.
@@ -306,11 +320,12 @@ impl Clocks {
                 if qualifier != CHANGED {
                     continue;
                 }
-                // A countdown of 0 s ends at once.
+                // A countdown of 0 s ends at once, but not for ever.
                 let periodic = clock.is_periodic();
-                let is_allowed = if periodic { interval > 0.0 } else { interval >= 0.0 };
+                let positive = periodic || clock.count_in(&self.event_ticks) >= TICKS;
+                let is_allowed = if positive { interval > 0.0 } else { interval >= 0.0 };
                 if !is_allowed && !std::mem::replace(&mut clock.warned, true) {
-                    let expected = if periodic { "a positive one" } else { "at least 0 s" };
+                    let expected = if positive { "a positive one" } else { "at least 0 s" };
                     component.base.warn(&format!(
                         "fmi3GetIntervalDecimal gives the clock with the value reference {} the interval {interval} s \
                          at t = {} s, expected {expected}; its ticks are wrong",
@@ -319,11 +334,13 @@ impl Clocks {
                     ));
                 }
                 clock.next = Some(time + interval);
-                if clock.is_periodic() && interval.to_bits() != clock.interval.to_bits() {
+                if !periodic {
+                    clock.interval = interval;
+                } else if interval.to_bits() != clock.interval.to_bits() {
                     // A parameter has changed the interval: the present tick is the first of the new ones.
                     clock.set_interval(interval);
                     (clock.first, clock.ticks) = (time, 1);
-                } else if clock.is_periodic() {
+                } else {
                     clock.next = Some(clock.tick(clock.ticks));
                 }
             }
@@ -473,8 +490,32 @@ mod tests {
     fn in_seconds_since_1970_a_clock_is_due_at_its_tick_only() {
         let tick = 1.7e9 + 0.1;
         let clock = TimedClock { next: Some(tick), ..clock(0.1, Some((1, 10))) };
-        assert!(clock.is_due(tick) && clock.is_due(tick - 2.4e-7));
-        assert!(!clock.is_due(tick - 1e-4) && !clock.is_due(1.7e9));
+        assert!(clock.is_due(tick, &[]) && clock.is_due(tick - 2.4e-7, &[]));
+        assert!(!clock.is_due(tick - 1e-4, &[]) && !clock.is_due(1.7e9, &[]));
+    }
+
+    /// The intervals are 1 us, which is rounding from 1000 s on, and 0 s, again and again.
+    #[test]
+    fn an_event_ends_although_intervals_are_tiny_or_zero() {
+        use IntervalVariability::{Constant, Countdown, Tunable};
+        for (interval_variability, interval, expected) in
+            [(Constant, 1e-6, 1), (Tunable, 0.0, 1), (Countdown, 1e-6, 1), (Countdown, 0.0, TICKS)]
+        {
+            let attributes = ClockType { interval_variability, ..ClockType::default() };
+            let (first, next) = (1e3, Some(1e3));
+            let clock = TimedClock { attributes, first, next, ..clock(interval, None) };
+            let mut clocks = Clocks { timed: vec![clock], ..Clocks::default() };
+            for _ in 0..2 * TICKS {
+                let due = clocks.take_due(1e3);
+                clocks.event_ticks.extend(due);
+                clocks.timed[0].next.get_or_insert(1e3 + interval);
+            }
+            let ticks = clocks.event_ticks.len();
+            assert_eq!(ticks, expected, "{interval_variability:?} {interval}");
+            // The next event is a new one.
+            clocks.end_event();
+            assert_eq!(clocks.take_due(1e3 + interval), [1]);
+        }
     }
 
     /// The table of clock types in section 2.2.8.2 of FMI 3.0.2.

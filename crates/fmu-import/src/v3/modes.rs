@@ -221,7 +221,7 @@ impl Events for Instance {
     }
 
     /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it. Clocks to which
-    /// the event gives an interval of 0 s then tick for the next update.
+    /// the event gives an interval of 0 s then tick for the next update, at most 100 times in an event.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         self.tick()?;
         if self.is_scheduled() {
