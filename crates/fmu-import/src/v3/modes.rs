@@ -162,6 +162,7 @@ impl Instance {
                 );
                 return Err(refused("fmi3DoStep", what));
             }
+            let reached = if target - reached <= rounding { target } else { reached.max(now) };
             self.state.time = reached;
             self.component.settle_inputs(reached)?;
             if done.terminate {

@@ -224,6 +224,15 @@ fn an_early_return_that_rounding_makes_late_is_at_the_end_of_the_step() {
     assert!((loaded.real("y") - 2e-6).abs() < 1e-12);
 }
 
+/// The FMU is a unit in the last place beyond the end.
+#[test]
+fn an_event_at_the_end_of_a_step_has_the_time_of_this_end() {
+    let mut loaded = Loaded::third("late");
+    assert_eq!(loaded.slave.hand_over_events(false), Ok(true));
+    let mut loaded = loaded.initialised();
+    assert_eq!(loaded.step(0.0, 0.25), Ok(StepResult::Event { reached: 0.25 }));
+}
+
 #[test]
 fn an_fmu_that_lacks_the_event_mode_it_promises_runs_without() {
     let mut loaded = ready("no event mode");
