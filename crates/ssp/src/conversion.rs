@@ -161,14 +161,14 @@ impl ConversionChain {
             let stated = resolve(stated, &self.measure, &there)?;
             transformation = then(transformation, stated)?;
         }
-        // After a suppressed conversion, the values are not in the unit of the source.
-        let unit = if conversion.suppress_units { None } else { self.measure.unit };
-        let relative = match stated {
-            // A difference from an operating point becomes a value.
-            Some(Stated::Linear { offset, .. }) if *offset != 0.0 => None,
-            _ => self.measure.relative,
-        };
-        let items = if stated.is_some() { None } else { self.measure.items };
+        let Measure { unit, relative, items } = self.measure;
+        // After a suppressed conversion, the values are not in the unit of the source, and may be no differences.
+        let (unit, relative) =
+            if conversion.suppress_units { (None, None) } else { (unit, relative) };
+        // A difference from an operating point becomes a value.
+        let is_moved = matches!(stated, Some(Stated::Linear { offset, .. }) if *offset != 0.0);
+        let relative = relative.filter(|_| !is_moved);
+        let items = if stated.is_some() { None } else { items };
         let measure = there.or(Measure { unit, relative, items });
         Ok(ConversionChain { measure, transformation, warnings })
     }

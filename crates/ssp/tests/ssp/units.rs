@@ -106,6 +106,21 @@ fn a_difference_is_connected_to_another_value_if_no_offset_separates_their_units
     assert_eq!(actual, ["a.y -> b.u * 1.0 + 20.0"]);
     let actual = connected(&difference("mm"), &real("m"), "", "").unwrap();
     assert_eq!(actual, ["a.y -> b.u * 0.001 + 0.0"]);
+    // The number of K is that of degC at the connector of the system, and 0 degC are 273.15 K.
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("y output {}", difference("K")));
+    bench.fmu("b.fmu", &format!("u input {}", real("K")));
+    let inner = system(
+        "inner",
+        "out output <ssc:Real unit=\"degC\"/>",
+        &component("a", "a.fmu", "y output", ""),
+        &connection("a.y", "out", "", suppressed),
+    );
+    let elements = inner + &component("b", "b.fmu", "u input", "");
+    let units = r#"<ssd:Units><ssc:Unit name="degC"><ssc:BaseUnit K="1" offset="273.15"/></ssc:Unit></ssd:Units>"#;
+    let opened =
+        bench.open(&root(&elements, &connection("inner.out", "b.u", "", "")), units).unwrap();
+    assert_eq!(links(&opened.assembly), ["inner.a.y -> b.u * 1.0 + 273.15"]);
 }
 
 #[test]
