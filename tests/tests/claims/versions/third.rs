@@ -49,6 +49,17 @@ fn a_structural_parameter_changes_the_size_of_arrays() {
     assert_eq!(names.filter(|name| name.starts_with("b[")).count(), 4);
 }
 
+/// The FMU ends the process if it is in Configuration Mode already.
+#[test]
+fn after_a_refused_size_another_one_is_set() {
+    let mut loaded = Loaded::third("plain");
+    let size = loaded.reference("n");
+    let error = loaded.slave.configure(&[size], &[-1]).unwrap_err();
+    assert!(error.to_string().contains("cannot take the value -1 for n"), "{error}");
+    loaded.slave.configure(&[size], &[4]).unwrap();
+    loaded.initialised().set_real("a[4]", 1.5);
+}
+
 /// A state has the values of its arrays.
 #[test]
 fn a_state_from_before_a_change_of_sizes_is_discarded() {
