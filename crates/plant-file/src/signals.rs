@@ -160,9 +160,8 @@ const SAME_UNIT: f64 = 1e-6;
 /// Whether two units are the same, or FMI does not know one of them.
 #[must_use]
 pub fn is_one_unit(one: &str, other: &str) -> bool {
-    conversion(one, other).is_none_or(|(factor, offset)| {
-        (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT
-    })
+    conversion(one, other)
+        .is_none_or(|(factor, offset)| (factor - 1.0).abs() < SAME_UNIT && offset.abs() < SAME_UNIT)
 }
 
 /// Whether differences have the same values in two units, such as K and degC, or FMI does not know one of them.
