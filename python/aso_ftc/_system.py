@@ -602,7 +602,13 @@ class Simulation:
         return self._stepper.save()
 
     def restore(self, state: bytes) -> None:
-        """Return to a state that :meth:`save` of this or an equal simulation has returned."""
+        """Return to a state that :meth:`save` of this or an equal simulation has returned.
+
+        Faults that have not begun in the state may differ: one run is the start of several.
+
+        Raises:
+            ConfigurationError: the state is one of another system, step, algorithm or start time, or of other faults.
+        """
         self._stepper.restore(state)
 
     def close(self) -> None:

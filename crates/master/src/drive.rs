@@ -143,6 +143,17 @@ impl Drive {
         reached(time, self.start).then(|| self.signal.at(time, &mut self.cursor))
     }
 
+    /// Returns the faults with the memory of those in `saved`; `None` if faults that had begun there differ.
+    pub(crate) fn resumed_faults(&self, saved: &DriveState) -> Option<FaultChain> {
+        let time = saved.committed.unwrap_or(f64::NEG_INFINITY);
+        let mut faults = self.faults.clone().unwrap_or_default();
+        let is_same = match &saved.faults {
+            Some(saved) => faults.resume(saved, time),
+            None => faults.resume(&FaultChain::default(), time),
+        };
+        is_same.then_some(faults)
+    }
+
     /// Puts faults between the signal and the variable.
     pub fn set_faults(&mut self, faults: FaultChain) {
         self.faults = Some(faults);
@@ -439,19 +450,11 @@ impl Drives {
         self.all.iter().map(state).collect()
     }
 
-    /// Whether the drives have the same faults as those in `state`; their memories may differ.
-    pub(crate) fn has_faults_of(&self, state: &[DriveState]) -> bool {
-        self.all.iter().zip(state).all(|(drive, saved)| match (&drive.faults, &saved.faults) {
-            (Some(faults), Some(saved)) => faults.has_faults_of(saved),
-            (faults, saved) => faults.is_none() && saved.is_none(),
-        })
-    }
-
     /// Restores the state of a checkpoint, at a communication point.
     ///
     /// # Errors
     ///
-    /// Returns an error if the checkpoint has another number of driven variables.
+    /// Returns an error if the checkpoint has another number of driven variables, or if faults that had begun differ.
     pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), SystemError> {
         let (expected, actual) = (self.all.len(), state.len());
         if actual != expected {
@@ -459,8 +462,13 @@ impl Drives {
                 "the checkpoint is of {actual} driven variables, expected {expected} as in the scenario"
             )));
         }
-        for (drive, DriveState { faults, accepted, committed }) in self.all.iter_mut().zip(state) {
-            (drive.faults, drive.committed) = (faults, committed);
+        for (drive, saved) in self.all.iter_mut().zip(state) {
+            let faults = drive.resumed_faults(&saved).ok_or_else(|| {
+                contradiction("the checkpoint has other faults of a driven variable that have begun")
+            })?;
+            let DriveState { accepted, committed, .. } = saved;
+            drive.faults = Some(faults).filter(|faults| !faults.is_empty());
+            drive.committed = committed;
             drive.cursor = Cursor::default();
             (drive.written, drive.accepted) = (accepted, accepted);
         }

@@ -135,7 +135,7 @@ pub enum FaultError {
 /// (the value at which it sticks, the last value not lost, the delayed values) changes only in
 /// [`FaultChain::commit`], which receives the values at final communication points. Neither
 /// function allocates.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultChain {
     stages: Vec<Stage>,
     /// The smallest and the largest value of the input, if it is an Integer of a system.
@@ -237,10 +237,27 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
-    /// Whether both have the same faults in the same windows; their memories may differ.
-    pub(crate) fn has_faults_of(&self, other: &Self) -> bool {
-        let mut pairs = self.stages.iter().zip(&other.stages);
-        self.len() == other.len() && pairs.all(|(stage, other)| stage.is_same_fault(other))
+    /// Takes over the memory of the faults of `saved`, a chain of the same input at `time` in s; other faults have no
+    /// memory. Returns false, and changes nothing, if one of them has begun by then.
+    pub(crate) fn resume(&mut self, saved: &Self, time: f64) -> bool {
+        let begun = |stages: &[Stage]| stages.iter().any(|stage| stage.has_begun(time));
+        let (mut resumed, mut rest) = (self.stages.clone(), saved.stages.as_slice());
+        for stage in &mut resumed {
+            match rest.iter().position(|saved| saved.is_same_fault(stage)) {
+                Some(position) if begun(&rest[..position]) => return false,
+                Some(position) => {
+                    stage.clone_from(&rest[position]);
+                    rest = &rest[position + 1..];
+                }
+                None if stage.has_begun(time) => return false,
+                None => stage.forget(),
+            }
+        }
+        if begun(rest) {
+            return false;
+        }
+        self.stages = resumed;
+        true
     }
 
     /// Takes over the memory of the faults of `earlier`; returns false, and changes nothing, if they are

@@ -67,6 +67,11 @@ impl DelayLine {
         Ok(Self { seconds, spacing: 0.5 * step, room, points })
     }
 
+    /// Removes all points.
+    pub(super) fn clear(&mut self) {
+        self.points.clear();
+    }
+
     /// Adds a point and removes the points that are no longer needed. It replaces the last point if that
     /// one is not earlier or if the points would be too close.
     pub(super) fn push(&mut self, time: f64, value: f64) {

@@ -33,6 +33,20 @@ impl Stage {
         self.window == other.window && self.fault == other.fault
     }
 
+    /// Whether the fault has acted by `time` in s, or delays values from before it.
+    pub(super) fn has_begun(&self, time: f64) -> bool {
+        let past = if let Fault::Delay { seconds, .. } = self.fault { seconds } else { 0.0 };
+        reached(time, self.window.from - past)
+    }
+
+    /// Forgets all values.
+    pub(super) fn forget(&mut self) {
+        self.last = None;
+        if let Some(line) = &mut self.line {
+            line.clear();
+        }
+    }
+
     /// Applies the fault to a value with its first two derivatives with respect to time.
     pub(super) fn apply(&self, time: f64, derivatives: [f64; 3]) -> [f64; 3] {
         if !self.window.contains(time) {
