@@ -37,7 +37,8 @@ def options(data: Input, element: str, variables: Iterable[Variable]) -> tuple[l
 
         def values(time: float) -> dict[str, Any]:
             present = function(time)
-            if not isinstance(present, Mapping):
+            # A row of pandas has names, too.
+            if not hasattr(present, "items"):
                 raise TypeError(f"input: expected a dict of values at t = {time:.12g} s, found {type(present).__name__}")
             return {f"{element}.{name}": value for name, value in spread(present, shapes)}
 

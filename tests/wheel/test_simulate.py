@@ -96,6 +96,14 @@ def test_a_function_of_time_drives_inputs(pendulum):
         af.simulate(pendulum, input=lambda t: None)
 
 
+def test_a_function_of_time_returns_a_dict_or_a_row_of_pandas(pendulum):
+    pandas = pytest.importorskip("pandas")
+    of_rows, of_dicts = (
+        af.simulate(pendulum, stop_time=0.1, input=lambda t, kind=kind: kind({"u": 3.0 * t})) for kind in (pandas.Series, dict)
+    )
+    assert of_rows == of_dicts
+
+
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="Linux only")
 def test_an_isolated_fmu_is_never_loaded_into_this_process(python):
     program = """
