@@ -32,7 +32,8 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
         plant: as for :func:`design`.
         grid: by entry, with a dot for an entry of a table, whose other entries stay, the values to try:
             ``{"observer.eigenvalues": [[-4, -5, -6], [-8, -10, -12]]}``.
-        entries: as for :func:`design`, the same in all designs.
+        entries: as for :func:`design`, the same in all designs; ``observer=None`` removes the table of the plant, for
+            a grid with another requirement.
 
     Returns:
         one row for each combination: the designs and their measures.
@@ -62,9 +63,10 @@ def trade_off(plant: object, grid: Mapping[str, Iterable[Any]], **entries: Any) 
 
 
 def _set(entries: dict[str, Any], place: list[str], value: Any) -> None:
-    """Set an entry of nested dicts, of which only those on the way are copied."""
+    """Set an entry of nested dicts, of which only those on the way are copied; dicts take the place of other values."""
     for name in place[:-1]:
-        entries[name] = dict(entries.get(name) or {})
+        known = entries.get(name)
+        entries[name] = dict(known) if isinstance(known, Mapping) else {}
         entries = entries[name]
     entries[place[-1]] = value
 

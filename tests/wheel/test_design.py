@@ -260,6 +260,19 @@ def test_a_trade_off_keeps_the_other_entries_of_a_table():
     assert [(limit["amber"], limit["tolerance"]) for limit in limits] == [(1.8, [0.05] * 4), (2.2, [0.05] * 4)]
 
 
+def test_a_trade_off_with_another_requirement_removes_that_of_the_plant():
+    plant = {name: matrix.reshape(shape) for name, matrix, shape in zip("ABC", SERVO, ((2, 2), (2, 1), (1, 2)))}
+    plant |= REQUIREMENTS
+    with pytest.raises(af.DesignError):
+        af.trade_off(plant, {"observer.bandwidth": [8.0]})
+    (design,) = af.trade_off(plant, {"observer.bandwidth": [8.0]}, observer=None).designs
+    assert design.entries["observer"] == {"bandwidth": 8.0} and "eigenvalues" in plant["observer"]
+    # A number has no other entries; matrices that the table does not name are exact.
+    plant["robustness"] = {"tolerance": 0.05}
+    (design,) = af.trade_off(plant, {"robustness.tolerance.A": [0.1]}).designs
+    assert design.report["verdict"]["limits"]["tolerance"] == [0.1, 0.0, 0.0, 0.0]
+
+
 def test_a_delay_margin_without_a_limit_is_infinite():
     from aso_ftc._trade_off import measures
 
