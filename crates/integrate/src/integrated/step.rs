@@ -92,6 +92,8 @@ impl Integrated {
                 let reached = self.point.time;
                 let at_end = reached >= end - rounding;
                 if self.hands_over && (at_end || self.stops && reached > start) {
+                    // Up to rounding, an event at the end is not before it.
+                    let reached = if at_end { reached.max(end) } else { reached };
                     return Ok(StepResult::Event { reached });
                 }
                 self.enter_event()?;

@@ -149,6 +149,17 @@ fn an_event_that_is_later_than_the_end_of_a_step_by_rounding_belongs_to_this_ste
     assert!((events - 5.0).abs() < 0.5, "{events}");
 }
 
+/// The master takes an earlier event for one within the step.
+#[test]
+fn an_event_that_is_earlier_than_the_end_of_a_step_by_rounding_is_at_this_end() {
+    let mut slave = timer(|_| 1.0, 1e3, [0.01, -1.6e-10]);
+    slave.hand_over_events(false).unwrap();
+    steps(&mut slave, 1e3, 1e-4, 99);
+    let (time, size) = (1e3 + 99.0 * 1e-4, 1e-4);
+    let done = slave.do_step(time, size, true).unwrap();
+    assert_eq!(done, StepResult::Event { reached: time + size });
+}
+
 /// The nominal value is a tolerance, on which the size of the steps depends.
 #[test]
 fn a_restored_state_goes_on_with_its_nominal_values_bit_by_bit() {
