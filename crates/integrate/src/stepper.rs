@@ -118,6 +118,16 @@ impl Stepper {
         self.scale = scale;
     }
 
+    /// Returns the nominal value of each state.
+    pub(crate) fn nominals(&self) -> &[f64] {
+        self.scale.nominals()
+    }
+
+    /// Replaces the nominal values by those that [`Stepper::nominals`] has returned.
+    pub(crate) fn set_nominals(&mut self, nominals: &[f64]) {
+        self.scale.set_nominals(nominals);
+    }
+
     /// Forgets the derivative at the present point, because inputs may have changed.
     pub(crate) fn forget_slope(&mut self) {
         self.has_slope = false;

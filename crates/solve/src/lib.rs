@@ -97,6 +97,12 @@ impl Scale {
         &self.nominals
     }
 
+    /// Replaces the nominal value of each component by one that [`Scale::nominals`] has returned.
+    pub fn set_nominals(&mut self, nominals: &[f64]) {
+        self.nominals.clear();
+        self.nominals.extend_from_slice(nominals);
+    }
+
     /// Returns the weight `w_i` of component `index`, from 0, for the values `a` and `b`.
     #[must_use]
     pub fn weight(&self, index: usize, a: f64, b: f64) -> f64 {

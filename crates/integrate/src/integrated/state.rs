@@ -12,6 +12,8 @@ pub(super) struct Saved {
     /// The point with the memory of the integrator; `None` in a slot without a state.
     point: Option<Point>,
     states: Vec<f64>,
+    /// The nominal values of the states, which events may change.
+    nominals: Vec<f64>,
     indicators: Vec<f64>,
     tracks: Vec<Track>,
 }
@@ -25,6 +27,8 @@ impl Integrated {
         let saved = &mut self.saved[slot];
         saved.point = Some(Point { memory: self.stepper.memory, ..self.point });
         saved.states.clone_from(&self.states);
+        saved.nominals.clear();
+        saved.nominals.extend_from_slice(self.stepper.nominals());
         saved.indicators.clone_from(&self.indicators);
         saved.tracks.clone_from(&self.inputs.tracks);
     }
@@ -38,6 +42,7 @@ impl Integrated {
         self.indicators.clone_from(&saved.indicators);
         self.inputs.tracks.clone_from(&saved.tracks);
         self.stepper.memory = point.memory;
+        self.stepper.set_nominals(&saved.nominals);
         self.stepper.forget_slope();
     }
 
@@ -46,6 +51,7 @@ impl Integrated {
         let saved = Saved {
             point: Some(Point { memory: self.stepper.memory, ..self.point }),
             states: self.states.clone(),
+            nominals: self.stepper.nominals().to_vec(),
             indicators: self.indicators.clone(),
             tracks: self.inputs.tracks.clone(),
         };
@@ -62,6 +68,7 @@ impl Integrated {
             read.map_err(|error| failed(format!("cannot read a serialised state: {error}")))?;
         let fits = saved.point.is_some()
             && saved.states.len() == self.states.len()
+            && saved.nominals.len() == self.states.len()
             && saved.indicators.len() == self.indicators.len()
             && saved.tracks.len() == self.inputs.tracks.len();
         if !fits {
@@ -69,9 +76,6 @@ impl Integrated {
             return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&fmu_state)?;
-        // An event may have changed the nominal values.
-        let scale = self.scale()?;
-        self.stepper.set_scale(scale);
         // In a temporary slot after those of the master.
         let slot = self.saved.len();
         self.saved.push(saved);

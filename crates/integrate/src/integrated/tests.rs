@@ -18,6 +18,7 @@ struct Timer {
     time: f64,
     x: f64,
     events: f64,
+    saved: Vec<u8>,
 }
 
 impl Timer {
@@ -35,8 +36,8 @@ fn timer(slope: fn(f64) -> f64, start: f64, [period, late]: [f64; 2]) -> Integra
         <Real/></ScalarVariable></ModelVariables><ModelStructure><Outputs><Unknown index="1"/>
         <Unknown index="2"/></Outputs></ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
-    let (time, x, events) = (0.0, 0.0, 0.0);
-    let instance = Timer { description, slope, period, late, start, time, x, events };
+    let (time, x, events, saved) = (0.0, 0.0, 0.0, Vec::new());
+    let instance = Timer { description, slope, period, late, start, time, x, events, saved };
     let mut slave = Integrated::new(Box::new(instance), Options::default());
     let experiment = Experiment { start_time: start, ..Experiment::default() };
     slave.setup_experiment(&experiment).unwrap();
@@ -75,6 +76,14 @@ impl Slave for Timer {
     }
     fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
         Err(absent("fmi2DoStep"))
+    }
+    fn save_state(&mut self, _: usize) -> Done {
+        self.saved = self.serialize_state()?;
+        Ok(())
+    }
+    fn restore_state(&mut self, _: usize) -> Done {
+        let saved = self.saved.clone();
+        self.deserialize_state(&saved)
     }
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         Ok([self.time, self.x, self.events].map(f64::to_le_bytes).concat())
@@ -168,5 +177,17 @@ fn a_restored_state_goes_on_with_its_nominal_values_bit_by_bit() {
     steps(&mut first, 0.0, 0.5, 1);
     second.deserialize_state(&first.serialize_state().unwrap()).unwrap();
     let ends = [first, second].map(|mut slave| steps(&mut slave, 0.5, 0.5, 3)[0].to_bits());
+    assert_eq!(ends[0], ends[1]);
+}
+
+/// The event that changes the nominal value is at 0.25 s.
+#[test]
+fn a_step_is_repeated_with_the_nominal_values_of_its_start_bit_by_bit() {
+    let new = || timer(|time| (50.0 * time).cos(), 0.0, [0.25, 0.0]);
+    let (mut repeated, first) = (new(), new());
+    repeated.save_state(0).unwrap();
+    steps(&mut repeated, 0.0, 0.5, 1);
+    repeated.restore_state(0).unwrap();
+    let ends = [repeated, first].map(|mut slave| steps(&mut slave, 0.0, 0.1, 2)[0].to_bits());
     assert_eq!(ends[0], ends[1]);
 }
