@@ -194,7 +194,7 @@ pub(super) struct ResultsOptions {
     out: Option<PathBuf>,
     /// Results, .csv or .parquet; -: CSV on stdout
     ///
-    /// [default: the name of the system.toml, or results.csv, in the folder of --out]
+    /// [default: that of the system.toml, or results.csv in the folder of --out]
     #[arg(long, value_name = "FILE")]
     results: Option<PathBuf>,
     /// Format of the results: csv or parquet
@@ -223,7 +223,7 @@ pub(super) struct ResultsOptions {
     plot: Vec<String>,
     /// File of the plot, .svg or .png
     ///
-    /// [default: the name of the system.toml, or plot.svg, in the folder of --out]
+    /// [default: that of the system.toml, or plot.svg in the folder of --out]
     #[arg(long, value_name = "FILE")]
     plot_file: Option<PathBuf>,
     /// Write the frames of the CAN buses to this file
