@@ -85,6 +85,21 @@ def test_a_restored_simulation_repeats_its_steps_bit_for_bit(paper, algorithm):
             other.restore(b"nothing")
 
 
+def test_one_run_is_the_start_of_several_with_a_fault_each(paper):
+    with paper.simulation(stop_time=1.0) as nominal:
+        nominal.run_until(0.02)
+        state = nominal.save()
+    for start in (0.05, 0.06):
+        late = [af.fault("controller.x_p", "bias", value=0.01, start=start)]
+        with paper.simulation(stop_time=1.0, faults=late) as whole, paper.simulation(stop_time=1.0, faults=late) as branch:
+            branch.restore(state)
+            assert whole.run_until(0.1) > branch.run_until(0.1)
+            assert branch["plant.x_p"] == whole["plant.x_p"]
+    with paper.simulation(stop_time=1.0, faults=[af.fault("controller.x_p", "bias", value=0.01)]) as other:
+        with pytest.raises(af.ConfigurationError, match="only faults that begin later may differ"):
+            other.restore(state)
+
+
 def test_a_set_input_acts_from_the_next_step_on():
     system = af.System().add("p", af.fmus()["FrictionPendulum"])
     with system.simulation(stop_time=1.0, step=0.01) as simulation:

@@ -27,7 +27,7 @@ const FIRST_SLOT: usize = 3;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     origin: Origin,
-    /// The names of everything to which the state of the master belongs, see [`Simulation::parts`].
+    /// The names of the connections and driven variables, in their order.
     parts: Vec<String>,
     time: f64,
     /// The latest end in s of a step that was attempted.
