@@ -120,7 +120,7 @@ def _unmasked(column: Any) -> NDArray[Any]:
     """Return a column as an array, with None for the values that are masked."""
     import numpy
 
-    if numpy.ma.isMaskedArray(column):
+    if numpy.ma.is_masked(column):
         return numpy.array(column.tolist(), dtype=object)
     return numpy.asarray(column)
 

@@ -53,6 +53,7 @@ def test_durations_are_times_in_s_and_dates_are_none(first):
     tables = [
         {"time": nanoseconds, "u": FORCE},
         {"time": nanoseconds.astype("timedelta64[ms]"), "u": FORCE},
+        {"time": np.ma.masked_array(nanoseconds), "u": np.ma.masked_array(FORCE)},
         pandas.DataFrame({"u": FORCE}, index=pandas.TimedeltaIndex(nanoseconds, name="time")),
         xarray.Dataset({"u": ("time", FORCE)}, coords={"time": nanoseconds}),
     ]
