@@ -464,7 +464,7 @@ impl Drives {
         }
         for (drive, saved) in self.all.iter_mut().zip(state) {
             let faults = drive.resumed_faults(&saved).ok_or_else(|| {
-                contradiction("the checkpoint has other faults of a driven variable that have begun")
+                contradiction("the checkpoint has other faults of a driven variable, which began")
             })?;
             let DriveState { accepted, committed, .. } = saved;
             drive.faults = Some(faults).filter(|faults| !faults.is_empty());

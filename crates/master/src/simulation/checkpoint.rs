@@ -197,8 +197,8 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// Returns an error if slaves, connections, faults that have begun, driven variables, start time or algorithm differ
-    /// from the checkpoint, or if an FMU refuses its state.
+    /// Returns an error if slaves, connections, faults that have begun, driven variables, start time or algorithm
+    /// differ from the checkpoint, or if an FMU refuses its state.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         let scenario = self.resumed_scenario(checkpoint)?;
         let states = checkpoint.slaves.iter();
@@ -243,8 +243,8 @@ impl Simulation {
         faults.filter_map(|(input, fault)| Some((input, fault?.clone()))).collect()
     }
 
-    /// Returns the driven variables and the faults of this simulation with the memory that they have in `checkpoint`. An
-    /// error if slaves, connections, driven variables, start time, algorithm or faults that have begun differ from it.
+    /// Returns the driven variables and the faults of this simulation with their memory in `checkpoint`. An error if
+    /// slaves, connections, driven variables, start time, algorithm or faults that have begun differ from it.
     fn resumed_scenario(&mut self, checkpoint: &Checkpoint) -> Result<Scenario, SystemError> {
         self.expect_same_system(checkpoint)?;
         let system = &self.engine.system;
