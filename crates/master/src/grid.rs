@@ -162,11 +162,13 @@ impl Grid {
         self.limited(self.time + size, size)
     }
 
-    /// Returns the grid point `t_start + number H`, in s.
+    /// Returns the grid point `t_start + number H`, in s; 0 if it is 0 up to the rounding of the product, because no
+    /// other time is equal to 0 s up to rounding.
     #[inline]
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     fn point(&self, number: u64) -> f64 {
-        self.start + number as f64 * self.step
+        let point = self.start + number as f64 * self.step;
+        if point.abs() <= f64::EPSILON * self.start.abs() { 0.0 } else { point }
     }
 
     /// Returns the first grid point after `time`, in s; both may be beyond the stop time.

@@ -96,3 +96,14 @@ fn a_run_that_goes_on_after_a_shorter_last_step_returns_to_the_grid() {
     second.reach(end);
     assert_eq!(second.next(), (0.0 + 12.0 * 0.1, 0.1));
 }
+
+/// -0.9 + 3 * 0.3 is -1.1e-16 in double precision.
+#[test]
+fn a_run_that_starts_before_0_s_has_its_grid_point_at_0_s() {
+    for (step, start, number) in
+        [(0.3, -0.9, 3), (0.1, -0.3, 3), (0.1, -1.7, 17), (0.01, -0.35, 35)]
+    {
+        assert_eq!(grid(step, start, 10.0).point(number), 0.0, "{step} {start}");
+    }
+    assert_eq!(grid(0.25, 1e-3, 10.0).point(0), 1e-3);
+}
