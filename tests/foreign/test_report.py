@@ -355,19 +355,6 @@ def test_a_page_is_written_again_whatever_the_name_of_the_file(aso_ftc, write):
         report(aso_ftc, file)
 
 
-def test_the_page_of_a_file_of_the_same_name_in_another_folder_is_kept(aso_ftc, write, tmp_path):
-    page = tmp_path / "page.html"
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-    one, other = (write(f"{folder}/results.csv", frame()) for folder in ("a", "b"))
-    report(aso_ftc, one, "--out", page)
-    before = page.read_bytes()
-    done = aso_ftc("report", other, "--out", page)
-    assert done.returncode == 2 and "not written by aso-ftc report of b/results.csv; --force" in done.stderr
-    assert page.read_bytes() == before
-    report(aso_ftc, one, "--out", page)
-
-
 TRACE = """(0.001000) can0 100#0102
 (0.001500) can0 00000101#
 (0.002000) can0 100#0102

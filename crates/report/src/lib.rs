@@ -215,13 +215,11 @@ pub enum Error {
     },
 }
 
-/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in a
-/// folder with the name of its folder. Characters that the page has in another form are `_`.
+/// Returns the text by which a later report recognises a report of a results file with the name of `results`, in any
+/// folder, which it may replace. Characters that the page has in another form are `_`.
 #[must_use]
 pub fn identity(results: &Path) -> String {
-    let path = results.canonicalize().unwrap_or_else(|_| results.to_owned());
-    let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
-    let identity = format!("aso-ftc report of {folder}/{}", name(results));
+    let identity = format!("aso-ftc report of {}", name(results));
     identity.replace(|sign: char| "&<>\"".contains(sign) || sign.is_control(), "_")
 }
 
