@@ -161,7 +161,7 @@ def test_it_plays_at_once_and_every_control_answers(tmp_path):
         page.until("Number(document.getElementById('time').value) > 20", limit=20)
         page.evaluate("document.getElementById('speed').value = '200'")
         page.until("Number(document.getElementById('time').value) === 1000", limit=30)
-        assert page.evaluate("document.getElementById('play').textContent") == "Run"
+        page.until("document.getElementById('play').textContent === 'Run'")
         page.evaluate("document.getElementById('play').click()")
         assert page.evaluate("document.getElementById('play').textContent") == "Pause"
         names = page.evaluate("[...document.querySelectorAll('#fields input')].map((input) => input.id)")
