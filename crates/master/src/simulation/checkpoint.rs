@@ -16,7 +16,7 @@ use crate::exchange::Values;
 use crate::fault::FaultChain;
 use crate::step_control::Controller;
 use crate::system::{Port, System};
-use slave::{Slave, Value};
+use slave::Value;
 
 pub(super) use origin::Origin;
 
@@ -29,6 +29,17 @@ pub struct Checkpoint {
     origin: Origin,
     /// The names of the connections and driven variables, in their order.
     parts: Vec<String>,
+    master: MasterState,
+    /// Faults on connections, each with the input of its connection.
+    faults: Vec<(Port, FaultChain)>,
+    drives: Vec<DriveState>,
+    /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
+    slaves: Vec<(String, String, Vec<u8>)>,
+}
+
+/// The state of the master without that of the scenario.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct MasterState {
     time: f64,
     /// The latest end in s of a step that was attempted.
     attempted: f64,
@@ -39,15 +50,10 @@ pub struct Checkpoint {
     controller: Controller,
     iteration: Option<Iteration>,
     values: Values,
-    /// Faults on connections, each with the input of its connection.
-    faults: Vec<(Port, FaultChain)>,
-    drives: Vec<DriveState>,
     /// Values of inputs that were set last by [`System::set_value`].
     inputs: Vec<(Port, Value)>,
     /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
     pending: Vec<f64>,
-    /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
-    slaves: Vec<(String, String, Vec<u8>)>,
     ended: Option<Ending>,
 }
 
@@ -55,7 +61,7 @@ impl Checkpoint {
     /// Returns the time reached in s.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.time
+        self.master.time
     }
 
     /// Returns the stop time in s that the FMUs received in `fmi2SetupExperiment`, if any. A
@@ -68,8 +74,8 @@ impl Checkpoint {
 
 /// A state of a simulation in memory, see [`Simulation::keep`].
 pub struct KeptState {
-    /// The state of the master; the FMU states are empty.
-    master: Checkpoint,
+    master: MasterState,
+    scenario: Scenario,
     slot: usize,
 }
 
@@ -89,16 +95,27 @@ impl Simulation {
     /// Returns an error if an FMU cannot serialise its state (`canSerializeFMUstate` is false) or
     /// fails to do so.
     pub fn checkpoint(&mut self) -> Result<Checkpoint, SystemError> {
-        self.checkpoint_with(|name, slave, time| {
+        let time = self.engine.grid.time;
+        let mut slaves = Vec::new();
+        for (name, slave) in &mut self.engine.system.slaves {
             let flags = slave.description().co_simulation.as_ref();
             if !flags.is_some_and(|flags| flags.can_serialize_fmu_state) {
                 return Err(SystemError::Capability {
-                    slave: name.to_owned(),
+                    slave: name.clone(),
                     lacks: "canSerializeFMUstate",
                     required_by: "a checkpoint".to_owned(),
                 });
             }
-            slave.serialize_state().map_err(|source| call(name, time, source))
+            let bytes = slave.serialize_state().map_err(|source| call(name, time, source))?;
+            slaves.push((name.clone(), slave.description().guid.clone(), bytes));
+        }
+        Ok(Checkpoint {
+            origin: self.origin.clone(),
+            parts: self.parts(),
+            master: self.master_state(),
+            faults: self.faults(),
+            drives: self.engine.drives.state(),
+            slaves,
         })
     }
 
@@ -110,63 +127,47 @@ impl Simulation {
     /// Returns an error if an FMU cannot save its state (`canGetAndSetFMUstate` is false) or fails to do
     /// so.
     pub fn keep(&mut self, slot: usize) -> Result<KeptState, SystemError> {
-        let master = self.checkpoint_with(|name, slave, time| {
-            let saved = slave.save_state(FIRST_SLOT + slot);
-            saved.map(|()| Vec::new()).map_err(|source| call(name, time, source))
-        })?;
-        Ok(KeptState { master, slot })
+        let time = self.engine.grid.time;
+        for (name, slave) in &mut self.engine.system.slaves {
+            slave.save_state(FIRST_SLOT + slot).map_err(|source| call(name, time, source))?;
+        }
+        let scenario = Scenario { drives: self.engine.drives.clone(), faults: self.faults() };
+        Ok(KeptState { master: self.master_state(), scenario, slot })
     }
 
-    /// Returns to a kept state of this simulation. `state` is the last result of [`Simulation::keep`] with its
-    /// slot: an older one has lost its FMU states.
+    /// Returns to a kept state of this simulation, with the driven variables and faults of then. `state` is the last
+    /// result of [`Simulation::keep`] with its slot: an older one has lost its FMU states.
     ///
     /// # Errors
     ///
-    /// Returns an error if slaves, connections, faults that have begun or driven variables differ from the kept state,
-    /// or if an FMU refuses its state.
+    /// Returns an error if an FMU refuses its state.
     pub fn return_to(&mut self, state: &KeptState) -> Result<(), SystemError> {
-        let scenario = self.resumed_scenario(&state.master)?;
+        let KeptState { master, scenario, slot } = state;
         for (name, slave) in &mut self.engine.system.slaves {
-            let restored = slave.restore_state(FIRST_SLOT + state.slot);
-            restored.map_err(|source| call(name, state.master.time, source))?;
+            let restored = slave.restore_state(FIRST_SLOT + slot);
+            restored.map_err(|source| call(name, master.time, source))?;
         }
-        self.restore_master(&state.master, scenario)
+        self.restore_master(master, scenario.clone())
     }
 
-    /// Creates a checkpoint whose FMU states are the bytes that `fmu_state` returns for the name of a slave, the slave
-    /// and the time in s.
-    fn checkpoint_with(
-        &mut self,
-        fmu_state: impl Fn(&str, &mut dyn Slave, f64) -> Result<Vec<u8>, SystemError>,
-    ) -> Result<Checkpoint, SystemError> {
-        let time = self.engine.grid.time;
-        let mut slaves = Vec::new();
-        for (name, slave) in &mut self.engine.system.slaves {
-            let bytes = fmu_state(name, slave.as_mut(), time)?;
-            slaves.push((name.clone(), slave.description().guid.clone(), bytes));
-        }
+    fn master_state(&self) -> MasterState {
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
         let inputs = self.engine.system.input_values.iter();
         let mut inputs: Vec<_> = inputs.map(|(port, value)| (*port, value.clone())).collect();
         inputs.sort_unstable_by_key(|(port, _)| (port.slave, port.variable));
-        Ok(Checkpoint {
-            origin: self.origin.clone(),
-            parts: self.parts(),
-            time,
+        MasterState {
+            time: self.engine.grid.time,
             attempted: self.attempted,
             count: self.engine.grid.count,
             size: self.control.size,
             controller: self.control.controller.clone(),
             iteration: self.coupler.iterated.as_ref().map(|iterated| iterated.iteration.clone()),
             values,
-            faults: self.faults(),
-            drives: self.engine.drives.state(),
             inputs,
             pending: self.engine.instants.pending.clone(),
-            slaves,
             ended: self.ended,
-        })
+        }
     }
 
     /// Creates the simulation of `checkpoint` with new slaves in `system`. The stop time may differ
@@ -203,34 +204,37 @@ impl Simulation {
         let scenario = self.resumed_scenario(checkpoint)?;
         let states = checkpoint.slaves.iter();
         for ((name, slave), (_, _, bytes)) in self.engine.system.slaves.iter_mut().zip(states) {
-            slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
+            slave
+                .deserialize_state(bytes)
+                .map_err(|source| call(name, checkpoint.time(), source))?;
         }
-        self.restore_master(checkpoint, scenario)
+        self.restore_master(&checkpoint.master, scenario)
     }
 
-    /// Restores everything but the FMU states; `scenario` is that of [`Simulation::resumed_scenario`].
+    /// Restores everything but the FMU states; `scenario` has its memory at the time of `state`.
     fn restore_master(
         &mut self,
-        checkpoint: &Checkpoint,
+        state: &MasterState,
         scenario: Scenario,
     ) -> Result<(), SystemError> {
-        self.engine.exchange.restore(&checkpoint.values);
+        self.engine.exchange.restore(&state.values);
         self.engine.exchange.set_faults(&self.engine.system, &scenario.faults)?;
         self.engine.drives = scenario.drives;
-        self.engine.grid.resume(checkpoint.time, checkpoint.count);
-        let (system, time) = (&mut self.engine.system, checkpoint.time);
-        system.input_values = checkpoint.inputs.iter().cloned().collect();
+        self.engine.choose_sweep();
+        self.engine.grid.resume(state.time, state.count);
+        let (system, time) = (&mut self.engine.system, state.time);
+        system.input_values = state.inputs.iter().cloned().collect();
         system.changes += 1;
-        self.engine.instants.restore(system, &checkpoint.pending, time)?;
-        self.attempted = checkpoint.attempted;
-        self.ended = checkpoint.ended;
-        self.control.size = checkpoint.size;
-        self.control.controller = checkpoint.controller.clone();
+        self.engine.instants.restore(system, &state.pending, time)?;
+        self.attempted = state.attempted;
+        self.ended = state.ended;
+        self.control.size = state.size;
+        self.control.controller = state.controller.clone();
         let iterated = &mut self.coupler.iterated;
-        if let (Some(iterated), Some(iteration)) = (iterated, &checkpoint.iteration) {
+        if let (Some(iterated), Some(iteration)) = (iterated, &state.iteration) {
             iterated.iteration = iteration.clone();
         }
-        // Faults that the checkpoint lacks record the present values.
+        // Faults that the state lacks record the present values.
         self.engine.commit();
         Ok(())
     }
@@ -247,9 +251,9 @@ impl Simulation {
     /// slaves, connections, driven variables, start time, algorithm or faults that have begun differ from it.
     fn resumed_scenario(&mut self, checkpoint: &Checkpoint) -> Result<Scenario, SystemError> {
         self.expect_same_system(checkpoint)?;
-        let system = &self.engine.system;
+        let (system, time) = (&self.engine.system, checkpoint.time());
         let other = |input: Port| {
-            let (name, time) = (system.name(input), seconds(checkpoint.time));
+            let (name, time) = (system.name(input), seconds(time));
             contradiction(format!(
                 "{name} has other faults than in the checkpoint at t = {time} s: only faults that begin later may \
                  differ, delays only if they begin later by more than their length"
@@ -258,14 +262,14 @@ impl Simulation {
         let mut faults = self.faults();
         for (input, saved) in &checkpoint.faults {
             let is_missing = faults.iter().all(|(known, _)| known != input);
-            if is_missing && !FaultChain::default().resume(saved, checkpoint.time) {
+            if is_missing && !FaultChain::default().resume(saved, time) {
                 return Err(other(*input));
             }
         }
         for (input, chain) in &mut faults {
             let saved = checkpoint.faults.iter().find(|(known, _)| *known == *input);
             let saved = saved.map(|(_, chain)| chain.clone()).unwrap_or_default();
-            if !chain.resume(&saved, checkpoint.time) {
+            if !chain.resume(&saved, time) {
                 return Err(other(*input));
             }
         }
@@ -318,7 +322,7 @@ impl Simulation {
         }
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
-        if values.has_shape_of(&checkpoint.values) {
+        if values.has_shape_of(&checkpoint.master.values) {
             return Ok(());
         }
         Err(contradiction(

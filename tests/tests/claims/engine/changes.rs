@@ -104,6 +104,33 @@ fn a_run_with_a_change_is_that_with_the_change_from_the_start_bit_for_bit() {
 }
 
 #[test]
+fn a_run_that_returns_to_a_kept_state_has_the_faults_of_then() {
+    let algorithm = Algorithm::new(0.01);
+    let (mut with_change, mut without) =
+        (simulation(FIRST, &algorithm), simulation(FIRST, &algorithm));
+    for _ in 0..20 {
+        with_change.step().unwrap();
+        without.step().unwrap();
+    }
+    let state = with_change.keep(0).unwrap();
+    let text =
+        format!("{FIRST}[[scenario.fault]]\nconnection = \"b.u0\"\nstuck = {{ from = 0.205 }}\n");
+    let scenario = resolve(&text, with_change.system(), algorithm.step);
+    with_change.change_scenario(scenario).unwrap();
+    for _ in 0..10 {
+        with_change.step().unwrap();
+    }
+    let disturbed = point(&mut with_change);
+    with_change.return_to(&state).unwrap();
+    for _ in 0..10 {
+        with_change.step().unwrap();
+        without.step().unwrap();
+        assert_eq!(point(&mut with_change), point(&mut without));
+    }
+    assert_ne!(disturbed, point(&mut without));
+}
+
+#[test]
 fn what_the_run_has_cannot_be_taken_away_or_changed() {
     let mut simulation = simulation(FIRST, &Algorithm::new(0.01));
     simulation.step().unwrap();
