@@ -13,6 +13,7 @@ mod events;
 mod fallback;
 mod initial;
 mod last_step;
+mod memory;
 mod multirate;
 mod parts;
 mod puppet;

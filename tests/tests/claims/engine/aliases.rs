@@ -1,62 +1,20 @@
 //! Aliases of FMI 3.0: another name of the same value.
 
-use fmu_description::ModelDescription;
-use master::{
-    Algorithm, CallError, Extrapolation, Method, Readout, Simulation, Slave, StepResult, System,
-};
+use master::System;
 
-use super::until;
+use super::memory::{Memory, after_step};
 
 /// A slave with the input `u` and its alias `also u`, the parameter `p` and its alias `also p`, and the output `y`, which
 /// is `u`.
-struct Aliased {
-    description: ModelDescription,
-    values: [f64; 2],
-}
-
-fn boxed() -> Box<Aliased> {
-    let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="A" instantiationToken="t">
+fn boxed() -> Box<Memory> {
+    let description = r#"<fmiModelDescription fmiVersion="3.0" modelName="A" instantiationToken="t">
         <CoSimulation modelIdentifier="A" canHandleVariableCommunicationStepSize="true"/><ModelVariables>
         <Float64 name="u" valueReference="0" causality="input" start="1"><Alias name="also u"/></Float64>
         <Float64 name="p" valueReference="1" causality="parameter" variability="tunable" start="2">
         <Alias name="also p"/></Float64>
         <Float64 name="y" valueReference="2" causality="output"/></ModelVariables>
         <ModelStructure><Output valueReference="2"/></ModelStructure></fmiModelDescription>"#;
-    let description = ModelDescription::parse(xml).unwrap();
-    Box::new(Aliased { description, values: [1.0, 2.0] })
-}
-
-impl Slave for Aliased {
-    fn description(&self) -> &ModelDescription {
-        &self.description
-    }
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        for (value, &reference) in values.iter_mut().zip(references) {
-            *value = self.values[reference as usize % 2];
-        }
-        Ok(())
-    }
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        for (&value, &reference) in values.iter().zip(references) {
-            self.values[reference as usize] = value;
-        }
-        Ok(())
-    }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
-        Ok(StepResult::Whole)
-    }
-}
-
-/// The values of the names, all of the slave `b`, after a step.
-fn values(system: System, names: &[&str]) -> Vec<f64> {
-    let ports: Vec<_> =
-        names.iter().map(|name| system.port(&format!("b.{name}")).unwrap()).collect();
-    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 1.0);
-    let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
-    simulation.step().unwrap();
-    let mut readout = Readout::new(simulation.system(), &ports);
-    readout.read(simulation.system(), 1.0).unwrap();
-    readout.reals
+    Memory::boxed(description, &[1.0, 2.0])
 }
 
 #[test]
@@ -67,7 +25,7 @@ fn a_variable_and_its_alias_have_one_value_and_one_setting() {
         for (name, value) in [("u", "5"), ("also p", "6"), (input, "7"), (parameter, "8")] {
             system.set(&format!("b.{name}"), value).unwrap();
         }
-        let actual = values(system, &["u", "also u", "p", "also p"]);
+        let actual = after_step(system, &["u", "also u", "p", "also p"]);
         assert_eq!(actual, [7.0, 7.0, 8.0, 8.0], "{input}");
     }
 }
@@ -82,7 +40,7 @@ fn an_input_is_connected_if_its_alias_is() {
         system.connect("a.y", "b.also u").unwrap();
         system
     };
-    assert_eq!(values(system(), &["u", "also u"]), [3.0, 3.0]);
+    assert_eq!(after_step(system(), &["u", "also u"]), [3.0, 3.0]);
     let error = system().connect("a.y", "b.u").unwrap_err().to_string();
     assert_eq!(error, "b.u is connected twice, to a.y and to a.y");
     let (free, names) = (system().free_inputs(), system());

@@ -24,6 +24,18 @@ pub(crate) struct Puppet {
     asked: Asked,
 }
 
+impl Puppet {
+    fn boxed(
+        description: ModelDescription,
+        outputs: [Output; 2],
+        way: Way,
+        asked: &Asked,
+    ) -> Box<Self> {
+        let (time, slots, asked) = (0.0, [0.0; 3], Arc::clone(asked));
+        Box::new(Self { description, time, slots, outputs, way, asked })
+    }
+}
+
 pub(crate) fn whole(_: f64, _: f64) -> StepResult {
     StepResult::Whole
 }
@@ -40,10 +52,8 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
         <Unknown index="2" dependencies=""/></Outputs>
         </ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
-    let (time, slots) = (0.0, [0.0; 3]);
-    let puppet = Puppet { description, time, slots, outputs, way, asked: Arc::clone(&asked) };
     let mut system = System::default();
-    system.add("p", Box::new(puppet)).unwrap();
+    system.add("p", Puppet::boxed(description, outputs, way, &asked)).unwrap();
     let lag = Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
     let lag = Linear::boxed(&lag, ABLE, &Arc::default());
     system.add("a", lag).unwrap();
@@ -54,32 +64,16 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
 /// Adds another puppet, which completes its steps and whose y is the time.
 pub(crate) fn add_clock(system: &mut System, name: &str) {
     let description = system.slaves[0].1.description().clone();
-    let clock = Puppet {
-        description,
-        time: 0.0,
-        slots: [0.0; 3],
-        outputs: [|time| time; 2],
-        way: whole,
-        asked: Asked::default(),
-    };
-    system.add(name, Box::new(clock)).unwrap();
+    let clock = Puppet::boxed(description, [|time| time; 2], whole, &Asked::default());
+    system.add(name, clock).unwrap();
 }
 
 /// The same with a puppet that takes equal steps only.
 pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
-    let shared = Arc::clone(&asked);
     let mut description = system.slaves[0].1.description().clone();
     let flags = description.co_simulation.as_mut().unwrap();
     flags.can_handle_variable_communication_step_size = false;
-    let puppet = Puppet {
-        description,
-        time: 0.0,
-        slots: [0.0; 3],
-        outputs: [f64::sin; 2],
-        way: whole,
-        asked: shared,
-    };
-    system.slaves[0].1 = Box::new(puppet);
+    system.slaves[0].1 = Puppet::boxed(description, [f64::sin; 2], whole, &asked);
     (system, asked)
 }
 

@@ -1,20 +1,11 @@
 //! Units of connected variables: temperatures, and differences of temperatures.
 
-use fmu_description::ModelDescription;
-use master::{
-    Algorithm, CallError, Extrapolation, Method, Readout, Simulation, Slave, StepResult, System,
-    Transformation,
-};
+use master::{System, Transformation};
 
-use super::until;
+use super::memory::{Memory, after_step};
 
 /// A slave with the outputs `rise`, a difference of 5 K, and `temperature`, 293.15 K, and with inputs in other units.
-struct Heater {
-    description: ModelDescription,
-    values: [f64; 6],
-}
-
-fn boxed() -> Box<Heater> {
+fn boxed() -> Box<Memory> {
     let variable = |(reference, (name, attributes)): (usize, &(&str, &str))| {
         let (role, start) = if reference < 2 { ("output", "") } else { ("input", "start='0'") };
         format!(
@@ -31,7 +22,7 @@ fn boxed() -> Box<Heater> {
         ("temperature_in_mK", "unit='mK'"),
     ];
     let variables: String = variables.iter().enumerate().map(variable).collect();
-    let xml = format!(
+    let description = format!(
         r#"<fmiModelDescription fmiVersion="2.0" modelName="Heater" guid="heater">
         <CoSimulation modelIdentifier="H" canHandleVariableCommunicationStepSize="true"/>
         <UnitDefinitions><Unit name="K"><BaseUnit K="1"/></Unit>
@@ -42,29 +33,7 @@ fn boxed() -> Box<Heater> {
         <ModelStructure><Outputs><Unknown index="1" dependencies=""/>
         <Unknown index="2" dependencies=""/></Outputs></ModelStructure></fmiModelDescription>"#
     );
-    let description = ModelDescription::parse(xml).unwrap();
-    Box::new(Heater { description, values: [5.0, 293.15, 0.0, 0.0, 0.0, 0.0] })
-}
-
-impl Slave for Heater {
-    fn description(&self) -> &ModelDescription {
-        &self.description
-    }
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        for (value, &reference) in values.iter_mut().zip(references) {
-            *value = self.values[reference as usize];
-        }
-        Ok(())
-    }
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        for (&value, &reference) in values.iter().zip(references) {
-            self.values[reference as usize] = value;
-        }
-        Ok(())
-    }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
-        Ok(StepResult::Whole)
-    }
+    Memory::boxed(&description, &[5.0, 293.15, 0.0, 0.0, 0.0, 0.0])
 }
 
 fn system() -> System {
@@ -83,13 +52,7 @@ fn a_difference_has_no_offset_and_a_temperature_has_one() {
         let output = input.split('_').next().unwrap();
         system.connect(&format!("a.{output}"), &format!("b.{input}")).unwrap();
     }
-    let ports = inputs.map(|input| system.port(&format!("b.{input}")).unwrap());
-    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 1.0);
-    let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
-    simulation.step().unwrap();
-    let mut readout = Readout::new(simulation.system(), &ports);
-    readout.read(simulation.system(), 1.0).unwrap();
-    for (actual, expected) in readout.reals.iter().zip([5.0, 9.0, 20.0]) {
+    for (actual, expected) in after_step(system, &inputs).into_iter().zip([5.0, 9.0, 20.0]) {
         assert!((actual - expected).abs() < 1e-9, "{actual} {expected}");
     }
 }
