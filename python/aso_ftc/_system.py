@@ -75,15 +75,8 @@ def fault(
     >>> fault("controller.x_p", "bias", value=0.01, start=2.0)
     {'connection': 'controller.x_p', 'bias': {'value': 0.01, 'from': 2.0}}
     """
-    body = dict(parameters)
-    if start is not None:
-        body["from"] = start
-    if until is not None:
-        body["until"] = until
-    entry: dict[str, Any] = {"connection": connection, kind: body}
-    if unit is not None:
-        entry["unit"] = unit
-    return entry
+    body = {**parameters, **stated({"from": start, "until": until})}
+    return {"connection": connection, kind: body, **stated({"unit": unit})}
 
 
 class System:
@@ -189,9 +182,8 @@ class System:
         else:
             kind = type(fmu).__name__
             raise TypeError(f"{name}: expected a path or an object with a function step, found {kind}")
-        for table, value in (("interface", interface), ("solver", solver)):
-            if value is not None:
-                self._rest.setdefault(table, {})[name] = value
+        for table, value in stated({"interface": interface, "solver": solver}).items():
+            self._rest.setdefault(table, {})[name] = value
         if every is not None:
             self.algorithm.setdefault("every", {})[name] = every
         return self
@@ -208,11 +200,7 @@ class System:
             source: ``"fmu.output"``.
             target: ``"fmu.input"``.
         """
-        entry: dict[str, Any] = {"from": source, "to": target}
-        if factor is not None:
-            entry["factor"] = factor
-        if offset is not None:
-            entry["offset"] = offset
+        entry = {"from": source, "to": target, **stated({"factor": factor, "offset": offset})}
         self._rest.setdefault("connections", []).append(entry)
         return self
 
@@ -240,17 +228,13 @@ class System:
             kind: exactly one of ``constant``, ``steps``, ``points``, ``ramp``, ``sine``, ``csv``, as in
                 ``[[scenario.signal]]``.
         """
-        entry: dict[str, Any] = {"variable": variable, **kind}
-        if unit is not None:
-            entry["unit"] = unit
+        entry = {"variable": variable, **kind, **stated({"unit": unit})}
         self.scenario.setdefault("signal", []).append(entry)
         return self
 
     def add_setting(self, variable: str, at: float, value: Value, unit: str | None = None) -> System:
         """Set an unconnected input or a tunable parameter at a simulated time in s."""
-        entry: dict[str, Any] = {"variable": variable, "at": at, "value": value}
-        if unit is not None:
-            entry["unit"] = unit
+        entry = {"variable": variable, "at": at, "value": value, **stated({"unit": unit})}
         self.scenario.setdefault("set", []).append(entry)
         return self
 
@@ -265,13 +249,9 @@ class System:
         return copy.deepcopy(self._rest.get("connections", []))
 
     def _config(self) -> dict[str, Any]:
-        config = {name: value for name, value in self._rest.items()}
-        config["settings"] = _flat(self.start_values)
-        for name in _TABLES:
-            table = getattr(self, name)
-            if table:
-                config[name] = table
-        return config
+        tables = {name: getattr(self, name) for name in _TABLES}
+        filled = {name: table for name, table in tables.items() if table}
+        return {**self._rest, "settings": _flat(self.start_values), **filled}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the structure of the ``system.toml`` with absolute paths, without Python slaves."""
@@ -286,9 +266,7 @@ class System:
         return copy.deepcopy(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        state = dict(self.__dict__)
-        state["_cache"] = None
-        return state
+        return {**self.__dict__, "_cache": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> System:
         system = type(self).__new__(type(self))
@@ -310,45 +288,22 @@ class System:
         rows = [(name, file, "; ".join(sources.get(name, ()))) for name, file in [*fmus, *slaves]]
         return page(repr(self), ("name", "FMU or object", "connections to it"), rows)
 
-    def _named_files(self) -> Iterator[str]:
-        config = self.to_dict()
-        if "system" in config:
-            yield config["system"]
-        yield from config.get("fmus", {}).values()
-        scenario = config.get("scenario", {})
-        for entry in scenario.get("table", []):
-            yield entry["csv"]
-        for entry in scenario.get("signal", []):
-            if "csv" in entry:
-                yield entry["csv"]["file"]
-
     def files(self) -> dict[str, str]:
         """Return the SHA-256 of every file that the system reads, by absolute path.
 
         A folder has the hash of the names and hashes of its files. The hash of an SSD, or of a system of
         libcosim, includes the files that it names.
         """
-        return {path: hash_of_file(path) for path in sorted(set(self._named_files()))}
+        paths = {table[name] for table, name in _entries_of_files(self.to_dict())}
+        return {path: hash_of_file(path) for path in sorted(paths)}
 
     def with_files(self, paths: Mapping[str, PathLike]) -> System:
         """Return a copy that reads other files: absolute path to new path, as for :meth:`files`."""
         replaced = {os.path.abspath(old): os.path.abspath(os.fspath(new)) for old, new in paths.items()}
         system = self.copy()
         config = system.to_dict()
-
-        def swap(path: str) -> str:
-            return replaced.get(path, path)
-
-        if "system" in config:
-            config["system"] = swap(config["system"])
-        for name, path in config.get("fmus", {}).items():
-            config["fmus"][name] = swap(path)
-        scenario = config.get("scenario", {})
-        for entry in scenario.get("table", []):
-            entry["csv"] = swap(entry["csv"])
-        for entry in scenario.get("signal", []):
-            if "csv" in entry:
-                entry["csv"]["file"] = swap(entry["csv"]["file"])
+        for table, name in _entries_of_files(config):
+            table[name] = replaced.get(table[name], table[name])
         system._adopt(config)
         return system
 
@@ -616,6 +571,21 @@ class Simulation:
         self._stepper.close()
 
 
+def stated(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries that are not ``None``."""
+    return {name: value for name, value in entries.items() if value is not None}
+
+
+def _entries_of_files(config: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Return the entries of a configuration that are paths of files: the table of each, and its name in it."""
+    if "system" in config:
+        yield config, "system"
+    fmus, scenario = config.get("fmus", {}), config.get("scenario", {})
+    yield from ((fmus, name) for name in fmus)
+    yield from ((entry, "csv") for entry in scenario.get("table", []))
+    yield from ((entry["csv"], "file") for entry in scenario.get("signal", []) if "csv" in entry)
+
+
 def _flat(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values of variables: of arrays of numbers as one text, of arrays of texts for each element."""
     flat: dict[str, Any] = {}
@@ -700,12 +670,8 @@ def _changes(
             "memory-limit": memory_limit,
         },
     }
-    changes: dict[str, Any] = {}
-    for name, table in tables_of.items():
-        stated = {} if table is None else {key: value for key, value in table.items() if value is not None}
-        if stated:
-            changes[name] = stated
-    return changes
+    changes = {name: stated(table or {}) for name, table in tables_of.items()}
+    return {name: table for name, table in changes.items() if table}
 
 
 def files_named_by(path: str) -> list[str]:

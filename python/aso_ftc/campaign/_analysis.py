@@ -281,12 +281,12 @@ class Outcome:
         problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
         return problem, values
 
-    def _table(self, names: Any, columns: Mapping[str, Any], index: str = "parameter") -> pandas.DataFrame:
+    def _table(self, indices: Mapping[str, Any], *names: str, index: Any = None) -> pandas.DataFrame:
+        """Return the indices with these names as columns; the index is by default that of the parameters."""
         pandas_ = package("pandas")
-        frame: pandas.DataFrame = pandas_.DataFrame(
-            {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()},
-            index=pandas_.Index(names, name=index),
-        )
+        index = pandas_.Index(self._units, name="parameter") if index is None else index
+        columns = {name: np.asarray(indices[name], dtype=np.float64) for name in names}
+        frame: pandas.DataFrame = pandas_.DataFrame(columns, index=index)
         return frame
 
     def sobol(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
@@ -312,7 +312,7 @@ class Outcome:
         # The rows of second order between A, AB and B are not needed here.
         first = np.ascontiguousarray(np.delete(rows, np.s_[1 + len(self._units) : -1], axis=1)).ravel()
         indices = _sobol(problem, first, False, len(rows), confidence, seed)
-        return self._table(self._units, {name: indices[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
+        return self._table(indices, "S1", "S1_conf", "ST", "ST_conf")
 
     def sobol_second_order(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
         """Return Sobol indices of second order of a design ``saltelli`` with ``second-order = true``.
@@ -331,8 +331,8 @@ class Outcome:
         upper = np.triu_indices(len(self._units), 1)
         pairs = [(self._units[i], self._units[j]) for i, j in zip(*upper)]
         index = package("pandas").MultiIndex.from_tuples(pairs, names=["first", "second"])
-        frame = self._table(range(len(pairs)), {name: indices[name][upper] for name in ("S2", "S2_conf")})
-        return frame.set_axis(index)
+        columns = {name: indices[name][upper] for name in ("S2", "S2_conf")}
+        return self._table(columns, *columns, index=index)
 
     @property
     def _block(self) -> int:
@@ -375,9 +375,7 @@ class Outcome:
             conf_level=confidence,
             seed=seed,
         )
-        return self._table(
-            self._units, {name: indices[name] for name in ("mu_star", "mu_star_conf", "mu", "sigma")}
-        )
+        return self._table(indices, "mu_star", "mu_star_conf", "mu", "sigma")
 
     def fast(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
         """Return indices of the extended Fourier amplitude sensitivity test, design ``fast``.
@@ -409,7 +407,7 @@ class Outcome:
                 indices = analyze(problem, values, M=harmonics, conf_level=confidence)
         finally:
             np.random.set_state(state)
-        return self._table(self._units, {name: indices[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
+        return self._table(indices, "S1", "S1_conf", "ST", "ST_conf")
 
     # Limits.
 

@@ -20,7 +20,7 @@ from .._arrays import plain
 from .._errors import ConfigurationError, Error
 from .._html import page
 from .._paper import paper
-from .._system import PathLike, System, fault, hash_of_file
+from .._system import PathLike, System, fault, hash_of_file, stated
 from .._words import similar
 from ._analysis import FAULT_COLUMNS
 from ._changes import arguments, changes
@@ -115,11 +115,10 @@ class Campaign:
         folder = options.pop("folder", None)
         entries: dict[str, Any] = {name.replace("_", "-"): value for name, value in options.items()}
         entries["system"] = system
-        stated = {
+        entries |= stated({
             "parameters": parameters, "design": design, "measures": measures, "limits": limits,
             "disturbances": disturbances, "faults": faults, "keep": keep, "stop": stop,
-        }  # fmt: skip
-        entries |= {name: value for name, value in stated.items() if value is not None}
+        })  # fmt: skip
         for name in TABLES:
             if isinstance(entries.get(name), Mapping):
                 entries[name] = {str(entry).replace("_", "-"): value for entry, value in entries[name].items()}
@@ -161,8 +160,7 @@ class Campaign:
         if self.isolate:
             # An FMU may also crash while it is opened for a check.
             limits = {"time-limit": self.time_limit, "memory-limit": self.memory_limit}
-            stated = {name: limit for name, limit in limits.items() if limit is not None}
-            self.system.isolation.update({"isolate": True, **stated})
+            self.system.isolation.update({"isolate": True, **stated(limits)})
         self.record_every: Any = entries.get("record-every", "step")
         self._variables = {variable.name: variable for variable in self.system.variables()}
         self.disturbances: dict[str, dict[str, Any]] = disturbances(entries.get("disturbances", {}))
@@ -210,10 +208,9 @@ class Campaign:
                 if name not in columns:
                     known = ", ".join(columns)
                     raise fail(f"parameters.{name}", f"the table has no such column, it has {known}")
-            stated = definitions or dict.fromkeys(columns, {})
             definitions = {
                 name: {**table(f"parameters.{name}", entry), "values": columns[name]}
-                for name, entry in stated.items()
+                for name, entry in (definitions or dict.fromkeys(columns, {})).items()
             }
         parameters = []
         for name, entry in definitions.items():
@@ -257,13 +254,13 @@ class Campaign:
                 raise fail(f"measures.{name}", "a column of the results has this name, choose another one")
             short = {"expression": entry} if isinstance(entry, str) else {"python": entry}
             is_short = isinstance(entry, str) or callable(entry)
-            stated = short if is_short else table(f"measures.{name}", entry)
-            if "unfinished" in stated:
-                self.unfinished[name] = finite(f"measures.{name}.unfinished", stated.pop("unfinished"))
-            if set(stated) == {"expression"}:
-                self.expressions[name] = Expression(name, str(stated["expression"]))
-            elif set(stated) == {"python"}:
-                self.functions[name] = _function(f"measures.{name}", stated["python"], folder)
+            measure = short if is_short else table(f"measures.{name}", entry)
+            if "unfinished" in measure:
+                self.unfinished[name] = finite(f"measures.{name}.unfinished", measure.pop("unfinished"))
+            if set(measure) == {"expression"}:
+                self.expressions[name] = Expression(name, str(measure["expression"]))
+            elif set(measure) == {"python"}:
+                self.functions[name] = _function(f"measures.{name}", measure["python"], folder)
             else:
                 raise fail(
                     f"measures.{name}", 'expected an expression, a function, or { python = "file.py:function" }'

@@ -59,13 +59,22 @@ def execute(
     live: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Do the runs of a campaign that its folder lacks; see :meth:`Campaign.run`."""
+
+    def perform(work: _Work) -> None:
+        with _quiet(), _viewed(work, live), _client(workers, scheduler) as client:
+            work.perform(client, scheduler)
+
+    return _outcome(campaign, path, progress, perform)
+
+
+def _outcome(campaign: Campaign, path: Path, progress: bool, perform: Callable[[_Work], None]) -> Outcome:
+    """Let ``perform`` do the runs of a campaign that its folder lacks."""
     folder = Folder(path, campaign)
     folder.begin(campaign)
     if not folder.manifest["complete"]:
         work = _Work(campaign, folder, progress)
         if work.open_parts:
-            with _quiet(), _viewed(work, live), _client(workers, scheduler) as client:
-                work.perform(client, scheduler)
+            perform(work)
         work.close()
     return load(folder.path)
 
@@ -77,8 +86,8 @@ class Session:
     first run that a folder lacks.
     """
 
-    def __init__(self, campaign: Campaign, workers: int | None, scheduler: str | None) -> None:
-        self.campaign, self.workers, self.scheduler = campaign, workers, scheduler
+    def __init__(self, workers: int | None, scheduler: str | None) -> None:
+        self.workers, self.scheduler = workers, scheduler
         self._open = contextlib.ExitStack()
         self._client: Any = None
         self._name = f"aso-ftc-session-{os.getpid()}-{time.monotonic_ns()}"
@@ -91,19 +100,15 @@ class Session:
 
     def outcome(self, campaign: Campaign, path: Path) -> Outcome:
         """Do the runs of a campaign that its folder lacks."""
-        folder = Folder(path, campaign)
-        folder.begin(campaign)
-        if not folder.manifest["complete"]:
-            work = _Work(campaign, folder, False)
-            if work.open_parts:
-                if self._client is None:
-                    self._open.enter_context(_quiet())
-                    self._client = self._open.enter_context(_client(self.workers, self.scheduler))
-                    self._open.callback(_forget, self._client, self._name)
-                    work.prepare(self._client, self._name)
-                work.perform(self._client, self.scheduler, self._name)
-            work.close()
-        return load(folder.path)
+        return _outcome(campaign, path, False, self._perform)
+
+    def _perform(self, work: _Work) -> None:
+        if self._client is None:
+            self._open.enter_context(_quiet())
+            self._client = self._open.enter_context(_client(self.workers, self.scheduler))
+            self._open.callback(_forget, self._client, self._name)
+            work.prepare(self._client, self._name)
+        work.perform(self._client, self.scheduler, self._name)
 
 
 class _View:

@@ -242,7 +242,7 @@ class Expression:
             return lambda run: constant
         if isinstance(node, (ast.UnaryOp, ast.BinOp)):
             inner = [node.operand] if isinstance(node, ast.UnaryOp) else [node.left, node.right]
-            return self._apply(node.op, inner)
+            return _joined(self._operator(node.op), [self._compile(part) for part in inner])
         if isinstance(node, ast.BoolOp):
             code = self._compile(node.values[0])
             for value in node.values[1:]:
@@ -265,9 +265,6 @@ class Expression:
                 f"{self.text!r} has an unknown operator: expected + - * / **, and, or, not, < and >"
             )
         return _OPERATORS[type(operator)]
-
-    def _apply(self, operator: ast.AST, inner: list[ast.expr]) -> _Code:
-        return _joined(self._operator(operator), [self._compile(part) for part in inner])
 
     def _named(self, node: ast.expr) -> _Code:
         name = ast.unparse(node)

@@ -130,7 +130,7 @@ def _batches(
     variant = copy.copy(campaign)
     variant.stop, variant.keep = {}, {}
     count = None if workers is None else whole("workers", plain(workers), 1)
-    with Session(variant, count, scheduler) as session:
+    with Session(count, scheduler) as session:
         yield _Batches(variant, path, session, measure)
 
 
