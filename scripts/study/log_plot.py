@@ -3,13 +3,15 @@
 import math
 from dataclasses import dataclass
 
+from drawing import TEXT, drawing, line, marker, text
+
 WIDTH, HEIGHT = 1000.0, 640.0
 LEFT, RIGHT, TOP, BOTTOM = 100.0, 972.0, 60.0, 560.0
 ACROSS, UP = (0.09, 11.0), (1e-3, 100.0)  # ms, mm
 ACROSS_TICKS = [0.1, 0.2, 0.5, 1, 2, 5, 10]
 UP_TICKS = [0.001, 0.01, 0.1, 1, 10, 100]
-FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
-TEXT, GRID, FINE = "#222222", "#d0d0d0", "#eeeeee"
+GRID, FINE = "#d0d0d0", "#eeeeee"
+RADIUS = 5
 # Colours of Okabe and Ito (2008), each with a marker: a polygon with this number of corners, 0 for
 # a disc.
 STYLES = [("#d55e00", 0), ("#0072b2", 4), ("#009e73", 3), ("#aa3377", 6)]
@@ -31,29 +33,6 @@ def at(point):
     part = lambda value, low, high: math.log(value / low) / math.log(high / low)
     x = LEFT + part(point[0], *ACROSS) * (RIGHT - LEFT)
     return x, BOTTOM - part(point[1], *UP) * (BOTTOM - TOP)
-
-
-def text(x, y, words, anchor="start", size=16, turned=""):
-    """A line of text."""
-    place = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}"'
-    return f'<text {place} fill="{TEXT}"{turned}>{words}</text>'
-
-
-def line(points, colour, width, dash="none"):
-    """A line through points of the drawing."""
-    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    style = f'stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}"'
-    return f'<polyline points="{path}" fill="none" {style}/>'
-
-
-def marker(centre, colour, corners):
-    """A filled polygon, or a disc."""
-    x, y = centre
-    if corners == 0:
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="{colour}"/>'
-    turns = [2 * math.pi * k / corners for k in range(corners)]
-    path = " ".join(f"{x + 6.5 * math.sin(t):.1f},{y - 6.5 * math.cos(t):.1f}" for t in turns)
-    return f'<polygon points="{path}" fill="{colour}"/>'
 
 
 def axes():
@@ -82,10 +61,6 @@ def log_plot(curves):
     """The figure as SVG."""
     title = "What is left of the friction, over the sample time of the controller"
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:g}" height="{HEIGHT:g}" '
-        f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" font-family="{FONT}" role="img">',
-        f"<title>{title}</title>",
-        f'<rect width="{WIDTH:g}" height="{HEIGHT:g}" fill="#ffffff"/>',
         text((LEFT + RIGHT) / 2, 34, title, "middle", 20),
         *axes(),
         line([at((ACROSS[0], PAPER)), at((ACROSS[1], PAPER))], TEXT, 1.2, "7 4"),
@@ -96,11 +71,11 @@ def log_plot(curves):
     for row, (curve, (colour, corners)) in enumerate(zip(curves, STYLES, strict=True)):
         height = TOP + 28 + 24 * row
         parts.append(line(map(at, curve.points), colour, 2))
-        parts += [marker(at(point), colour, corners) for point in curve.points]
+        parts += [marker(at(point), colour, corners, RADIUS) for point in curve.points]
         parts.append(line([(key, height), (key + 44, height)], colour, 2))
-        parts.append(marker((key + 22, height), colour, corners))
+        parts.append(marker((key + 22, height), colour, corners, RADIUS))
         parts.append(text(key + 56, height + 6, curve.label))
     height = TOP + 28 + 24 * len(curves)
     parts.append(line([(key, height), (key + 44, height)], "#777777", 5, "2 6"))
     parts.append(text(key + 56, height + 6, "first prototype (constant, prediction)"))
-    return "\n".join([*parts, "</svg>"]) + "\n"
+    return drawing(WIDTH, HEIGHT, title, parts)

@@ -1,7 +1,7 @@
 //! Computes the error over the number of steps, for fixed steps and for every step control.
 //!
 //! `cargo run --release -p tests --example work_precision > docs/figures/work_precision.csv`, then
-//! `python scripts/bench/work_precision.py` draws the figure.
+//! `python scripts/study/work_precision.py` draws the figure.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
 
 use master::algorithm::PowerBond;

@@ -1,7 +1,7 @@
 """Draws docs/figures/work_precision.svg from docs/figures/work_precision.csv.
 
 Usage: cargo run --release -p tests --example work_precision > docs/figures/work_precision.csv
-       python scripts/bench/work_precision.py
+       python scripts/study/work_precision.py
 """
 
 import csv
@@ -9,12 +9,14 @@ import math
 from collections import defaultdict
 from pathlib import Path
 
+from drawing import drawing, line, marker, text
+
 STEM = Path(__file__).resolve().parents[2] / "docs" / "figures" / "work_precision"
 WIDTH, HEIGHT = 1000.0, 560.0
 TOP, BOTTOM = 70.0, 480.0
 PANELS = [(90.0, 480.0), (590.0, 980.0)]
-FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
-TEXT, GRID = "#222222", "#dddddd"
+GRID = "#dddddd"
+SIZE, RADIUS = 14, 4
 # Colours of Okabe and Ito (2008), each with a marker: a polygon with this number of corners, 0 for
 # a disc.
 STYLES = {
@@ -40,28 +42,6 @@ def curves():
     return points
 
 
-def text(x, y, words, anchor="start", size=14, turned=""):
-    """A line of text."""
-    place = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}"'
-    return f'<text {place} fill="{TEXT}"{turned}>{words}</text>'
-
-
-def line(points, colour, width):
-    """A line through points of the drawing."""
-    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    return f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{width}"/>'
-
-
-def marker(centre, colour, corners):
-    """A filled polygon, or a disc."""
-    x, y = centre
-    if corners == 0:
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>'
-    turns = [2 * math.pi * k / corners for k in range(corners)]
-    path = " ".join(f"{x + 5.5 * math.sin(t):.1f},{y - 5.5 * math.cos(t):.1f}" for t in turns)
-    return f'<polygon points="{path}" fill="{colour}"/>'
-
-
 def decades(values):
     """Powers of ten from the one below the smallest value to the one above the largest."""
     return range(math.floor(math.log10(min(values))), math.ceil(math.log10(max(values))) + 1)
@@ -80,36 +60,30 @@ def panel(title, by_control, left, right):
     parts = [text((left + right) / 2, TOP - 14, title, "middle", 15)]
     for power in across:
         x, _ = at((10.0**power, 10.0 ** up[0]))
-        parts += [line([(x, TOP), (x, BOTTOM)], GRID, 1), text(x, BOTTOM + 20, f"1e{power}", "middle")]
+        parts += [line([(x, TOP), (x, BOTTOM)], GRID, 1), text(x, BOTTOM + 20, f"1e{power}", "middle", SIZE)]
     for power in up:
         _, y = at((10.0 ** across[0], 10.0**power))
-        parts += [line([(left, y), (right, y)], GRID, 1), text(left - 8, y + 5, f"1e{power}", "end")]
+        parts += [line([(left, y), (right, y)], GRID, 1), text(left - 8, y + 5, f"1e{power}", "end", SIZE)]
     for control, curve in by_control.items():
         colour, corners = STYLES[control]
         parts.append(line(map(at, curve), colour, 2))
-        parts += [marker(at(point), colour, corners) for point in curve]
-    parts.append(text((left + right) / 2, BOTTOM + 44, "communication steps", "middle"))
+        parts += [marker(at(point), colour, corners, RADIUS) for point in curve]
+    parts.append(text((left + right) / 2, BOTTOM + 44, "communication steps", "middle", SIZE))
     turned = f' transform="rotate(-90 {left - 58:.1f} {(TOP + BOTTOM) / 2:.1f})"'
-    parts.append(text(left - 58, (TOP + BOTTOM) / 2, "largest error of an output", "middle", 14, turned))
+    parts.append(text(left - 58, (TOP + BOTTOM) / 2, "largest error of an output", "middle", SIZE, turned))
     return parts
 
 
 def main():
     """Reads, draws, writes."""
     title = "Error over the number of communication steps, Gauss-Seidel with lines"
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:g}" height="{HEIGHT:g}" '
-        f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" font-family="{FONT}" role="img">',
-        f"<title>{title}</title>",
-        f'<rect width="{WIDTH:g}" height="{HEIGHT:g}" fill="#ffffff"/>',
-        text(WIDTH / 2, 28, title, "middle", 18),
-    ]
+    parts = [text(WIDTH / 2, 28, title, "middle", 18)]
     for (problem, by_control), (left, right) in zip(curves().items(), PANELS, strict=True):
         parts += panel(TITLES[problem], by_control, left, right)
     for column, (control, (colour, corners)) in enumerate(STYLES.items()):
         x, y = 190 + 140 * column, HEIGHT - 14
-        parts += [marker((x, y - 5), colour, corners), text(x + 14, y, control)]
-    STEM.with_suffix(".svg").write_text("\n".join([*parts, "</svg>"]) + "\n", encoding="utf-8")
+        parts += [marker((x, y - 5), colour, corners, RADIUS), text(x + 14, y, control, size=SIZE)]
+    STEM.with_suffix(".svg").write_text(drawing(WIDTH, HEIGHT, title, parts), encoding="utf-8")
 
 
 if __name__ == "__main__":
