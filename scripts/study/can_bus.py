@@ -7,7 +7,6 @@ target/release/aso-ftc; takes four minutes. Each run is that of examples/can-bus
 the controller, another bit rate, or another examples/can-node/resources/network.dbc.
 """
 
-import csv
 import json
 import math
 import re
@@ -19,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-COMMAND = ROOT / "target" / "release" / "aso-ftc"
+from command import COMMAND, ROOT, columns
+
 SYSTEM = ROOT / "examples" / "can-bus" / "system.toml"
 NETWORK = ROOT / "examples" / "can-node" / "resources" / "network.dbc"
 PLANT = ROOT / "examples" / "can-bus" / "controller.toml"
@@ -122,10 +121,7 @@ def measure(controller, schedule=(0.7, 0.05), resolution=None, bit_rate=500_000,
     with tempfile.TemporaryDirectory() as name:
         folder = couple(controller, Path(name), network(schedule, resolution), bit_rate, settings)
         names = ("time", "plant.x_p", "plant.theta", "plant.u", "bus.load", "bus.lost")
-        with (folder / "results.csv").open(encoding="utf-8") as rows:
-            header = next(csv.reader(rows))
-            columns = [header.index(name) for name in names]
-            time, cart, angle, force, load, lost = np.loadtxt(rows, delimiter=",", usecols=columns, unpack=True)
+        time, cart, angle, force, load, lost = columns(folder / "results.csv", names)
         late = time > SETTLED
         falls = np.abs(angle).max() > math.pi / 2
         delay = longest_delay(folder / "trace.log", schedule) if lost[-1] == 0 else math.inf

@@ -13,16 +13,14 @@ of 4000 frequencies. Needs target/release/aso-ftc and Python 3.11 with python-co
 
 import json
 import re
-import subprocess
-import tempfile
 import tomllib
-from pathlib import Path
 
 import control
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-ROOT = Path(__file__).resolve().parents[2]
+from command import ROOT, design
+
 PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 1e-3
 # The integrators of the shaped plant act below the bandwidth by this factor.
 SLOWER = 5.0
@@ -85,16 +83,9 @@ def tuned(a, b, c, bandwidth):
     """Our controller, and the gamma that the command states."""
     rows = [f"{name} = {matrix.tolist()}" for name, matrix in zip("ABC", (a, b, c), strict=True)]
     text = "\n".join([*rows, 'actuator_faults = "all"', "[loop]", f"bandwidth = {bandwidth}", f"peak = {PEAK}"])
-    with tempfile.TemporaryDirectory() as folder:
-        file, out = Path(folder, "plant.toml"), Path(folder, "design.toml")
-        file.write_text(text)
-        command = [ROOT / "target/release/aso-ftc", "design", file, "--out", out, "--json", "--certificate-time", "0"]
-        run = subprocess.run(command, capture_output=True, text=True, check=False)
-        if not out.exists():
-            raise RuntimeError(run.stderr)
-        design = tomllib.loads(out.read_text())
-        stated = float(re.search(r"gamma = ([0-9.e+-]+[0-9])", json.dumps(json.loads(run.stdout)))[1])
-    k_x, l_x, l_f = (np.array(design[key], float) for key in ("K_x", "L_x", "L_f"))
+    report, file = design(text, "--certificate-time", "0")
+    stated = float(re.search(r"gamma = ([0-9.e+-]+[0-9])", json.dumps(report))[1])
+    k_x, l_x, l_f = (np.array(file[key], float) for key in ("K_x", "L_x", "L_f"))
     n, m = b.shape
     a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
     c_0 = np.hstack([c, np.zeros((c.shape[0], m))])

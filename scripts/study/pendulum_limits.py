@@ -7,20 +7,15 @@ The designs are those of fmu-controller/pendulum-masses.toml with the changes be
 and Python 3.11 with numpy and scipy.
 """
 
-import json
 import re
-import subprocess
-import tempfile
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
+from command import ROOT, design
 from split_mix import uniform
 
-ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "fmu-controller" / "pendulum-masses.toml"
 NOMINAL = {"M": 3.2, "m": 0.535}
 TOLERANCE = 0.2
@@ -50,13 +45,7 @@ def plant_file(changes):
 
 def designed(changes):
     """Report and design file."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "plant.toml"
-        file.write_text(plant_file(changes), encoding="utf-8")
-        command = [ROOT / "target/release/aso-ftc", "design", file, "--json", "--certificate-time", "0"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert done.returncode in (0, 1), done.stderr
-        return json.loads(done.stdout), tomllib.loads((Path(folder) / "plant-design.toml").read_text(encoding="utf-8"))
+    return design(plant_file(changes), "--certificate-time", "0")
 
 
 def pendulum(M=3.2, m=0.535, J=0.062, l=0.365, F_x=6.2, F_theta=0.009, g=9.807):
@@ -70,9 +59,9 @@ def pendulum(M=3.2, m=0.535, J=0.062, l=0.365, F_x=6.2, F_theta=0.009, g=9.807):
 class Loop:
     """Plant and controller, [x; x_hat; f_hat]; the controller is that of a design file."""
 
-    def __init__(self, design):
+    def __init__(self, file):
         names = ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f")
-        matrices = {name: np.array(design[name], dtype=float) for name in names}
+        matrices = {name: np.array(file[name], dtype=float) for name in names}
         self.c, self.k = matrices["C"], np.hstack([matrices["K_x"], matrices["K_f"]])
         a_0 = np.block([[matrices["A"], matrices["F_a"]], [np.zeros((1, 5))]]) + np.vstack([matrices["B"], [[0]]]) @ self.k
         self.l = np.vstack([matrices["L_x"], matrices["L_f"]])
@@ -118,9 +107,9 @@ class Figures:
     heaviest: float
 
 
-def figures(design, cases, seed=1):
+def figures(file, cases, seed=1):
     """Those of a design file."""
-    loop, random = Loop(design), uniform(seed)
+    loop, random = Loop(file), uniform(seed)
     value = lambda nominal: nominal * (1 + TOLERANCE * (2 * next(random) - 1))
     drawn = [{name: value(nominal) for name, nominal in NOMINAL.items()} for _ in range(cases)]
     corners = [{"M": 3.2 * (1 + i * TOLERANCE), "m": 0.535 * (1 + j * TOLERANCE)} for i in (-1, 1) for j in (-1, 1)]
@@ -141,8 +130,8 @@ def first_unstable(loop, masses):
 
 def row(name, changes):
     """A row of the table."""
-    report, design = designed(changes)
-    masses, robustness = figures(design, 1000), report["robustness"]
+    report, file = designed(changes)
+    masses, robustness = figures(file, 1000), report["robustness"]
     point = robustness["points"][1]
     noise = [one["value"] for one in robustness["noise_together"]]
     limits = " and ".join(f"{mass:.2f} kg" for mass in (masses.lightest, masses.heaviest) if np.isfinite(mass))

@@ -10,18 +10,15 @@ frequency at which the plant has a phase of -135 degrees, at most half a radian 
 The peaks of S are those with the delays themselves. Needs target/release/aso-ftc and Python 3.11 with scipy.
 """
 
-import json
 import re
-import subprocess
 import sys
-import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 from scipy.signal import tf2ss
 
-ROOT = Path(__file__).resolve().parents[2]
+from command import design
+
 SAMPLES = 40
 
 
@@ -85,16 +82,10 @@ def plant_file(plant, sampled, structure):
 
 def designed(text):
     """Verdict, peak of S and gamma; the message of a refusal."""
-    with tempfile.TemporaryDirectory() as folder:
-        plant = Path(folder) / "plant.toml"
-        plant.write_text(text, encoding="utf-8")
-        words = ["design", plant, "--json", "--certificate-time", "1", "--out", Path(folder) / "design.toml"]
-        done = subprocess.run(
-            [ROOT / "target/release/aso-ftc", *words], capture_output=True, text=True, encoding="utf-8", check=False
-        )
-    if done.returncode not in (0, 1):
-        return "refused", done.stderr, np.nan
-    report = json.loads(done.stdout)
+    try:
+        report, _ = design(text, "--certificate-time", "1")
+    except RuntimeError as refusal:
+        return "refused", refusal, np.nan
     robustness = report["robustness"]
     exact = robustness["delays"] or {"s_peaks": [point["s_peak"] for point in robustness["points"]]}
     gamma = re.search(r"gamma = ([0-9.e+-]+[0-9])", report["feedback"]["method"])

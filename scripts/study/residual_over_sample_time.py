@@ -18,10 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from command import COMMAND, ROOT, columns
 from log_plot import Curve, log_plot
 
-ROOT = Path(__file__).resolve().parents[2]
-COMMAND = ROOT / "target" / "release" / "aso-ftc"
 STEM = ROOT / "docs" / "figures" / "residual_over_sample_time"
 
 SAMPLE_TIMES = [0.1, 0.2, 0.5, 1, 2, 3, 5, 7, 10]  # ms
@@ -105,10 +104,7 @@ def couple(fmu, step, method="gauss-seidel", settings=None):
         if "the run ended early" in ended.stderr:
             return None
         ended.check_returncode()
-        with (Path(folder) / "results.csv").open(encoding="utf-8") as rows:
-            names = next(csv.reader(rows))
-            columns = [names.index(name) for name in ("time", "plant.x_p", "plant.theta")]
-            time, cart, angle = np.loadtxt(rows, delimiter=",", usecols=columns, unpack=True)
+        time, cart, angle = columns(Path(folder, "results.csv"), ("time", "plant.x_p", "plant.theta"))
     if np.abs(angle).max() > math.pi / 2:
         return None
     return 5e2 * np.ptp(cart[time > SETTLED])
