@@ -11,14 +11,13 @@ Each matrix stands below a line with its name, rows and columns. Needs Python wi
 given as the first argument, or to the committed file.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import scipy
 from scipy.linalg import eig
 from scipy.optimize import brentq, minimize
 from scipy.signal import cont2discrete, place_poles
+
+from matrices import numbers, target
 
 RANDOM = np.random.default_rng(20)
 
@@ -160,14 +159,12 @@ def main():
     ramps = np.block([[np.zeros((2, 2)), np.eye(2)], [np.zeros((2, 4))]])
     data.update(ramp_a=a, ramp_b=b, ramp_f_a=f_a, ramp=sampled(a, b, np.hstack([f_a, 0 * f_a]), ramps, 0.25))
     loss(data)
-    default = Path(__file__).resolve().parents[2] / "crates" / "control" / "tests" / "data" / "faults.txt"
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else default
-    with path.open("w") as file:
+    with target("faults.txt").open("w") as file:
         file.write(f"# scripts/reference/reference_faults.py: numpy {np.__version__}, scipy {scipy.__version__}\n")
         for name, matrix in data.items():
             file.write(f"{name} {matrix.shape[0]} {matrix.shape[1]}\n")
             for row in matrix:
-                file.write(" ".join(repr(float(entry)) for entry in row) + "\n")
+                file.write(numbers(row) + "\n")
 
 
 if __name__ == "__main__":

@@ -8,15 +8,13 @@ H2 and in sampled time: semidefinite programs stated in CVXPY. The smallest radi
 Needs Python with numpy, scipy and cvxpy; writes to the path given as the first argument, or to the committed file.
 """
 
-import sys
-from pathlib import Path
-
 import cvxpy as cp
 import numpy as np
 import scipy
 from scipy import linalg
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import target, write
+
 SEED = 19961999
 STEPS = 60
 LARGEST = 1e3
@@ -150,16 +148,7 @@ def smallest_radius(f, g):
     return 2 * solved(cp.Problem(cp.Minimize(cp.sigma_max(p @ g)), [decay << 0, p >> 0]))
 
 
-def line(name, value):
-    m = np.atleast_2d(np.asarray(value, dtype=float))
-    return " ".join([name, str(m.shape[0]), str(m.shape[1])] + [repr(float(x)) for x in m.ravel()])
-
-
-def case(kind, name, **matrices):
-    return [f"{kind}: {name}"] + [line(key, value) for key, value in matrices.items()]
-
-
-def norm_cases(random):
+def write_norms(file, random):
     for count in range(12):
         n, k, r, sampled = 1 + count // 2, 1 + count % 3, 1 + count % 2, count % 2 == 1
         a = random.standard_normal((n, n))
@@ -172,10 +161,10 @@ def norm_cases(random):
         d = random.standard_normal((r, k)) if sampled else np.zeros((r, k))
         infinity, peak, impulse = norms(a, b, c, d, sampled)
         kind = "sampled norms" if sampled else "norms"
-        yield case(kind, str(count), A=a, B=b, C=c, D=d, infinity=infinity, peak=peak, impulse=impulse)
+        write(file, kind, count, A=a, B=b, C=c, D=d, infinity=infinity, peak=peak, impulse=impulse)
 
 
-def synthesis_cases(random):
+def write_syntheses(file, random):
     for count in range(4):
         n, m = 2 + count, 1 + count % 2
         a, b = random.standard_normal((n, n)), random.standard_normal((n, m))
@@ -184,31 +173,30 @@ def synthesis_cases(random):
         d = np.vstack([np.zeros((1, m)), np.eye(m)])
         riccati = best_feedback(a, b, disturbance, c, d)
         disc = best_with_disc(a, b, disturbance, c, d, -3.0, 2.0)
-        yield case(
-            "feedback", str(count), A=a, B=b, disturbance=disturbance, output=c, feed=d, infinity=riccati, disc=disc,
+        write(
+            file, "feedback", count, A=a, B=b, disturbance=disturbance, output=c, feed=d, infinity=riccati, disc=disc,
             sampled=best_sampled(a, b, disturbance, c, d), peak=best_peak(a, b, disturbance, c, d),
         )
 
 
-def radius_cases(random):
+def write_radii(file, random):
     for count in range(4):
         n = 2 + count
         f = random.standard_normal((n, n))
         f -= (np.max(np.linalg.eigvals(f).real) + 0.5) * np.eye(n)
         g = random.standard_normal((n, 1 + count % 2))
         printed = linalg.solve_continuous_lyapunov(f.T, -np.eye(n))
-        yield case("radius", str(count), F=f, G=g, printed=2 * np.linalg.norm(printed @ g, 2), free=smallest_radius(f, g))
+        write(file, "radius", count, F=f, G=g, printed=2 * np.linalg.norm(printed @ g, 2), free=smallest_radius(f, g))
 
 
 def main():
     random = np.random.default_rng(SEED)
-    versions = f"numpy {np.__version__}, scipy {scipy.__version__}, cvxpy {cp.__version__}"
-    lines = [f"# scripts/reference/reference_lmi.py: {versions}"]
-    for cases in (norm_cases, synthesis_cases, radius_cases):
-        for block in cases(random):
-            lines += block
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates/control/tests/data/lmi.txt"
-    target.write_text("\n".join(lines) + "\n")
+    with target("lmi.txt").open("w") as file:
+        versions = f"numpy {np.__version__}, scipy {scipy.__version__}, cvxpy {cp.__version__}"
+        file.write(f"# scripts/reference/reference_lmi.py: {versions}\n")
+        write_norms(file, random)
+        write_syntheses(file, random)
+        write_radii(file, random)
 
 
 if __name__ == "__main__":

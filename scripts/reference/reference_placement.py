@@ -30,7 +30,8 @@ from scipy.linalg import block_diag, expm
 from scipy.optimize import linear_sum_assignment
 from scipy.signal import place_poles
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import CONTROL, ROOT, numbers, zoh
+
 SEED = 1985
 CASES = 16
 METHODS = ["KNV0", "YT"]
@@ -193,8 +194,7 @@ class Plant:
         self.poles = [np.array(list(eigenvalues(f"{who}_eigenvalues"))) for who in ["controller", "observer"]]
         if sampled:
             self.poles = [sampled_poles(poles, self.sample_time) for poles in self.poles]
-            whole = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * self.sample_time)
-            a, b = whole[:n, :n], whole[:n, n:]
+            a, b = zoh(a, b, self.sample_time)
         self.a, self.b, self.c = a, b, c
         # The faults add to the commands.
         fault_dynamics = np.eye(m) if sampled else np.zeros((m, m))
@@ -242,28 +242,24 @@ def plants():
     return [Plant(name, data, sampled) for name, data in stated.items() for sampled in [False, True]]
 
 
-def text(values):
-    return " ".join(repr(float(value)) for value in np.ravel(values))
-
-
 def line(kind, a, b, required, sampled, reached):
     condition, gain, s_peak, how, error = reached
     domain = "sampled" if sampled else "continuous"
-    fields = [kind, str(a.shape[0]), str(b.shape[1]), text(a), text(b), text(required.real), text(required.imag), domain]
-    return ";".join([*fields, text(condition), text(gain), text(s_peak), how, f"{error:.1e}"])
+    fields = [kind, str(a.shape[0]), str(b.shape[1]), numbers(a), numbers(b), numbers(required.real), numbers(required.imag), domain]
+    return ";".join([*fields, numbers(condition), numbers(gain), numbers(s_peak), how, f"{error:.1e}"])
 
 
 def loop_line(plant, peaks):
     a, b, c = plant.continuous
     estimator = "current" if plant.current else "prediction"
-    fields = [plant.name, text(plant.sample_time), estimator, str(len(a)), str(b.shape[1]), str(len(c))]
-    poles = [text(part) for poles in plant.poles for part in [poles.real, poles.imag]]
-    return ";".join([*fields, text(a), text(b), text(c), *poles, *map(text, peaks)])
+    fields = [plant.name, numbers(plant.sample_time), estimator, str(len(a)), str(b.shape[1]), str(len(c))]
+    poles = [numbers(part) for poles in plant.poles for part in [poles.real, poles.imag]]
+    return ";".join([*fields, numbers(a), numbers(b), numbers(c), *poles, *map(numbers, peaks)])
 
 
 def main():
     warnings.simplefilter("ignore")
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates" / "control" / "tests" / "claims"
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else CONTROL / "claims"
     heading = f"# scripts/reference/reference_placement.py: numpy {np.__version__}, scipy {scipy.__version__} place_poles; seed {SEED}; "
     of_plants = plants()
     pairs = [pair for plant in of_plants for pair in plant.pairs()]

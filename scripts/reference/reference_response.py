@@ -10,26 +10,18 @@ Needs Python with numpy, scipy, mpmath, control and slycot; writes to the path g
 committed file.
 """
 
-import sys
 import tomllib
-from pathlib import Path
 
 import control
 import mpmath as mp
 import numpy as np
 import slycot
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import ROOT, target, write
+
 SEED = 20091124
 POINTS = 3000
 CHANGE, RATE = 60.0, 521.0
-
-
-def write(file, kind, name, **matrices):
-    file.write(f"{kind}: {name}\n")
-    for key, m in matrices.items():
-        m = np.atleast_2d(m)
-        file.write(f"{key} {m.shape[0]} {m.shape[1]} " + " ".join(repr(float(x)) for x in m.flat) + "\n")
 
 
 class Modes:
@@ -144,8 +136,7 @@ def write_loop(file):
 def main():
     mp.mp.dps = 40
     random = np.random.default_rng(SEED)
-    default = ROOT / "crates" / "control" / "tests" / "data" / "response.txt"
-    with (Path(sys.argv[1]) if len(sys.argv) > 1 else default).open("w") as file:
+    with target("response.txt").open("w") as file:
         versions = f"python-control {control.__version__}, slycot {slycot.__version__}, mpmath {mp.__version__}"
         file.write(f"# scripts/reference/reference_response.py: {versions}\n")
         write_norms(file, random)

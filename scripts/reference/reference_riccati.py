@@ -8,16 +8,15 @@ cont2discrete.
 Needs Python with numpy, scipy and mpmath; writes to the path given as the first argument, or to the committed file.
 """
 
-import sys
 import tomllib
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 import scipy
 from scipy import linalg, signal
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import ROOT, target, write, zoh
+
 SEED = 20091123
 NEWTON_STEPS = 12
 
@@ -121,18 +120,9 @@ def sampled_cases(random):
             yield name, a, b, q, r, cross
         elif not name.startswith(("stiff", "five", "pendulum, filter")):
             period = 1e-2
-            n, m = b.shape
-            block = linalg.expm(np.block([[a, b], [np.zeros((m, n + m))]]) * period)
-            yield name, block[:n, :n], block[:n, n:], q * period, r * period, cross * period
+            yield name, *zoh(a, b, period), q * period, r * period, cross * period
     shift = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
     yield "shift register", shift, np.eye(3)[:, 2:], np.eye(3), np.eye(1), np.zeros((3, 1))
-
-
-def write(file, kind, name, **matrices):
-    file.write(f"{kind}: {name}\n")
-    for key, m in matrices.items():
-        m = np.atleast_2d(m)
-        file.write(f"{key} {m.shape[0]} {m.shape[1]} " + " ".join(repr(float(x)) for x in m.flat) + "\n")
 
 
 def write_riccati(file, random):
@@ -180,8 +170,7 @@ def write_holds(file, random):
 def main():
     mp.mp.dps = 60
     random = np.random.default_rng(SEED)
-    default = ROOT / "crates" / "control" / "tests" / "data" / "riccati.txt"
-    with (Path(sys.argv[1]) if len(sys.argv) > 1 else default).open("w") as file:
+    with target("riccati.txt").open("w") as file:
         versions = f"scipy {scipy.__version__}, numpy {np.__version__}, mpmath {mp.__version__}"
         file.write(f"# scripts/reference/reference_riccati.py: {versions}\n")
         write_riccati(file, random)

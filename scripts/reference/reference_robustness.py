@@ -13,9 +13,7 @@ of fmu-controller/resources/design.toml. Needs Python with numpy, scipy, control
 as the first argument, or to the committed file.
 """
 
-import sys
 import tomllib
-from pathlib import Path
 
 import control as ct
 import numpy as np
@@ -24,14 +22,9 @@ import scipy.linalg as sl
 from scipy.optimize import brentq, minimize_scalar
 from slycot import ab13md
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import ROOT, target, write, zoh
+
 SEED = 20261123
-
-
-def zoh(a, b, h):
-    n, m = b.shape
-    e = sl.expm(np.block([[a, b], [np.zeros((m, n + m))]]) * h)
-    return e[:n, :n], e[:n, n:]
 
 
 class Loop:
@@ -194,12 +187,10 @@ def main():
                                     ("two by three, sampled", (4, 2, 3), 0.3)):
         a, b, c = rng.normal(size=(n, n)), rng.normal(size=(n, m)), rng.normal(size=(p, n))
         loops[name] = Loop((a, b, c), lqg(a, b, c, period), period)
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates/control/tests/data/robustness.txt"
-    with path.open("w") as file:
+    with target("robustness.txt").open("w") as file:
         versions = f"python-control {ct.__version__}, slycot 0.7.1, scipy {scipy.__version__}"
         file.write(f"# scripts/reference/reference_robustness.py: {versions}\n")
         for name, loop in loops.items():
-            file.write(f"loop: {name}\n")
             (a, b, c, d), m, p = loop.k, loop.m, loop.p
             out = {"A": loop.a, "B": loop.b, "C": loop.c, "a": a, "b": b, "c": c, "d": d, "period": loop.period}
             for point, k in (("in", m), ("out", p)):
@@ -208,9 +199,7 @@ def main():
                 out[f"disk_{point}"] = loop.disk(point)
                 out[f"channels_{point}"] = [loop.channel(point, i) for i in range(k)]
             out["noise"], out["hold"], out["delay"] = loop.noise(), loop.hold(), loop.delay()
-            for key, m in out.items():
-                m = np.atleast_2d(m)
-                file.write(f"{key} {m.shape[0]} {m.shape[1]} " + " ".join(repr(float(x)) for x in m.flat) + "\n")
+            write(file, "loop", name, **out)
 
 
 if __name__ == "__main__":

@@ -6,15 +6,13 @@ that is refined about its maximum. Needs Python with numpy, scipy and slycot; wr
 argument, or to the committed file.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import scipy
 from scipy.optimize import minimize_scalar
 from slycot import ab13md
 
-ROOT = Path(__file__).resolve().parents[2]
+from matrices import target, write
+
 SEED = 20261128
 # States, real and complex blocks.
 SIZES = (2, 2, 0), (4, 3, 0), (6, 4, 0), (4, 2, 2), (6, 0, 4), (5, 6, 1), (8, 5, 0), (8, 1, 5)
@@ -36,8 +34,7 @@ def peak(a, b, c, kinds):
 
 def main():
     rng = np.random.default_rng(SEED)
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates/control/tests/data/structured.txt"
-    with path.open("w", encoding="utf-8") as file:
+    with target("structured.txt").open("w", encoding="utf-8") as file:
         versions = f"slycot 0.7.1, scipy {scipy.__version__}"
         file.write(f"# scripts/reference/reference_structured.py: {versions}\n")
         for n, real, whole in SIZES:
@@ -46,10 +43,8 @@ def main():
             a -= (np.linalg.eigvals(a).real.max() + 0.2) * np.eye(n)
             b, c = rng.normal(size=(n, r)), rng.normal(size=(r, n))
             kinds = np.array([1] * real + [2] * whole)
-            file.write(f"system: {n} states, {real} real, {whole} complex\n")
-            for key, m in {"A": a, "B": b, "C": c, "kinds": kinds, "peak": peak(a, b, c, kinds)}.items():
-                m = np.atleast_2d(m)
-                file.write(f"{key} {m.shape[0]} {m.shape[1]} " + " ".join(repr(float(x)) for x in m.flat) + "\n")
+            name = f"{n} states, {real} real, {whole} complex"
+            write(file, "system", name, A=a, B=b, C=c, kinds=kinds, peak=peak(a, b, c, kinds))
 
 
 if __name__ == "__main__":
