@@ -4,9 +4,10 @@ import tomllib
 
 import numpy as np
 import pytest
-from scipy.linalg import expm, solve_continuous_are
+from scipy.linalg import solve_continuous_are
 
 from design_oracle import Matrices, design_and_report
+from matrices import zoh
 
 # A heated tank, a pendulum that falls, a cart with its position and speed.
 TANK = ([[-0.01]], [[0.02]], [[1]])
@@ -74,19 +75,11 @@ def test_the_peaks_of_a_continuous_loop_are_those_with_the_delays_themselves(
 def held(plant, delay, period):
     """x[n+1] = phi x + late u[n-k-1] + early u[n-k] of a plant whose command acts `delay` late; k."""
     a, b, _ = map(np.array, plant)
-    n, m = b.shape
-    whole = np.zeros((n + m, n + m))
-    whole[:n] = np.hstack([a, b])
-
-    def hold(time):
-        phi = expm(whole * time)
-        return phi[:n, :n], phi[:n, n:]
-
     k = int(delay // period)
     rest = delay - k * period
-    phi, _ = hold(period)
-    free, early = hold(period - rest)
-    _, late = hold(rest)
+    phi, _ = zoh(a, b, period)
+    free, early = zoh(a, b, period - rest)
+    _, late = zoh(a, b, rest)
     return phi, free @ late, early, k
 
 

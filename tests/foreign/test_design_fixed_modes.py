@@ -5,9 +5,10 @@ import tomllib
 
 import numpy as np
 import pytest
-from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
+from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are
 
 from design_oracle import Matrices
+from matrices import zoh
 from test_design_wanted import feedback_gain, observer_gain
 
 PERIOD = 0.1
@@ -52,13 +53,6 @@ def stabilisable(rng):
     return turned(rng, a, b, rng.standard_normal((2, 6)))
 
 
-def zero_order_hold(a, b):
-    """The sampled plant."""
-    n, m = b.shape
-    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * PERIOD)
-    return both[:n, :n], both[:n, n:]
-
-
 @pytest.mark.parametrize("sampled", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_regulators_of_stabilisable_plants_are_those_of_scipy(aso_ftc, tmp_path, seed, sampled):
@@ -67,7 +61,7 @@ def test_regulators_of_stabilisable_plants_are_those_of_scipy(aso_ftc, tmp_path,
     text += "feedback.Q = [1, 2, 1, 1, 3, 1]\nfeedback.R = [0.5]\nobserver.region = { decay = 1 }\n"
     q, r = np.diag([1.0, 2, 1, 1, 3, 1]), np.array([[0.5]])
     if sampled:
-        phi, gamma = zero_order_hold(a, b)
+        phi, gamma = zoh(a, b, PERIOD)
         p = solve_discrete_are(phi, gamma, q, r)
         expected = -np.linalg.solve(r + gamma.T @ p @ gamma, gamma.T @ p @ phi)
         text += f"sample_time = {PERIOD}\n"
@@ -91,7 +85,7 @@ def test_kalman_filters_of_detectable_plants_are_those_of_scipy(aso_ftc, tmp_pat
     w, v = np.diag([1.0, 1, 1, 2, 1, 1, 5]), np.array([[0.1]])
     c_0 = np.hstack([c, np.zeros((1, 1))])
     if sampled:
-        phi, gamma = zero_order_hold(a, b)
+        phi, gamma = zoh(a, b, PERIOD)
         a_0 = np.block([[phi, -gamma], [np.zeros((1, 6)), np.eye(1)]])
         p = solve_discrete_are(a_0.T, c_0.T, w, v)
         expected = p @ c_0.T @ np.linalg.inv(v + c_0 @ p @ c_0.T)
@@ -118,7 +112,7 @@ def test_only_the_movable_eigenvalues_are_assigned(aso_ftc, tmp_path, sampled):
     expected = np.array([-5, -4, -3, *FIXED])
     if sampled:
         text += f"sample_time = {PERIOD}\n"
-        a, b = zero_order_hold(a, b)
+        a, b = zoh(a, b, PERIOD)
         expected = np.exp(expected * PERIOD)
     eigenvalues = np.linalg.eigvals(a + b @ gain(reported(aso_ftc, tmp_path, text), "K_x"))
     for value in expected:
@@ -135,7 +129,7 @@ def test_an_observer_assigns_what_the_measurements_show(aso_ftc, tmp_path, sampl
     expected = np.array([-6, -7, -8, -9, *FIXED])
     if sampled:
         text += f'sample_time = {PERIOD}\nestimator = "prediction"\n'
-        a, b = zero_order_hold(a, b)
+        a, b = zoh(a, b, PERIOD)
         expected = np.exp(expected * PERIOD)
     report = reported(aso_ftc, tmp_path, text)
     a_0 = np.block([[a, -b], [np.zeros((1, 6)), np.eye(1) if sampled else np.zeros((1, 1))]])

@@ -11,6 +11,7 @@ import scipy.linalg
 import scipy.stats
 
 from conftest import ROOT
+from matrices import zoh
 
 PLANT = """
 A = [[-0.5, 0.2, 0.0, 0.0], [0.1, -0.4, 0.3, 0.0], [0.0, 0.1, -0.8, 0.2], [0.0, 0.0, 0.1, -1.0]]
@@ -58,8 +59,7 @@ def plant(sampled):
     a, b, c = (np.array(file[name], dtype=float) for name in "ABC")
     b = np.hstack([b, np.array([[0.0], [0.0], [1.0], [0.0]])])
     if sampled:
-        whole = scipy.linalg.expm(np.block([[a, b], [np.zeros((3, 7))]]) * T)
-        a, b = whole[:4, :4], whole[:4, 4:]
+        a, b = zoh(a, b, T)
     return a, b, c
 
 

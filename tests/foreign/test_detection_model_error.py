@@ -13,6 +13,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from conftest import ROOT
 from design_loop import packed_plant
+from matrices import zoh
 from split_mix import uniform
 from test_detection import COMMAND, DETECTION, PLANT, Filter, T, designed, noise
 
@@ -73,21 +74,21 @@ def means(detector, plant, period, samples):
     A continuous filter is simulated with commands held over `period` s; its residuals are integrals over such times
     divided by the root of the period."""
     a, b, c = plant
-    n, k, q, m = len(a), len(detector.a), len(detector.c), b.shape[1]
+    n, k, q = len(a), len(detector.a), len(detector.c)
     whole = np.block(
         [[a, np.zeros((n, k + q))], [detector.b_y @ c, detector.a, np.zeros((k, q))], [detector.d_y @ c, detector.c, np.zeros((q, q))]]
     )
     column = np.vstack([b, detector.b_u, detector.d_u])
     if period is None:
-        held = scipy.linalg.expm(np.block([[a, b], [np.zeros((m, n + m))]]) * T)
-        whole = np.block([[held[:n, :n], np.zeros((n, k))], [detector.b_y @ c, detector.a]])
-        column, read = np.vstack([held[:n, n:], detector.b_u]), np.hstack([detector.d_y @ c, detector.c])
+        phi, gamma = zoh(a, b, T)
+        whole = np.block([[phi, np.zeros((n, k))], [detector.b_y @ c, detector.a]])
+        column, read = np.vstack([gamma, detector.b_u]), np.hstack([detector.d_y @ c, detector.c])
         first = detector.d_u
     else:
-        step = scipy.linalg.expm(np.block([[whole, column], [np.zeros((m, n + k + q + m))]]) * period)
-        rows = slice(n + k, n + k + q)
-        whole, column = step[: n + k, : n + k], step[: n + k, n + k + q :]
-        read, first = step[rows, : n + k] / np.sqrt(period), step[rows, n + k + q :] / np.sqrt(period)
+        step, entry = zoh(whole, column, period)
+        whole, read = np.split(step[:, : n + k], [n + k])
+        column, first = np.split(entry, [n + k])
+        read, first = read / np.sqrt(period), first / np.sqrt(period)
     effects = [first]
     for _ in range(samples):
         effects.append(read @ column)
@@ -132,7 +133,7 @@ def test_the_worst_commands_give_no_more_alarms_than_the_noise_alone_may(tmp_pat
     for test in range(2):
         at = np.argmax([np.abs(one[test]) @ SIZE for one in steady])
         a, b, c = plants[at]
-        held = scipy.linalg.expm(np.block([[a, b], [np.zeros((2, 6))]]) * T)
+        phi, gamma = zoh(a, b, T)
         # A constant command that moves the mean of this residual as far as it can.
         u = SIZE * np.sign(steady[at][test])
         x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(detector.a)))
@@ -142,7 +143,7 @@ def test_the_worst_commands_give_no_more_alarms_than_the_noise_alone_may(tmp_pat
             y = x @ c.T + root_v * generator.standard_normal((runs, 3))
             r = x_r @ detector.c.T + detector.d_u @ u + y @ detector.d_y.T
             x_r = x_r @ detector.a.T + detector.b_u @ u + y @ detector.b_y.T
-            x = x @ held[:4, :4].T + held[:4, 4:] @ u + root_w * generator.standard_normal((runs, 4))
+            x = x @ phi.T + gamma @ u + root_w * generator.standard_normal((runs, 4))
             both = np.array([r, -r])
             sums, simple = np.maximum(0.0, sums + both - drifts), np.maximum(0.0, simple + both - (drifts - bias))
             over |= np.array([(one > thresholds).any(axis=(0, 2)) for one in (sums, simple)])

@@ -10,6 +10,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from conftest import ROOT
+from matrices import zoh
 
 VEHICLE = ROOT / "examples/plants/actuators/underwater-vehicle.toml"
 
@@ -200,10 +201,8 @@ class Plant:
 
     def __init__(self, design, step):
         a, b = matrix(design, "A"), matrix(design, "B")
-        n, m = b.shape
-        whole = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * step)
-        self.phi, self.gamma, self.c = whole[:n, :n], whole[:n, n:], matrix(design, "C")
-        self.x = np.zeros(n)
+        self.phi, self.gamma = zoh(a, b, step)
+        self.c, self.x = matrix(design, "C"), np.zeros(len(a))
 
     def advance(self, u):
         self.x = self.phi @ self.x + self.gamma @ u
@@ -268,9 +267,7 @@ def test_at_the_switch_the_estimates_continue_and_the_commands_change_by_the_gai
         """z of the next step; y is held over a step."""
         z = loop.model + np.vstack([loop.b, np.zeros((loop.q, loop.m))]) @ loop.k
         z -= loop.gain @ np.hstack([loop.c, np.zeros((len(loop.c), loop.q))])
-        size = loop.n + loop.q
-        whole = expm(np.block([[z, loop.gain], [np.zeros((len(loop.c), size + len(loop.c)))]]) * step)
-        return whole[:size, :size], whole[:size, size:]
+        return zoh(z, loop.gain, step)
 
     z, u = np.zeros(before.n + before.q), np.zeros(4)
     for k in range(300):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from matrices import zoh
 from stepped import Stepped
 from tracking_oracle import TrackingLoop
 
@@ -43,13 +44,6 @@ def designed(aso_ftc, folder, text, *options):
     return tomllib.loads((folder / "design.toml").read_text(encoding="utf-8")), json.loads(done.stdout)
 
 
-def held(a, b, time):
-    """The sampled matrices of a plant whose input is held."""
-    n, m = b.shape
-    whole = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * time)
-    return whole[:n, :n], whole[:n, n:]
-
-
 def silent(a, b, output, k, period):
     """The slowest left eigenvectors W of the feedback, and N_r with W' [B N_r; I] = 0."""
     n, t = len(a), len(output)
@@ -72,7 +66,7 @@ def carts(request, aso_ftc, packed, tmp_path_factory):
 def test_n_r_is_that_of_the_left_eigenvectors(carts):
     kind, design, report, _ = carts
     period = None if kind == "continuous" else PERIOD
-    a, b = held(A, B, PERIOD) if period else (A, B)
+    a, b = zoh(A, B, PERIOD) if period else (A, B)
     _, expected = silent(a, b, C, np.hstack([design["K_x"], design["K_i"]]), period)
     assert np.allclose(design["N_r"], expected, rtol=1e-7, atol=1e-9)
     sentence = next(text for text in report["assumptions"] if "do not excite the slowest eigenvalues" in text)
@@ -82,8 +76,8 @@ def test_n_r_is_that_of_the_left_eigenvectors(carts):
 
 def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
     """A plant under the FMU after a step of both references: states, commands, integrals at each communication step."""
-    phi, gamma = held(plant[0], plant[1], PERIOD)
-    _, xi = held(plant[0], disturbance[:, None], PERIOD)
+    phi, gamma = zoh(plant[0], plant[1], PERIOD)
+    _, xi = zoh(plant[0], disturbance[:, None], PERIOD)
     controller = Stepped(fmu, folder, [("r_p_1", STEP[0]), ("r_p_2", STEP[1])])
     x, rows = np.zeros(4), []
     for k in range(round(end / PERIOD) + 1):
@@ -114,9 +108,9 @@ def continuous(design, plant, disturbance, count):
         [matrices["L_f"], np.zeros((q, t))],
         [-matrices["H"], np.eye(t)],
     ])
-    step, entry = held(dynamics, inputs, PERIOD)
-    phi, gamma = held(plant[0], plant[1], PERIOD)
-    _, xi = held(plant[0], disturbance[:, None], PERIOD)
+    step, entry = zoh(dynamics, inputs, PERIOD)
+    phi, gamma = zoh(plant[0], plant[1], PERIOD)
+    _, xi = zoh(plant[0], disturbance[:, None], PERIOD)
     z, x, rows = np.zeros(n + q + t), np.zeros(n), []
     for _ in range(count):
         u = k @ z + matrices["N_r"] @ STEP
@@ -169,7 +163,7 @@ def test_references_leave_the_slowest_modes_at_rest_and_settle_faster(carts, tmp
         a, b, period = A, B, None
     else:
         rows = run(fmu, tmp_path, (A, B), np.zeros(4), True)[:, [0, 1, 2, 3, 6, 7]]
-        (a, b), period = held(A, B, PERIOD), PERIOD
+        (a, b), period = zoh(A, B, PERIOD), PERIOD
     w, _ = silent(a, b, C, np.hstack([design["K_x"], design["K_i"]]), period)
     assert np.abs(rows @ w).max() < 1e-8
     without = TrackingLoop((A, B, C, B[:, :1], np.zeros((2, 1))), {key: value for key, value in design.items() if key != "N_r"})
@@ -263,7 +257,7 @@ def test_one_p_proves_the_loops_of_all_members_with_their_integrals(family):
     assert len(whole) == 6 and len(feedback) == 3
     k = np.hstack([design["K_x"], design["K_i"]])
     for a, b in MEMBERS.values():
-        a, b = (held(np.array(a, float), np.array(b, float), period)) if period else (np.array(a, float), np.array(b, float))
+        a, b = zoh(np.array(a, float), np.array(b, float), period) if period else (np.array(a, float), np.array(b, float))
         extended = np.block([[a, np.zeros((2, 1))], [-(period or 1.0) * np.eye(1, 2), np.eye(1) if period else np.zeros((1, 1))]])
         matrix = extended + np.vstack([b, [[0]]]) @ k
         shifted = matrix * np.exp(period) if period else matrix + np.eye(3)
@@ -285,7 +279,7 @@ def test_each_member_settles_on_its_reference(family, name, tmp_path):
     values = np.linalg.eigvals(member_loop(name, design).matrices()[0])
     assert instability == pytest.approx(abs(values).max() - 1 if "sample_time" in design else values.real.max(), rel=1e-5)
     a, b = (np.array(matrix, float) for matrix in MEMBERS[name])
-    phi, gamma = held(a, b, 0.02)
+    phi, gamma = zoh(a, b, 0.02)
     controller = Stepped(fmu, tmp_path, [("p", 2.0), ("r_p", 2.5)])
     x = np.array([2.0, 0.0])
     for k in range(1000):

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-from scipy.linalg import expm
 
 from conftest import ROOT
+from matrices import zoh
 from test_estimation_laws import Designed as DesignedFmu
 
 # Two masses between springs; position of the first one and acceleration of the second one are measured.
@@ -82,8 +82,7 @@ class Designed(DesignedFmu):
         if kind == "continuous":
             return C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D, D
         h = self.design["sample_time"]
-        both = expm(np.block([[A, B], [np.zeros((B.shape[1], len(A) + B.shape[1]))]]) * h)
-        phi, gamma = both[: len(A), : len(A)], both[: len(A), len(A) :]
+        phi, gamma = zoh(A, B, h)
         return C @ np.linalg.solve(s * np.eye(len(A)) - phi, gamma) + D / s, D / s
 
 
@@ -142,8 +141,7 @@ class Run:
         self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
-        both = expm(np.block([[A, B], [np.zeros((1, 5))]]) * step)
-        self.phi, self.gamma, self.step = both[:4, :4], both[:4, 4:], step
+        (self.phi, self.gamma), self.step = zoh(A, B, step), step
 
     def get(self, *names):
         return np.array(self.slave.getReal([self.names[name] for name in names]))

@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment, minimize_scalar
 
 import large_plants
 from design_oracle import Matrices, closed_loop
+from matrices import zoh
 
 MASSES, COMMANDS, MEASUREMENTS = 25, 3, 6
 STATES = 2 * MASSES
@@ -122,13 +123,7 @@ def test_the_worst_case_and_the_longest_hold_are_on_the_limit(designed):
     hold = robustness["longest_hold"]
 
     def radius(h):
-        from scipy.linalg import expm
-
-        def held(a, b):
-            whole = expm(h * np.block([[a, b], [np.zeros((b.shape[1], len(a) + b.shape[1]))]]))
-            return whole[: len(a), : len(a)], whole[: len(a), len(a) :]
-
-        (a, b), (k, gain) = held(design.A, design.B), held(controller, correction)
+        (a, b), (k, gain) = zoh(design.A, design.B, h), zoh(controller, correction, h)
         return np.abs(np.linalg.eigvals(np.block([[a, b @ command], [gain @ design.C, k]]))).max()
 
     assert radius(0.999 * hold) < 1 < radius(1.001 * hold)

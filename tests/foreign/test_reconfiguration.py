@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-from scipy.linalg import expm
 from scipy.optimize import minimize
 from scipy.signal import place_poles
 
 from conftest import ROOT
+from matrices import zoh
 
 PLANT = ROOT / "examples/plants/actuators/underwater-vehicle.toml"
 
@@ -75,8 +75,7 @@ class Loop:
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
         a, b = matrix(self.design, "A"), matrix(self.design, "B")
-        whole = expm(np.block([[a, b], [np.zeros((4, 10))]]) * step)
-        self.phi, self.gamma = whole[:6, :6], whole[:6, 6:]
+        self.phi, self.gamma = zoh(a, b, step)
         self.x, self.time = np.zeros(6), 0.0
 
     def get(self, *names):
@@ -155,13 +154,13 @@ def test_the_run_is_that_of_the_reconfigured_equations(vehicle, loop):
     m = np.block([[a, f_a], [np.zeros((2, 8))]]) + np.vstack([b @ feedback, np.zeros((2, 8))])
     m -= gain @ np.hstack([c, np.zeros((3, 2))])
     n = np.hstack([gain, np.concatenate([b @ constant, np.zeros(2)])[:, None]])
-    whole = expm(np.block([[m, n], [np.zeros((4, 12))]]) * step)
+    phi, gamma = zoh(m, n, step)
     u = np.array([3.0, 3.0, 3.0, 3.0])
     for k in range(400):
         loop.run((k + 1) * step, without(2))
         u[2] = 0.0
         x = loop.phi @ x + loop.gamma @ (u - 3.0)
-        z = whole[:8, :8] @ z + whole[:8, 8:] @ np.concatenate([c @ x, [1.0]])
+        z = phi @ z + gamma @ np.concatenate([c @ x, [1.0]])
         u = 3.0 + feedback @ z + constant
         assert abs(loop.x - x).max() < 1e-9, k
         assert abs(loop.get("T1", "T2", "T3", "T4") - (u - [0, 0, 0, 0])).max() < 1e-7, k

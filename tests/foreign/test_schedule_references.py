@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 from fmpy import extract
-from scipy.linalg import expm
 
 import scheduled_design
 from c_abi import Fmu, Instance
+from matrices import zoh
 from scheduled_design import LISTS, ScheduledDesign
 from stepped import Stepped
 
@@ -24,16 +24,10 @@ WITHOUT = [
 ]
 
 
-def held(a, b, time=PERIOD):
-    """The sampled matrices of a plant whose input is held."""
-    n, m = b.shape
-    whole = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * time)
-    return whole[:n, :n], whole[:n, n:]
-
-
 def drive(k):
     """The sampled plant at a point."""
-    return held(np.array([[0, 1], [-SPRINGS[k] / INERTIAS[k], -FRICTIONS[k] / INERTIAS[k]]]), np.array([[0], [1 / INERTIAS[k]]]))
+    a = np.array([[0, 1], [-SPRINGS[k] / INERTIAS[k], -FRICTIONS[k] / INERTIAS[k]]])
+    return zoh(a, np.array([[0], [1 / INERTIAS[k]]]), PERIOD)
 
 
 def by(law):
