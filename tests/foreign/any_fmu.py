@@ -4,8 +4,8 @@ import csv
 from contextlib import contextmanager
 
 import numpy as np
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+
+from stepped import instantiated
 
 # Every input is held over a step at its value at the start.
 HELD = ("--method", "jacobi", "--extrapolation", "hold")
@@ -33,25 +33,25 @@ def numbers(table, name):
 
 @contextmanager
 def instance(path, folder, settings=None):
-    """An initialised instance by FMPy with Reals and Integers set, and its variables by name."""
-    description = read_model_description(str(path))
-    variables = {variable.name: variable for variable in description.modelVariables}
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(str(path), str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="own",
-    )
-    slave.instantiate()
+    """An initialised instance by FMPy with Reals, Booleans and Integers set, and its variables by name."""
+    slave, variables = instantiated(path, folder)
     slave.setupExperiment(startTime=0.0)
     for name, value in (settings or {}).items():
-        real = variables[name].type == "Real"
-        (slave.setReal if real else slave.setInteger)([variables[name].valueReference], [value])
+        variable = variables[name]
+        place = {"Real": slave.setReal, "Boolean": slave.setBoolean}.get(variable.type, slave.setInteger)
+        place([variable.valueReference], [value])
     slave.enterInitializationMode()
     slave.exitInitializationMode()
     yield slave, variables
     slave.terminate()
     slave.freeInstance()
+
+
+@contextmanager
+def referenced(path, folder, settings=None):
+    """Such an instance, and its value references by name."""
+    with instance(path, folder, settings) as (slave, variables):
+        yield slave, {name: variable.valueReference for name, variable in variables.items()}
 
 
 def stepped(path, folder, step, count, names, settings=None):

@@ -8,13 +8,12 @@ import tomllib
 import numpy as np
 import pytest
 import scipy.linalg
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
 
 from conftest import ROOT
 from design_loop import packed_plant
 from matrices import zoh
 from split_mix import uniform
+from stepped import Stepped
 from test_detection import COMMAND, DETECTION, PLANT, Filter, T, designed, noise
 
 SIZE = np.array([0.5, 0.4])
@@ -266,7 +265,7 @@ def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change,
     section = tomllib.loads((tmp_path / "plant-design.toml").read_text("utf-8"))["detection"]
     period = section.get("sample_time", T)
     names = ["u1", "u2", "residual[1]", "residual[2]"]
-    fmu, references = started(tmp_path / "Detecting.fmu", tmp_path / "unpacked")
+    fmu = Stepped(tmp_path / "Detecting.fmu", tmp_path / "unpacked")
     # Measurements held over a step; the filter of the design file by scipy, with the commands of the FMU.
     detector, generator = Filter(section), np.random.default_rng(2)
     step = 0.001 if not sampled else T
@@ -279,14 +278,14 @@ def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change,
     for at in range(40 if sampled else 2000):
         if at % (1 if sampled else 100) == 0:
             y = 0.1 * generator.standard_normal(3)
-        fmu.setReal([references[name] for name in ("y1", "y2", "y3")], list(y))
+        fmu.set_reals(("y1", "y2", "y3"), y)
         if "reference" in extra:
-            fmu.setReal([references["r_y1"]], [0.4])
+            fmu.set("r_y1", 0.4)
         elif at >= (10 if sampled else 500):
-            fmu.setBoolean([references["actuator_gone[1]"]], [True])
-        before = np.array(fmu.getReal([references[name] for name in names[:2]]))
-        fmu.doStep(at * step, step)
-        values = np.array(fmu.getReal([references[name] for name in names]))
+            fmu.set("actuator_gone[1]", True)
+        before = fmu.get(*names[:2])
+        fmu.step(at * step, step)
+        values = fmu.get(*names)
         u = values[:2] if sampled else 0.5 * (before + values[:2])
         commands.append(values[:2])
         if sampled:
@@ -301,24 +300,7 @@ def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change,
             residuals.append(values[2:])
             expected.append(integral / np.sqrt(period))
             integral, due = np.zeros(2), due + period
-    fmu.terminate()
-    fmu.freeInstance()
+    fmu.close()
     residuals, expected = np.array(residuals), np.array(expected)
     assert np.ptp(np.array(commands), axis=0).min() > 0.1, "the commands move"
     assert np.abs(residuals).max() > 1.0 and np.abs(residuals - expected).max() < (1e-9 if sampled else 0.02) * np.abs(residuals).max()
-
-
-def started(path, folder):
-    """The initialised FMU and the references of its variables."""
-    description = read_model_description(str(path))
-    fmu = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(str(path), unzipdir=str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="controller",
-    )
-    fmu.instantiate()
-    fmu.setupExperiment(startTime=0.0)
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    return fmu, {variable.name: variable.valueReference for variable in description.modelVariables}

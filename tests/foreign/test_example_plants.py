@@ -4,14 +4,13 @@ Oracles: scipy's integration of the equations, with the events found by scipy, a
 formula.
 """
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description, simulate_fmu
-from fmpy.fmi2 import FMU2Slave
+from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
+
+from any_fmu import referenced
 
 PLANTS = {"three-tank": "ThreeTank", "dc-servo": "DcServo"}
 EXACT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
@@ -40,29 +39,6 @@ def held(names, begins, values):
 def table(result, names):
     """Columns of a result of FMPy."""
     return np.array([result[name] for name in names]).T
-
-
-@contextmanager
-def slave(fmu, folder, start):
-    """An initialised instance by FMPy, and its value references by name."""
-    description = read_model_description(fmu)
-    names = {variable.name: variable.valueReference for variable in description.modelVariables}
-    instance = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(fmu, str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="own",
-    )
-    instance.instantiate()
-    for name, value in start.items():
-        place = instance.setBoolean if isinstance(value, bool) else instance.setReal
-        place([names[name]], [value])
-    instance.setupExperiment(startTime=0.0)
-    instance.enterInitializationMode()
-    instance.exitInitializationMode()
-    yield instance, names
-    instance.terminate()
-    instance.freeInstance()
 
 
 def jacobian(instance, names, unknowns, knowns):
@@ -189,7 +165,7 @@ def test_the_directional_derivatives_of_the_tanks_give_the_linear_model(plants, 
     states, inputs = ["h_1", "h_2", "h_3"], ["Q_1", "Q_2"]
     slopes, measured = [f"der({name})" for name in states], ["y_1", "y_2", "y_3"]
     h = np.array([0.45, 0.15, 0.28])
-    with slave(plants["ThreeTank"], tmp_path, dict(zip(states, h))) as (instance, names):
+    with referenced(plants["ThreeTank"], tmp_path, dict(zip(states, h))) as (instance, names):
         drops = [h[0] - h[2], h[2] - h[1], h[1]]
         a, b, c = np.array(MU) * PIPE * np.sqrt(GRAVITY / 2 / np.array(drops)) / AREA
         expected = [[-a, 0, a], [0, -b - c, b], [a, b, -a - b]]
@@ -305,7 +281,7 @@ def test_the_directional_derivatives_of_the_servo_without_friction_give_the_line
     plants, tmp_path
 ):
     damping = VISCOUS + K**2 / RESISTANCE
-    with slave(plants["DcServo"], tmp_path, {"friction": False}) as (instance, names):
+    with referenced(plants["DcServo"], tmp_path, {"friction": False}) as (instance, names):
         slopes = ["der(theta)", "der(omega)"]
         matrix = jacobian(instance, names, slopes, NAMES)
         assert matrix == pytest.approx(np.array([[0, 1], [0, -damping / INERTIA]]), rel=1e-14)

@@ -6,7 +6,6 @@ Oracles: the published output of the Reference-FMUs, closed forms, and numpy.
 import os
 import shutil
 import subprocess
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -14,20 +13,13 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 
-from any_fmu import instance
+from any_fmu import referenced
 from conftest import EXAMPLES
 
 
 def published(root, name):
     """A table of the published output of the Reference-FMUs."""
     return np.genfromtxt(root / "tests" / "data" / name, delimiter=",", names=True, skip_header=1)
-
-
-@contextmanager
-def slave(fmu, folder, start=None):
-    """An instance by FMPy after initialization, and its value references by name."""
-    with instance(fmu, folder, start) as (initialized, variables):
-        yield initialized, {name: variable.valueReference for name, variable in variables.items()}
 
 
 @pytest.mark.parametrize("model", EXAMPLES.values())
@@ -105,7 +97,7 @@ def test_co_simulation_integrates_the_van_der_pol_equation_to_the_tolerance_of_t
 def test_the_directional_derivatives_of_the_van_der_pol_oscillator_give_its_jacobian(
     examples, tmp_path
 ):
-    with slave(examples["VanDerPol"], tmp_path, {"x0": 0.7, "x1": -1.3}) as (instance, names):
+    with referenced(examples["VanDerPol"], tmp_path, {"x0": 0.7, "x1": -1.3}) as (instance, names):
         for known, column in {"x0": [0, 2 * 0.7 * 1.3 - 1], "x1": [1, 1 - 0.7**2]}.items():
             slopes = [names["x1"], names["der(x1)"]]
             derivatives = instance.getDirectionalDerivative(slopes, [names[known]], [1.0])
@@ -154,7 +146,7 @@ def closed_form_ball(time, e, v_min=0.1, g=9.81):
 @pytest.mark.parametrize("size", [3.0, 0.5, 0.01])
 @pytest.mark.parametrize("e", [0.5, 0.7, 0.9])
 def test_the_ball_follows_the_closed_form_for_every_step(examples, tmp_path, e, size):
-    with slave(examples["BouncingBall"], tmp_path, {"e": e}) as (ball, names):
+    with referenced(examples["BouncingBall"], tmp_path, {"e": e}) as (ball, names):
         for k in range(round(3.0 / size)):
             ball.doStep(k * size, size)
             state = ball.getReal([names["h"], names["v"]])
@@ -213,7 +205,7 @@ WORDS = {0: "off", 1: "manual", 2: "automatic"}
 def drive(fmu, folder, steps, size, inputs, anti_windup=True):
     """Returns u, samples and status after each step; `inputs(k)` gives w, y, u_manual and the mode."""
     rows = []
-    with slave(fmu, folder, PARAMETERS) as (pid, names):
+    with referenced(fmu, folder, PARAMETERS) as (pid, names):
         reals = [names[name] for name in ("w", "y", "u_manual")]
         for k in range(steps):
             *values, mode = inputs(k)
@@ -266,7 +258,7 @@ def test_the_table_agrees_with_numpy_between_at_and_outside_of_its_rows(examples
     table = np.genfromtxt(path, delimiter=",", names=True)
     x, *outputs = table.dtype.names
     points = np.concatenate([np.linspace(-100.0, 900.0, 777), table[x]])
-    with slave(examples["LookupTable"], tmp_path) as (lookup, names):
+    with referenced(examples["LookupTable"], tmp_path) as (lookup, names):
         for point in points:
             lookup.setReal([names[x]], [point])
             for name in outputs:

@@ -6,11 +6,12 @@ import tomllib
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi2 import FMU2Model
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from conftest import ROOT
 from matrices import zoh
+from stepped import Stepped
 
 VEHICLE = ROOT / "examples/plants/actuators/underwater-vehicle.toml"
 
@@ -156,44 +157,20 @@ def test_price_and_rest_are_those_of_the_loop(vehicle, masses):
             assert [number["value"] for number in case["commands"]] == pytest.approx(commands, rel=1e-6, abs=1e-12)
 
 
-class Run:
+class Run(Stepped):
     """The controller FMU in co-simulation and the plant by scipy; commands are held over a step."""
 
     def __init__(self, design, fmu, folder, step):
-        self.design, self.step, self.time = design, step, 0.0
-        description = read_model_description(str(fmu))
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=extract(str(fmu), unzipdir=str(folder)),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="controller",
-        )
-        self.fmu.instantiate()
-        self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
+        super().__init__(fmu, folder)
+        self.size, self.time = step, 0.0
         self.actuators = [actuator["name"] for actuator in design["actuators"]]
         self.operating = np.array([actuator.get("operating", 0.0) for actuator in design["actuators"]])
         self.measurements = [measurement["name"] for measurement in design["measurements"]]
 
-    def get(self, *names):
-        return np.array(self.fmu.getReal([self.references[name] for name in names]))
-
-    def set(self, name, value):
-        self.fmu.setBoolean([self.references[name]], [value])
-
-    def number(self):
-        return self.fmu.getInteger([self.references["reconfiguration"]])[0]
-
     def do(self, y):
-        self.fmu.setReal([self.references[name] for name in self.measurements], list(y))
-        self.fmu.doStep(self.time, self.step)
-        self.time += self.step
-
-    def close(self):
-        self.fmu.terminate()
-        self.fmu.freeInstance()
+        self.set_reals(self.measurements, y)
+        self.step(self.time, self.size)
+        self.time += self.size
 
 
 class Plant:

@@ -81,13 +81,12 @@ def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
     controller = Stepped(fmu, folder, [("r_p_1", STEP[0]), ("r_p_2", STEP[1])])
     x, rows = np.zeros(4), []
     for k in range(round(end / PERIOD) + 1):
-        u = np.array([controller.get("F_1"), controller.get("F_2")])
-        rows.append(np.concatenate([x, u, [controller.get("x_i[1]"), controller.get("x_i[2]")]]))
+        u = controller.get("F_1", "F_2")
+        rows.append(np.concatenate([x, u, controller.get("x_i[1]", "x_i[2]")]))
         following = phi @ x + gamma @ u + xi[:, 0]
         # A sampled controller takes the measurements at the end of the step, a continuous one during it.
         x = following if is_sampled else x
-        for j in range(2):
-            controller.set(f"p_{j + 1}", x[j])
+        controller.set_reals(("p_1", "p_2"), x[:2])
         controller.step(k * PERIOD, PERIOD)
         x = following
     return np.array(rows)
@@ -283,7 +282,7 @@ def test_each_member_settles_on_its_reference(family, name, tmp_path):
     controller = Stepped(fmu, tmp_path, [("p", 2.0), ("r_p", 2.5)])
     x = np.array([2.0, 0.0])
     for k in range(1000):
-        x = phi @ x + gamma[:, 0] * (controller.get("u") + 0.1)
+        x = phi @ x + gamma[:, 0] * (controller.get("u")[0] + 0.1)
         controller.set("p", x[0])
         controller.step(k * 0.02, 0.02)
     assert x[0] == pytest.approx(2.5, abs=1e-6)

@@ -13,11 +13,10 @@ import tomllib
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
 
 from conftest import ROOT
 from matrices import zoh
+from stepped import Stepped
 from test_estimation_laws import Designed as DesignedFmu
 
 # Two masses between springs; position of the first one and acceleration of the second one are measured.
@@ -127,44 +126,34 @@ def test_the_sensitivity_to_an_entry_of_d_is_that_of_another_plant(designed):
     assert worst["D"][1, 0] / 2 in (pytest.approx(0.9), pytest.approx(1.1))
 
 
-class Run:
+class Run(Stepped):
     """The FMU and the exact plant, exchanged every `step` seconds."""
 
-    def __init__(self, fmu, step):
-        description = read_model_description(fmu)
-        self.names = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.slave = FMU2Slave(
-            guid=description.guid, unzipDirectory=extract(fmu), instanceName="own",
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        self.slave.instantiate()
-        self.slave.setupExperiment(startTime=0.0)
-        self.slave.enterInitializationMode()
-        self.slave.exitInitializationMode()
-        (self.phi, self.gamma), self.step = zoh(A, B, step), step
+    def __init__(self, fmu, folder, step):
+        super().__init__(fmu, folder)
+        (self.phi, self.gamma), self.size = zoh(A, B, step), step
 
-    def get(self, *names):
-        return np.array(self.slave.getReal([self.names[name] for name in names]))
+    def measure(self, k, y):
+        """Step `k` with these measurements."""
+        self.set_reals(("position", "acceleration"), y)
+        self.step(k * self.size, self.size)
 
     def run(self, end, fault):
         """The state of the plant, and the last estimate of the fault."""
         x = np.array([0.02, -0.01, 0.0, 0.0])
         u = self.get("force")
-        count = round(end / self.step)
+        count = round(end / self.size)
         for k in range(count):
-            t = k * self.step
-            f = fault if t >= end / 2 else 0.0
-            y = C @ x + D @ (u + f)
-            self.slave.setReal([self.names["position"], self.names["acceleration"]], list(y))
-            self.slave.doStep(t, self.step)
+            f = fault if k * self.size >= end / 2 else 0.0
+            self.measure(k, C @ x + D @ (u + f))
             u = self.get("force")
             x = self.phi @ x + self.gamma @ (u + f)
         return x, self.get("f_hat")
 
 
-def test_the_fault_is_estimated_and_cancelled_through_the_feedthrough(designed):
+def test_the_fault_is_estimated_and_cancelled_through_the_feedthrough(designed, tmp_path):
     kind, loop = designed
-    run = Run(loop.fmu, 0.0005 if kind == "continuous" else 0.01)
+    run = Run(loop.fmu, tmp_path, 0.0005 if kind == "continuous" else 0.01)
     x, estimate = run.run(16.0, 0.7)
     assert estimate[0] == pytest.approx(0.7, rel=1e-3)
     assert abs(x).max() < 1e-4
@@ -174,7 +163,7 @@ def test_a_sampled_controller_follows_its_equations_with_limits(aso_ftc, tmp_pat
     """Fifty samples of measurements without a pattern; the commands reach their limits."""
     text = SAMPLED.replace('["force"]', '[{ name = "force", limits = [-0.4, 0.5], operating = 0.1 }]')
     controller = Designed(aso_ftc, tmp_path, text)
-    run = Run(controller.fmu, 0.01)
+    run = Run(controller.fmu, tmp_path / "unpacked", 0.01)
     n = len(controller.A)
     x_hat, f_hat, y_f, u = np.zeros(n), np.zeros(1), np.zeros(2), np.zeros(1)
     W = controller.design["filter"]
@@ -190,8 +179,7 @@ def test_a_sampled_controller_follows_its_equations_with_limits(aso_ftc, tmp_pat
         reached.update(np.round(u, 12).tolist())
         x_hat, f_hat = controller.A @ x + controller.B @ u + controller.F_a @ f, f
         y_f = y_f + W * (filter_input - y_f)
-        run.slave.setReal([run.names["position"], run.names["acceleration"]], list(y))
-        run.slave.doStep(k * 0.01, 0.01)
+        run.measure(k, y)
         assert run.get("force")[0] == pytest.approx(u[0] + 0.1, abs=1e-11), k
     assert {-0.5, 0.4} <= reached
 
@@ -231,7 +219,7 @@ def test_a_fault_in_the_acceleration_is_detected_with_the_stated_delay(aso_ftc, 
         folder = tmp_path / kind
         folder.mkdir()
         controller = Designed(aso_ftc, folder, text)
-        run = Run(controller.fmu, 0.01)
+        run = Run(controller.fmu, folder / "unpacked", 0.01)
         detection = controller.report["detection"]
         latest = detection["faults"][0]["delay_90"]
         generator = np.random.default_rng(5)
@@ -239,9 +227,7 @@ def test_a_fault_in_the_acceleration_is_detected_with_the_stated_delay(aso_ftc, 
         x, u, detected = np.zeros(4), run.get("force"), None
         for k in range(2000 + round(200 * latest)):
             f = 0.5 if k >= 2000 else 0.0
-            y = C @ x + D @ (u + f) + deviation * generator.standard_normal(2)
-            run.slave.setReal([run.names["position"], run.names["acceleration"]], list(y))
-            run.slave.doStep(k * 0.01, 0.01)
+            run.measure(k, C @ x + D @ (u + f) + deviation * generator.standard_normal(2))
             u = run.get("force")
             x = run.phi @ x + run.gamma @ (u + f)
             if detected is None and run.slave.getBoolean([run.names["fault_detected"]])[0]:

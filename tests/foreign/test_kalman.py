@@ -7,11 +7,10 @@ import zipfile
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
 from scipy.integrate import solve_ivp
 
 from any_fmu import instance
+from stepped import instantiated
 
 METHODS = {"extended": 1, "unscented": 2}
 T = 5.0
@@ -456,14 +455,7 @@ def test_a_saved_state_repeats_the_estimates(tanks, tmp_path, record):
         other.setFMUstate(state)
         assert samples(other, variables, range(10, 20)) == expected
         other.freeFMUstate(state)
-    description = read_model_description(str(tanks))
-    new = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(str(tanks), str(tmp_path / "new")),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="new",
-    )
-    new.instantiate()
+    new, variables = instantiated(tanks, tmp_path / "new")
     state = new.deSerializeFMUstate(data)
     new.setFMUstate(state)
     assert samples(new, variables, range(10, 20)) == expected

@@ -5,13 +5,12 @@ import tomllib
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
 from scipy.optimize import minimize
 from scipy.signal import place_poles
 
 from conftest import ROOT
 from matrices import zoh
+from stepped import Stepped
 
 PLANT = ROOT / "examples/plants/actuators/underwater-vehicle.toml"
 
@@ -56,36 +55,19 @@ def test_three_thrusters_have_the_effect_of_four_with_the_least_effort(vehicle):
     assert ("loss" in design["reconfigurations"][0]) and ("loss" not in design["reconfigurations"][2])
 
 
-class Loop:
+class Loop(Stepped):
     """The controller FMU and the plant by scipy, coupled every `step` s; commands are held in between."""
 
     def __init__(self, vehicle, folder, step=0.005):
         self.design, _, fmu = vehicle
-        self.step = step
-        description = read_model_description(str(fmu))
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=extract(str(fmu), unzipdir=str(folder)),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="controller",
-        )
-        self.fmu.instantiate()
-        self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
+        super().__init__(fmu, folder)
+        self.size = step
         a, b = matrix(self.design, "A"), matrix(self.design, "B")
         self.phi, self.gamma = zoh(a, b, step)
         self.x, self.time = np.zeros(6), 0.0
 
-    def get(self, *names):
-        return np.array(self.fmu.getReal([self.references[name] for name in names]))
-
-    def number(self):
-        return self.fmu.getInteger([self.references["reconfiguration"]])[0]
-
     def gone(self, j, value=True):
-        self.fmu.setBoolean([self.references[f"actuator_gone[{j}]"]], [value])
+        self.set(f"actuator_gone[{j}]", value)
 
     def run(self, end, effect):
         """Runs to `end`; `effect` turns the commands into what the thrusters do. Returns the largest |x|."""
@@ -93,15 +75,11 @@ class Loop:
         while self.time < end - 1e-9:
             u = effect(self.get("T1", "T2", "T3", "T4"))
             self.x = self.phi @ self.x + self.gamma @ (u - 3.0)
-            self.fmu.setReal([self.references[name] for name in ("x", "y", "psi")], list(self.x[:3]))
-            self.fmu.doStep(self.time, self.step)
-            self.time += self.step
+            self.set_reals(("x", "y", "psi"), self.x[:3])
+            self.step(self.time, self.size)
+            self.time += self.size
             largest = np.maximum(largest, abs(self.x))
         return largest
-
-    def close(self):
-        self.fmu.terminate()
-        self.fmu.freeInstance()
 
 
 @pytest.fixture
@@ -144,7 +122,7 @@ def test_the_run_is_that_of_the_reconfigured_equations(vehicle, loop):
     gain = np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
     loop.gone(3)
     loop.x[:] = [0.05, -0.03, 0.02, 0.0, 0.0, 0.0]
-    x, z, step = loop.x.copy(), np.zeros(8), loop.step
+    x, z, step = loop.x.copy(), np.zeros(8), loop.size
     u_3 = -3.0
     # z' = M z + N [y; u_3] with the feedback of the design file; y is held over a step.
     feedback = np.hstack([matrix(entry, "K_x"), matrix(entry, "K_f")])

@@ -180,8 +180,8 @@ def follow(fmu, folder, start, count=400):
     decay = np.exp(-period)
     x, rows = np.array([1.0, 0.0]), []
     for k in range(count):
-        u = instance.get("u")
-        rows.append((x[0], u, instance.get("x_i")))
+        u, integral = instance.get("u", "x_i")
+        rows.append((x[0], u, integral))
         x = np.array([x[0] + (1 - decay) * x[1] + (period - 1 + decay) * u, decay * x[1] + (1 - decay) * u])
         # The sample at the end of the step takes the angle at that time.
         instance.set("theta", x[0])

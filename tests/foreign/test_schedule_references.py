@@ -133,10 +133,9 @@ def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0
     measured = len(schedule.file["measurements"])
     for k in range(count):
         z, u = schedule.sample(z, x[:measured], np.array([reference(k)]), schedule.numbers(inertia(k)))
-        rows.append([x[0], controller.get("torque"), u[0]])
+        rows.append([x[0], controller.get("torque")[0], u[0]])
         x = a @ x + b[:, 0] * (rows[-1][1] + disturbance)
-        for name, value in zip(["angle", "speed"][:measured], x):
-            controller.set(name, value)
+        controller.set_reals(["angle", "speed"][:measured], x[:measured])
         controller.set("inertia", inertia(k + 1))
         controller.set("r_angle", reference(k + 1))
         controller.step(k * PERIOD, PERIOD)
