@@ -106,3 +106,28 @@ def examples(aso_ftc, root, tmp_path_factory):
     done = aso_ftc("pack", *(root / "examples" / name for name in EXAMPLES), "--out", out)
     assert done.returncode == 0, done.stderr
     return {model: out / f"{model}.fmu" for model in EXAMPLES.values()}
+
+
+@pytest.fixture(scope="session")
+def package(root):
+    """The SSP of `aso-ftc pack --ssp`."""
+    path = root / "dist" / "InvertedPendulum.ssp"
+    assert path.is_file(), f"{path} is missing: run aso-ftc pack --ssp first"
+    return path
+
+
+@pytest.fixture
+def refusal(aso_ftc, tmp_path):
+    """The message for a plant file; afterwards its folder must contain no other file."""
+
+    def run(text, *options):
+        file = tmp_path / "plant.toml"
+        file.write_text(text, encoding="utf-8")
+        before = sorted(tmp_path.rglob("*"))
+        done = aso_ftc("design", file, "--out", tmp_path / "design.toml", *options)
+        assert done.returncode == 2 and done.stdout == "", done
+        assert sorted(tmp_path.rglob("*")) == before, "nothing is written"
+        assert done.stderr.count("error:") == 1, done
+        return done.stderr.replace(f"{tmp_path}/", "")
+
+    return run

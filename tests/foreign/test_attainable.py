@@ -69,16 +69,9 @@ def test_samples_too_far_apart_for_an_unstable_plant_are_named_with_the_time_tha
     assert not said(report([1], np.poly([10, -1]), "sample_time = 0.01\n"), "no controller")
 
 
-def refused(aso_ftc, tmp_path, text):
-    (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
-    assert done.returncode == 2 and not (tmp_path / "design.toml").exists()
-    return done.stderr
-
-
-def test_samples_between_which_the_plant_grows_beyond_any_loop_are_refused_with_a_time_that_is_short_enough(aso_ftc, tmp_path):
+def test_samples_between_which_the_plant_grows_beyond_any_loop_are_refused_with_a_time_that_is_short_enough(aso_ftc, refusal, tmp_path):
     text = "sample_time = {}\nA = [[300, 0], [0, -1]]\nB = [[1], [1]]\nC = [[1, 1]]\nactuator_faults = 'all'\n"
-    error = refused(aso_ftc, tmp_path, text.format(0.1))
+    error = refusal(text.format(0.1))
     assert "no controller has a peak of S below 1.0686e13" in error and "plant.toml:1:15" in error
     allowed = float(error.split("at most ")[1].split()[0])
     assert allowed == pytest.approx(np.log(2) / 300, rel=1e-3)

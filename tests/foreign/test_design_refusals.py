@@ -45,23 +45,6 @@ def poorer(source, target, *changes):
             copy.writestr(entry, content)
 
 
-@pytest.fixture
-def refusal(aso_ftc, tmp_path):
-    """The message for a plant file; afterwards its folder must contain no other file."""
-
-    def run(text, *options):
-        file = tmp_path / "plant.toml"
-        file.write_text(text, encoding="utf-8")
-        before = sorted(tmp_path.rglob("*"))
-        done = aso_ftc("design", file, "--out", tmp_path / "design.toml", *options)
-        assert done.returncode == 2 and done.stdout == "", done
-        assert sorted(tmp_path.rglob("*")) == before, "nothing is written"
-        assert done.stderr.count("error:") == 1
-        return done.stderr.replace(f"{tmp_path}/", "")
-
-    return run
-
-
 WRONG = [
     ("C = [[1, 0]]", "C = [[0, 1]]", "3:5: the measurements y1 show 1 of 2 states only"),
     ("B = [[0], [1]]", "B = [[1], [0]]", "2:5: the commands u1 reach 1 of 2 states only"),

@@ -190,13 +190,10 @@ actuator_faults = "all"
         ('reference = { track = ["h"], feedforward = 1 }', 8, ["feedforward"]),
     ],
 )
-def test_a_feedforward_that_cannot_be_is_refused_at_its_line(aso_ftc, tmp_path, table, line, parts):
-    (tmp_path / "plant.toml").write_text(ONE + table + "\n", encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
-    assert done.returncode == 2 and done.stderr.count("error:") == 1, done
-    assert f"plant.toml:{line}:" in done.stderr, done.stderr
-    for part in parts:
-        assert part in done.stderr, done.stderr
+def test_a_feedforward_that_cannot_be_is_refused_at_its_line(refusal, table, line, parts):
+    message = refusal(ONE + table + "\n")
+    for part in [f"plant.toml:{line}:", *parts]:
+        assert part in message, message
 
 
 def test_an_integral_action_needs_no_slow_real_eigenvalue_without_feedforward(aso_ftc, tmp_path):
@@ -314,11 +311,8 @@ def test_a_family_without_a_common_p_is_not_green_and_says_so(aso_ftc, tmp_path)
         ),
     ],
 )
-def test_a_family_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, old, new, line, parts):
+def test_a_family_that_cannot_follow_is_refused_at_its_line(refusal, old, new, line, parts):
     assert old in FAMILY
-    (tmp_path / "plant.toml").write_text(FAMILY.replace(old, new), encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
-    assert done.returncode == 2 and done.stderr.count("error:") == 1, done
-    assert f"plant.toml:{line}:" in done.stderr, done.stderr
-    for part in parts:
-        assert part in done.stderr, done.stderr
+    message = refusal(FAMILY.replace(old, new))
+    for part in [f"plant.toml:{line}:", *parts]:
+        assert part in message, message

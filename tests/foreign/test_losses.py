@@ -140,10 +140,9 @@ def test_a_stated_loss_that_destabilises_is_red_and_says_from_where_on(aso_ftc, 
     "entry, message",
     [("1.5", "expected a fraction above 0 and at most 1"), ("0", "expected a number above 0"), ('"all"', "up_to")],
 )
-def test_a_bad_fraction_is_refused_at_its_line(aso_ftc, tmp_path, entry, message):
-    (tmp_path / "plant.toml").write_text(PLANT.replace("UP_TO", entry), encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
-    assert done.returncode == 2 and message in done.stderr and "plant.toml:15:9" in done.stderr
+def test_a_bad_fraction_is_refused_at_its_line(refusal, entry, message):
+    error = refusal(PLANT.replace("UP_TO", entry))
+    assert message in error and "plant.toml:15:9" in error, error
 
 
 SENSOR = """

@@ -113,11 +113,7 @@ def test_a_larger_weight_lowers_the_error_of_its_fault(designed):
         (REGION + "observer.noise = 1\n", "it belongs to `h_infinity`"),
     ],
 )
-def test_a_bad_channel_is_refused_at_its_line(aso_ftc, tmp_path, entries, message):
-    plant = tmp_path / "plant.toml"
-    plant.write_text(PLANT + entries)
-    done = aso_ftc("design", plant, "--out", tmp_path / "design.toml")
+def test_a_bad_channel_is_refused_at_its_line(refusal, entries, message):
+    error = refusal(PLANT + entries)
     line = (PLANT + entries).count("\n")
-    assert done.returncode == 2
-    assert f"plant.toml:{line}:" in done.stderr
-    assert message in done.stderr
+    assert f"plant.toml:{line}:" in error and message in error, error

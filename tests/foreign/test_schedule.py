@@ -306,9 +306,7 @@ def test_a_measurement_that_moves_its_own_operating_point_leaves_no_equilibrium_
         ("B = [[0], [0.5]]", "x_op = [1]", "expected 2 numbers"),
     ],
 )
-def test_a_wrong_schedule_is_refused_at_its_line(aso_ftc, tmp_path, old, new, words):
+def test_a_wrong_schedule_is_refused_at_its_line(refusal, old, new, words):
     assert old in DRIVE
-    (tmp_path / "drive.toml").write_text(DRIVE.replace(old, new))
-    done = aso_ftc("design", tmp_path / "drive.toml", "--out", tmp_path / "design.toml")
-    assert done.returncode == 2
-    assert words in done.stderr and "drive.toml:" in done.stderr, done.stderr
+    message = refusal(DRIVE.replace(old, new))
+    assert words in message and "plant.toml:" in message, message

@@ -9,14 +9,6 @@ from ssp_files import ecos_style, libcosim_style, nested_style, problems, ssd_of
 SAMPLES = ["sample.ssd", "sample.ssv", "sample.ssm", "sample.ssb"]
 
 
-@pytest.fixture(scope="module")
-def package(root):
-    """The SSP of `aso-ftc pack --ssp`."""
-    path = root / "dist" / "InvertedPendulum.ssp"
-    assert path.is_file(), f"{path} is missing: run aso-ftc pack --ssp first"
-    return path
-
-
 def test_the_packed_system_structure_follows_the_schema(package):
     assert problems(ssd_of(package), ".ssd") == []
 

@@ -27,14 +27,6 @@ OWN_STEP, OWN_COUNT = 1e-3, 2_000
 NO_SETTINGS = {"plant": {}, "controller": {}}
 
 
-@pytest.fixture(scope="module")
-def package(root):
-    """The SSP of `aso-ftc pack --ssp`."""
-    path = root / "dist" / "InvertedPendulum.ssp"
-    assert path.is_file(), f"{path} is missing: run aso-ftc pack --ssp first"
-    return path
-
-
 def sums(step, count):
     """The times of tools that add the step to the previous time."""
     time = 0.0
