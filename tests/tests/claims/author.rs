@@ -10,6 +10,8 @@ use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 use tests::{command, root};
 
+use crate::run::fails;
+
 const EXAMPLES: [&str; 4] = ["van-der-pol", "bouncing-ball", "pid", "lookup-table"];
 
 /// Runs the command in `folder`. All tests share the folder of built dependencies, so no two tests
@@ -26,13 +28,7 @@ fn message(output: &Output) -> String {
 
 /// Checks that the command refuses with status 2 and a message that has all of `parts`.
 fn refuses(folder: &Path, arguments: &[&str], parts: &[&str]) {
-    let output = run_in(folder, arguments);
-    let message = message(&output);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    for part in parts {
-        assert!(message.contains(part), "{part:?} is not in {message:?}");
-    }
-    assert!(!message.contains("panicked"), "{message}");
+    fails(&run_in(folder, arguments), 2, parts);
 }
 
 /// Makes the crate `name` in `folder`, with the dependency versions of this workspace, so that

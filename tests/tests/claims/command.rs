@@ -7,6 +7,8 @@ use std::process::Output;
 use serde_json::Value;
 use tests::{Table, dist, root, run};
 
+use crate::run::fails;
+
 /// Runs `reproduce` into a new folder with `more` arguments.
 fn reproduce(more: &[&str]) -> (tempfile::TempDir, Output) {
     let folder = tempfile::tempdir().unwrap();
@@ -30,13 +32,7 @@ fn said(output: &Output) -> String {
 
 /// Checks that the command refuses with status 2 and a message that has all of `parts`.
 fn refuses(arguments: &[&str], parts: &[&str]) {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    for part in parts {
-        assert!(message.contains(part), "{part:?} is not in {message:?}");
-    }
-    assert!(!message.contains("panicked"), "{message}");
+    fails(&run(arguments), 2, parts);
 }
 
 #[test]

@@ -34,18 +34,18 @@ fn refused(fmu: &CFmu) -> FmuError {
     Fmu::open(&path).err().unwrap()
 }
 
-fn instance(fmu: &CFmu) -> Instance {
+pub(crate) fn instance(fmu: &CFmu) -> Instance {
     open(fmu).instantiate("slave").unwrap()
 }
 
-fn initialise(slave: &mut Instance) -> Result<(), CallError> {
+pub(crate) fn initialise(slave: &mut Instance) -> Result<(), CallError> {
     slave.setup_experiment(&Experiment::default())?;
     slave.enter_initialization_mode()?;
     slave.exit_initialization_mode()
 }
 
 /// An instance that is ready to step.
-fn ready(behaviour: &str) -> Instance {
+pub(crate) fn ready(behaviour: &str) -> Instance {
     let mut slave = instance(&CFmu::that(behaviour));
     initialise(&mut slave).unwrap();
     slave

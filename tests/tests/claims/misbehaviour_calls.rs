@@ -3,30 +3,17 @@
 
 use std::time::Duration;
 
-use fmu_description::Experiment;
 use fmu_description::abi::Status;
 use fmu_import::{Fmu, Instance};
 use master::{CallError, Failure, Slave, StepResult};
 use tests::c_fmu::CFmu;
 
+use crate::misbehaviour::{self, initialise, ready};
+
 const PART: StepResult = StepResult::Part { reached: 0.5, terminated: false };
 
 fn instance(behaviour: &str) -> Instance {
-    let folder = tempfile::tempdir().unwrap();
-    let path = CFmu::that(behaviour).write(folder.path(), "slave");
-    Fmu::open(&path).unwrap().instantiate("slave").unwrap()
-}
-
-fn initialise(slave: &mut Instance) -> Result<(), CallError> {
-    slave.setup_experiment(&Experiment::default())?;
-    slave.enter_initialization_mode()?;
-    slave.exit_initialization_mode()
-}
-
-fn ready(behaviour: &str) -> Instance {
-    let mut slave = instance(behaviour);
-    initialise(&mut slave).unwrap();
-    slave
+    misbehaviour::instance(&CFmu::that(behaviour))
 }
 
 fn output(slave: &mut Instance) -> f64 {

@@ -100,7 +100,7 @@ fn said(output: &Output) -> String {
 }
 
 /// Checks the exit status, and that standard error contains all of `parts`.
-fn fails(output: &Output, status: i32, parts: &[&str]) {
+pub(crate) fn fails(output: &Output, status: i32, parts: &[&str]) {
     let message = said(output);
     assert_eq!(output.status.code(), Some(status), "{message}");
     for part in parts {

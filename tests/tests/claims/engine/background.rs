@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use master::{
-    Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, StepResult, System,
-};
+use master::{Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, System};
 
 use crate::engine::ahead::{Fails, ahead};
+use crate::engine::parts::stops;
 use crate::engine::{puppet, typed, until};
 use tests::linear::ABLE;
 use tests::problems;
@@ -131,13 +130,6 @@ fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
         assert_eq!(run(all), run(none));
         assert_eq!(run(all).len(), 120);
     }
-}
-
-fn stops(begin: f64, end: f64) -> StepResult {
-    if begin < 0.35 && end > 0.35 {
-        return StepResult::Part { reached: 0.35, terminated: false };
-    }
-    StepResult::Whole
 }
 
 #[test]

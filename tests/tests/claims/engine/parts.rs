@@ -8,7 +8,7 @@ use crate::engine::puppet::{add_clock, system, whole};
 use crate::engine::until;
 
 /// Stops at 0.35 s; the rest of the step must be requested again.
-fn stops(begin: f64, end: f64) -> StepResult {
+pub(crate) fn stops(begin: f64, end: f64) -> StepResult {
     if begin < 0.35 && end > 0.35 {
         return StepResult::Part { reached: 0.35, terminated: false };
     }
