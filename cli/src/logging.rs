@@ -18,7 +18,7 @@ use tracing_subscriber::registry::LookupSpan;
 use crate::output;
 
 /// `target` of the events for messages of FMUs.
-const FMU: &str = "fmu";
+pub(crate) const FMU: &str = "fmu";
 /// `target` of the events of a results file; the information that it is replaced is logged without `verbose`, too.
 pub(crate) const RESULTS_FILE: &str = "results::output";
 
@@ -127,6 +127,12 @@ pub(crate) fn bar(template: &str, length: u64) -> ProgressBar {
     bars().add(ProgressBar::new(length).with_style(style.with_key("percent", percent)))
 }
 
+/// Returns a position on a bar: the whole part, 0 for a number below it.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a display")]
+pub(crate) fn position(value: f64) -> u64 {
+    value as u64
+}
+
 /// Writes the percentage that is done; it is rounded down, so that 100 % is the end.
 fn percent(state: &ProgressState, text: &mut dyn fmt::Write) {
     let percent = 100 * state.pos() / state.len().unwrap_or(1).max(1);
@@ -166,7 +172,8 @@ where
     }
 }
 
-fn fields(event: &Event<'_>) -> LogFields {
+/// Returns the fields of a message.
+pub(crate) fn fields(event: &Event<'_>) -> LogFields {
     let mut fields = LogFields::default();
     event.record(&mut fields);
     fields
@@ -181,7 +188,7 @@ fn sentence(event: &Event<'_>) -> String {
         Level::DEBUG => "debug",
         Level::TRACE => "trace",
     };
-    let LogFields { message, instance, category, time, others } = fields(event);
+    let LogFields { message, instance, category, time, others, .. } = fields(event);
     if metadata.target() != FMU {
         return format!("{word}: {message}{others}");
     }

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap_complete::Shell;
 use clap_mangen::Man;
+
+use crate::outputs;
 
 #[derive(clap::Args)]
 pub(crate) struct CompletionOptions {
@@ -41,8 +42,7 @@ pub(crate) fn man(options: &ManOptions, command: clap::Command) -> anyhow::Resul
     };
     for (name, text) in pages {
         let path = folder.join(name);
-        files::whole::write(&path, text.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        outputs::write(&path, text.as_bytes())?;
         println!("{}", path.display());
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! Writes the files of a command, all or none, and finds out whether an existing file is of the same design or results.
 
 use std::ffi::OsString;
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::{fs, io, process};
 
@@ -101,6 +101,12 @@ impl Replacement {
     }
 }
 
+/// Writes `bytes` to `path`, completely or not at all; creates its folder if necessary. A pipe or a device gets the bytes
+/// itself.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    files::whole::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
 /// Gives the file at `path` a second, temporary name, by a link, or by a copy where the file system has no links;
 /// `None` if there is no file.
 fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
@@ -114,7 +120,7 @@ fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
     }
     match fs::hard_link(path, &former) {
         Ok(()) => Ok(Some(former)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(_) => match fs::copy(path, &former) {
             Ok(_) => Ok(Some(former)),
             Err(error) => {
@@ -151,13 +157,11 @@ pub(crate) fn check_identity(path: &Path, identity: &str) -> anyhow::Result<()> 
     let mut head = Vec::new();
     let file = match fs::File::open(path) {
         Ok(file) => file,
-        Err(error) => {
-            // Without a folder there is no file either; writing names the reason.
-            let kinds = [io::ErrorKind::NotFound, io::ErrorKind::NotADirectory];
-            let absent = kinds.contains(&error.kind());
-            let what = || format!("cannot read {}", path.display());
-            return if absent { Ok(()) } else { Err(error).with_context(what) };
+        // Without a folder there is no file either; writing names the reason.
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Ok(());
         }
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
     };
     file.take(HEAD).read_to_end(&mut head)?;
     let head = String::from_utf8_lossy(&head);

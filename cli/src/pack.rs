@@ -18,7 +18,7 @@ use fmu_description::{ModelDescription, Version, terminals};
 
 use figure::rasterise;
 
-use crate::models;
+use crate::{models, outputs};
 
 /// The equations of a model, from which the packer makes index.html. They are also in the FMU, so that
 /// index.html can be made again for another design.
@@ -183,8 +183,7 @@ fn update_descriptions(root: &Path) -> anyhow::Result<()> {
                 fmu_import::described_as(&library.file, &resources, model, version)?;
             let name = format!("{}.xml", file_stem(&description));
             let target = root.join("modelDescription").join(name);
-            files::whole::write(&target, xml.as_bytes())
-                .with_context(|| format!("cannot write {}", target.display()))?;
+            outputs::write(&target, xml.as_bytes())?;
         }
     }
     Ok(())
@@ -253,9 +252,7 @@ fn pack_version(
     #[cfg(feature = "sbom")]
     if packing.sbom {
         let bill = sbom::bill(&description, library, packing.binaries.is_some())?;
-        let target = path.with_extension("cdx.json");
-        files::whole::write(&target, &bill)
-            .with_context(|| format!("cannot write {}", target.display()))?;
+        outputs::write(&path.with_extension("cdx.json"), &bill)?;
     }
     Ok(PackedFmu { path, description })
 }

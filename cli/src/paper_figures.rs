@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use figure::{Figure, FigureError, Ink, Panel, Series};
+use anyhow::{Context as _, ensure};
+use figure::{Figure, Ink, Panel, Series};
 
 /// Length of the transient after the activation in s.
 const SETTLING: f64 = 20.0;
@@ -18,32 +19,17 @@ const STRONGEST: f64 = 4.0;
 pub(crate) const COLUMNS: [&str; 5] =
     ["time", "plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
 
-/// Error of writing the figures of the paper.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum PaperFigureError {
-    #[error("the results have no column {0:?}, which the figures need")]
-    MissingColumn(&'static str),
-    #[error("column {name:?} has {actual} values, column \"time\" has {expected}")]
-    UnequalLengths { name: &'static str, expected: usize, actual: usize },
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-}
-
 /// Writes `figure5.svg`, `figure5.png`, `figure6.svg` and `figure6.png` into the folder `out`.
 ///
 /// `columns` returns the values of a column: `time` in s, `plant.x_p` in m, `plant.theta` in rad,
 /// `plant.f_fric` and `controller.f_hat` in N. `activation` is the time in s at which the
-/// compensation starts. A run that ends before it, or that diverges, is drawn as far as possible.
-///
-/// # Errors
-///
-/// Returns [`PaperFigureError`] if a column is missing or has the wrong length, or if a file cannot
-/// be written.
+/// compensation starts. A run that ends before it, or that diverges, is drawn as far as possible. Returns an error if a
+/// column is missing or has the wrong length, or if a file cannot be written.
 pub(crate) fn write<'a>(
     columns: &dyn Fn(&str) -> Option<&'a [f64]>,
     activation: f64,
     out: &Path,
-) -> Result<(), PaperFigureError> {
+) -> anyhow::Result<()> {
     let run = Run::new(columns, activation)?;
     run.motion().write(&out.join("figure5"))?;
     run.friction().write(&out.join("figure6"))?;
@@ -66,19 +52,20 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(
-        columns: &dyn Fn(&str) -> Option<&'a [f64]>,
-        activation: f64,
-    ) -> Result<Self, PaperFigureError> {
-        let time = columns("time").ok_or(PaperFigureError::MissingColumn("time"))?;
-        let column = |name: &'static str| {
-            let values = columns(name).ok_or(PaperFigureError::MissingColumn(name))?;
+    fn new(columns: &dyn Fn(&str) -> Option<&'a [f64]>, activation: f64) -> anyhow::Result<Self> {
+        let any = |name: &str| {
+            let missing = || format!("the results have no column {name:?}, which the figures need");
+            columns(name).with_context(missing)
+        };
+        let time = any("time")?;
+        let column = |name: &str| {
+            let values = any(name)?;
             let (expected, actual) = (time.len(), values.len());
-            if expected == actual {
-                Ok(values)
-            } else {
-                Err(PaperFigureError::UnequalLengths { name, expected, actual })
-            }
+            ensure!(
+                expected == actual,
+                "column {name:?} has {actual} values, column \"time\" has {expected}"
+            );
+            anyhow::Ok(values)
         };
         let (x_p, theta) = (column("plant.x_p")?, column("plant.theta")?);
         let (f_fric, f_hat) = (column("plant.f_fric")?, column("controller.f_hat")?);

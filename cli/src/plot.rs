@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use results::{Column, ColumnKind, Selection, Table};
 
 use figure::{Figure, Ink, Panel, Series, rasterise};
+
+use crate::outputs;
 
 /// Colours of the curves in a panel; their number is the largest number of curves in a panel.
 const INKS: [Ink; 7] =
@@ -23,8 +25,7 @@ struct Curve {
 
 /// Draws variables of a results file, selected by name or pattern, over time: one panel for up to seven
 /// variables with the same unit. The extension of `out`, `.svg` or `.png`, selects the format. The memory
-/// used does not depend on the length of the file. `unit` returns the unit of a variable for files without
-/// units, such as CSV.
+/// used does not depend on the length of the file. `units` has units by variable for files without units, such as CSV.
 ///
 /// # Errors
 ///
@@ -34,16 +35,22 @@ struct Curve {
 pub(crate) fn plot_with_units(
     results: &Path,
     variables: &[String],
-    unit: &dyn Fn(&str) -> Option<String>,
+    units: &[(String, String)],
     out: &Path,
 ) -> anyhow::Result<()> {
-    let ending = out.extension().unwrap_or_default().to_ascii_lowercase();
-    ensure!(ending == "svg" || ending == "png", "{}: a plot is a .svg or a .png", out.display());
-    let curves = curves(results, variables, unit)?;
+    let is_png = is_png(out)?;
+    let curves = curves(results, variables, units)?;
     let title = results.file_name().unwrap_or_default().to_string_lossy();
     let svg = Figure { title: &title, panels: panels(&curves) }.svg()?;
-    let bytes = if ending == "png" { rasterise(&svg)? } else { svg.into_bytes() };
-    files::whole::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
+    outputs::write(out, &if is_png { rasterise(&svg)? } else { svg.into_bytes() })
+}
+
+/// Whether the extension of a picture is `.png`; another one than this and `.svg` is an error.
+pub(crate) fn is_png(picture: &Path) -> anyhow::Result<bool> {
+    let ending = picture.extension().unwrap_or_default().to_ascii_lowercase();
+    let shown = picture.display();
+    ensure!(ending == "svg" || ending == "png", "{shown}: a plot is a .svg or a .png");
+    Ok(ending == "png")
 }
 
 /// Checks that a picture can have this number of curves.
@@ -57,7 +64,7 @@ pub(crate) fn check_count(count: usize) -> anyhow::Result<()> {
 fn curves(
     results: &Path,
     variables: &[String],
-    unit: &dyn Fn(&str) -> Option<String>,
+    units: &[(String, String)],
 ) -> anyhow::Result<Vec<Curve>> {
     let table = Table::open(results)?;
     let selection = Selection { include: variables.to_vec(), exclude: Vec::new() };
@@ -74,7 +81,8 @@ fn curves(
         let column = &table.columns()[position];
         let (time, values) = envelope.samples();
         let (time, values) = if stepwise(column) { stairs(&time, &values) } else { (time, values) };
-        let unit = column.unit.clone().or_else(|| unit(&column.name));
+        let stated = || units.iter().find(|(name, _)| *name == column.name);
+        let unit = column.unit.clone().or_else(|| Some(stated()?.1.clone()));
         let label = unit
             .as_ref()
             .map_or_else(|| column.name.clone(), |unit| format!("{} in {unit}", column.name));
@@ -112,17 +120,15 @@ fn panels(curves: &[Curve]) -> Vec<Panel<'_>> {
         2 => Some(260.0),
         _ => None,
     };
-    let mut panels = Vec::new();
-    for (place, group) in groups.into_iter().enumerate() {
-        panels.push(Panel {
-            x_label: if place + 1 == count { "time in s" } else { "" },
-            y_label: group[0].unit.as_deref().unwrap_or_default(),
-            frame_height,
-            series: group.into_iter().zip(INKS).map(|(curve, ink)| series(curve, ink)).collect(),
-            ..Panel::default()
-        });
-    }
-    panels
+    let numbered = groups.into_iter().enumerate();
+    let panels = numbered.map(|(place, group)| Panel {
+        x_label: if place + 1 == count { "time in s" } else { "" },
+        y_label: group[0].unit.as_deref().unwrap_or_default(),
+        frame_height,
+        series: group.into_iter().zip(INKS).map(|(curve, ink)| series(curve, ink)).collect(),
+        ..Panel::default()
+    });
+    panels.collect()
 }
 
 fn series(curve: &Curve, ink: Ink) -> Series<'_> {

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use files::check_distinct;
 use fmu_description::number::seconds;
 use report::{Comparison, Request, identity};
 
-use crate::outputs::check_identity;
+use crate::outputs::{self, check_identity};
 use crate::run::split_names;
 
 /// Largest number of names in a line about what was not compared.
@@ -75,7 +75,9 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     if let (Some(comparison), Some(other)) = (&page.comparison, &options.against) {
         print_comparison(comparison, &options.results, other);
     }
-    write(&out, &page.html)
+    outputs::write(&out, page.html.as_bytes())?;
+    println!("{}", out.display());
+    Ok(())
 }
 
 /// Prints the largest difference relative to the range, that there is none, or that the runs have no time in common;
@@ -106,15 +108,4 @@ fn print_comparison(comparison: &Comparison, results: &Path, other: &Path) {
 /// Formats a number of things, with an `s` for the plural.
 fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
-/// Writes a page, in a folder that is created if necessary, and prints its name.
-fn write(out: &Path, html: &str) -> anyhow::Result<()> {
-    let unwritten = || format!("cannot write {}", out.display());
-    if let Some(folder) = out.parent() {
-        std::fs::create_dir_all(folder).with_context(unwritten)?;
-    }
-    files::whole::write(out, html.as_bytes()).with_context(unwritten)?;
-    println!("{}", out.display());
-    Ok(())
 }

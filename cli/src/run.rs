@@ -20,8 +20,7 @@ use study::{
     RunStatistics,
 };
 
-use crate::logging;
-use crate::plot;
+use crate::{logging, outputs, plot};
 use facts::PlannedEntries;
 pub(crate) use interrupt::status as interrupted;
 use live::Live;
@@ -206,10 +205,7 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) else {
         return Ok(());
     };
-    let ending = picture.extension().unwrap_or_default().to_ascii_lowercase();
-    if ending != "svg" && ending != "png" {
-        bail!("{}: a plot is a .svg or a .png", picture.display());
-    }
+    plot::is_png(picture)?;
     if results.every == Some(Every::Never) {
         bail!("there is nothing to plot where rows are recorded `never`");
     }
@@ -388,8 +384,7 @@ impl ActiveRun {
             run: Some(&run),
         })?;
         let out = file.with_extension("html");
-        files::whole::write(&out, page.html.as_bytes())
-            .with_context(|| format!("cannot write {}", out.display()))?;
+        outputs::write(&out, page.html.as_bytes())?;
         self.show(&out);
         Ok(())
     }
@@ -437,11 +432,7 @@ impl ActiveRun {
         else {
             return Ok(());
         };
-        let unit = |name: &str| {
-            let known = self.units.iter().find(|(known, _)| known == name);
-            known.map(|(_, unit)| unit.clone())
-        };
-        plot::plot_with_units(file, &results.plot, &unit, picture)?;
+        plot::plot_with_units(file, &results.plot, &self.units, picture)?;
         self.show(picture);
         Ok(())
     }

@@ -18,12 +18,9 @@ const PRINTED_L: [[f64; 2]; 5] =
 
 impl Scenario {
     /// Returns the name on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Scenario::Paper => "paper",
-            Scenario::PaperLiteral => "paper-literal",
-            Scenario::PrintedGains => "printed-gains",
-        }
+    pub(crate) fn name(self) -> String {
+        let value = clap::ValueEnum::to_possible_value(&self);
+        value.map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
     /// Returns the expected result if it differs from the claims of the paper.

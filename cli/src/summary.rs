@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::eigen::eigenvalues;
 use control::theorem1::{Certificate, certify};
@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::claims::Claim;
+use crate::outputs;
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;
@@ -19,7 +20,7 @@ const ALPHA: f64 = 1.0;
 /// The content of `summary.json`.
 #[derive(Serialize)]
 pub(crate) struct Summary<'a> {
-    pub(crate) scenario: &'static str,
+    pub(crate) scenario: String,
     pub(crate) method: &'static str,
     pub(crate) extrapolation: &'static str,
     /// Communication step in s.
@@ -168,6 +169,5 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
 
 /// Writes `value` as JSON to `path`, completely or not at all.
 pub(crate) fn write(value: &impl Serialize, path: &Path) -> anyhow::Result<()> {
-    let text = serde_json::to_vec_pretty(value)?;
-    files::whole::write(path, &text).with_context(|| format!("cannot write {}", path.display()))
+    outputs::write(path, &serde_json::to_vec_pretty(value)?)
 }

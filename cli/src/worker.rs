@@ -13,9 +13,7 @@ pub(crate) fn worker() -> Option<ExitCode> {
     Some(match fmu_import::isolate::worker_with(integrate::Integrated::boxed) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let cause = std::error::Error::source(&error);
-            let cause = cause.map(|cause| format!(": {cause}")).unwrap_or_default();
-            eprintln!("error: {error}{cause}");
+            eprintln!("error: {}", files::sentence(&error));
             ExitCode::from(2)
         }
     })

@@ -72,21 +72,22 @@ impl LiveView {
             let _ = view.take_calls();
             while let Some(request) = view.request(None) {
                 let answer = match &request.action {
-                    Action::Pause => Ok("No further run starts."),
-                    Action::Continue => Ok("The campaign goes on."),
+                    Action::Pause => {
+                        held = true;
+                        Ok("No further run starts.")
+                    }
+                    Action::Continue => {
+                        held = false;
+                        Ok("The campaign goes on.")
+                    }
                     Action::Stop => {
+                        stopped = true;
                         Ok("The campaign is stopped; the same command goes on with it.")
                     }
                     Action::Step | Action::Intervene(_) => {
                         Err("a campaign can be paused and stopped only")
                     }
                 };
-                match &request.action {
-                    Action::Pause => held = true,
-                    Action::Continue => held = false,
-                    Action::Stop => stopped = true,
-                    Action::Step | Action::Intervene(_) => {}
-                }
                 view.set_phase(if held { Phase::Paused } else { Phase::Running });
                 request.answer(answer.map(str::to_owned).map_err(str::to_owned));
             }

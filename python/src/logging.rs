@@ -119,7 +119,7 @@ impl Subscriber for Collector {
         let metadata = event.metadata();
         let mut fields = LogFields::default();
         event.record(&mut fields);
-        let LogFields { message, instance, category, time, others } = fields;
+        let LogFields { message, instance, category, time, others, .. } = fields;
         let fmu = (metadata.target() == FMU).then_some(instance);
         let text = message.trim_end().to_owned() + &others;
         let level = level(*metadata.level());

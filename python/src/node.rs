@@ -14,27 +14,20 @@ use toml::Spanned;
 const DEPTH: usize = 32;
 
 /// A value of TOML.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Serialize)]
+#[serde(untagged)]
 pub(crate) enum Node {
     Boolean(bool),
     Integer(i64),
     Real(f64),
     Text(String),
     List(Vec<Node>),
+    #[serde(serialize_with = "as_map")]
     Table(Vec<(String, Node)>),
 }
 
-impl Serialize for Node {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Boolean(value) => serializer.serialize_bool(*value),
-            Self::Integer(value) => serializer.serialize_i64(*value),
-            Self::Real(value) => serializer.serialize_f64(*value),
-            Self::Text(value) => serializer.serialize_str(value),
-            Self::List(values) => serializer.collect_seq(values),
-            Self::Table(entries) => serializer.collect_map(entries.iter().map(|(k, v)| (k, v))),
-        }
-    }
+fn as_map<S: Serializer>(entries: &[(String, Node)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(entries.iter().map(|(name, value)| (name, value)))
 }
 
 impl<'de> Deserialize<'de> for Node {

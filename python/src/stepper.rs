@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use master::Checkpoint;
 use master::signal::reached;
+use master::{Checkpoint, SystemError};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt as _;
@@ -47,6 +47,26 @@ impl Stepper {
         result
     }
 
+    /// Calls `work` with the run, without the interpreter, and passes on the messages that it caused.
+    ///
+    /// # Errors
+    ///
+    /// `RuntimeError` if the simulation is closed; the exception of a logging handler; the error of `work`.
+    fn detached<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Run) -> Result<T, SystemError> + Send,
+    ) -> PyResult<T> {
+        let result = guarded(py, || {
+            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            guard.as_mut().map(work).transpose()
+        });
+        logging::pass_on(py)?;
+        let result =
+            result?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
+        result.ok_or_else(closed)
+    }
+
     /// Steps until `is_done` holds for the number of steps so far and the time, or the run is finished; returns the
     /// number of steps. An exception of a signal ends the steps, too.
     fn advance(
@@ -55,9 +75,7 @@ impl Stepper {
         is_done: impl Fn(u64, f64) -> bool + Send + Sync,
     ) -> PyResult<u64> {
         let mut watch = Watch::new(py, None, None, Progress::None)?;
-        let steps = guarded(py, || {
-            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(run) = guard.as_mut() else { return Ok(None) };
+        let steps = self.detached(py, |run| {
             let simulation = &mut run.simulation;
             let mut steps = 0;
             while !simulation.is_finished() && !is_done(steps, simulation.time()) {
@@ -67,13 +85,11 @@ impl Stepper {
                     break;
                 }
             }
-            Ok(Some(steps))
-        });
-        logging::pass_on(py)?;
-        let steps = steps?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
+            Ok(steps)
+        })?;
         match watch.stop {
             Some(Stop::Raised(error)) => Err(error),
-            _ => steps.ok_or_else(closed),
+            _ => Ok(steps),
         }
     }
 }
@@ -166,13 +182,8 @@ impl Stepper {
 
     /// Returns the state of all FMUs and connections as bytes.
     fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let saved = guarded(py, || {
-            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
-            guard.as_mut().map(|run| run.simulation.checkpoint()).transpose()
-        });
-        logging::pass_on(py)?;
-        let saved = saved?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
-        let bytes = postcard::to_stdvec(&saved.ok_or_else(closed)?);
+        let saved = self.detached(py, |run| run.simulation.checkpoint())?;
+        let bytes = postcard::to_stdvec(&saved);
         let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
     }
@@ -182,14 +193,7 @@ impl Stepper {
         let checkpoint: Checkpoint = postcard::from_bytes(state).map_err(|_| {
             PyValueError::new_err("the bytes are no state that save() of this version has returned")
         })?;
-        let restored = guarded(py, || {
-            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
-            guard.as_mut().map(|run| run.simulation.restore(&checkpoint)).transpose()
-        });
-        logging::pass_on(py)?;
-        let restored =
-            restored?.map_err(|error| with_cause(py, error::system(&error), &self.raised))?;
-        restored.ok_or_else(closed)
+        self.detached(py, |run| run.simulation.restore(&checkpoint))
     }
 
     /// Terminates and frees the FMUs. A second call does nothing.

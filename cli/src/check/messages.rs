@@ -1,20 +1,17 @@
 //! Counts the messages of an FMU during a trial.
 
 use std::collections::BTreeSet;
-use std::fmt::Debug;
 use std::sync::{Arc, Mutex};
 
-use tracing::field::{Field, Visit};
 use tracing::{Event, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 
-/// `target` of the events for messages of FMUs.
-const TARGET: &str = "fmu";
+use crate::logging::{FMU, fields};
 
 /// Summary of the messages.
 #[derive(Default)]
 pub(super) struct MessageSummary {
-    /// The log categories of the messages.
+    /// The log categories of the messages; empty for messages without one.
     pub(super) categories: BTreeSet<String>,
     /// Number of messages, including those that were lost because they came too fast.
     pub(super) messages: u64,
@@ -37,44 +34,15 @@ impl MessageRecorder {
     }
 }
 
-/// A visitor that reads what an event says about messages.
-struct EventFields {
-    /// The field `category`.
-    category: Option<String>,
-    /// Number of messages that the event represents: the field `lost`, or 1.
-    count: u64,
-}
-
-impl Visit for EventFields {
-    fn record_u64(&mut self, field: &Field, value: u64) {
-        if field.name() == "lost" {
-            self.count = value;
-        }
-    }
-
-    fn record_str(&mut self, field: &Field, value: &str) {
-        if field.name() == "category" {
-            self.category = Some(value.to_owned());
-        }
-    }
-
-    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
-        if field.name() == "category" {
-            self.category = Some(format!("{value:?}").trim_matches('"').to_owned());
-        }
-    }
-}
-
 impl<S: Subscriber> Layer<S> for MessageRecorder {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
-        if event.metadata().target() != TARGET {
+        if event.metadata().target() != FMU {
             return;
         }
-        let mut fields = EventFields { category: None, count: 1 };
-        event.record(&mut fields);
+        let fields = fields(event);
         if let Ok(mut summary) = self.messages.lock() {
-            summary.messages = summary.messages.saturating_add(fields.count);
-            summary.categories.extend(fields.category);
+            summary.messages = summary.messages.saturating_add(fields.lost.unwrap_or(1));
+            summary.categories.insert(fields.category);
         }
     }
 }

@@ -38,7 +38,7 @@ impl Reporter {
             return Self::Lines(Lines::new());
         }
         let template = "{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}";
-        let bar = logging::bar(template, parts(1.0));
+        let bar = logging::bar(template, logging::position(PARTS));
         bar.enable_steady_tick(REDRAW);
         Self::Bar(bar)
     }
@@ -47,7 +47,7 @@ impl Reporter {
     pub(super) fn show(&self, progress: Progress) {
         match self {
             Self::Bar(bar) => {
-                bar.set_position(parts(progress.done));
+                bar.set_position(logging::position(PARTS * progress.done));
                 bar.set_message(progress.step);
             }
             Self::Lines(lines) => {
@@ -83,9 +83,4 @@ impl Drop for Reporter {
             bar.finish_and_clear();
         }
     }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a display")]
-fn parts(done: f64) -> u64 {
-    (PARTS * done) as u64
 }

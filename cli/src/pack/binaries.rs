@@ -114,12 +114,12 @@ fn folders(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// Returns the paths of the files and folders in `folder`, sorted by name.
-fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let failed = || format!("cannot read {}", folder.display());
-    let items = fs::read_dir(folder).with_context(failed)?;
-    let mut paths = items
-        .map(|item| Ok(item.with_context(failed)?.path()))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+pub(super) fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let items = fs::read_dir(folder).and_then(|items| {
+        let paths = items.map(|item| Ok(item?.path()));
+        paths.collect::<std::io::Result<Vec<_>>>()
+    });
+    let mut paths = items.with_context(|| format!("cannot read {}", folder.display()))?;
     paths.sort();
     Ok(paths)
 }

@@ -7,6 +7,7 @@ use anyhow::Context;
 use cargo_metadata::Package as Crate;
 use fmu_description::package::Package;
 
+use super::binaries::files;
 use super::library::Library;
 use super::read;
 
@@ -79,19 +80,14 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
 
 /// Returns the files in `folder` with names of licences, and the files in a folder `LICENSES`.
 fn license_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    let failed = || format!("cannot read {}", folder.display());
-    for item in fs::read_dir(folder).with_context(failed)? {
-        let path = item.with_context(failed)?.path();
+    let mut licenses = Vec::new();
+    for path in files(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         if path.is_dir() && name == "licenses" {
-            for item in fs::read_dir(&path).with_context(failed)? {
-                files.push(item.with_context(failed)?.path());
-            }
-            files.retain(|path| path.is_file());
+            licenses.extend(files(&path)?.into_iter().filter(|path| path.is_file()));
         } else if path.is_file() && NAMES.iter().any(|start| name.starts_with(start)) {
-            files.push(path);
+            licenses.push(path);
         }
     }
-    Ok(files)
+    Ok(licenses)
 }

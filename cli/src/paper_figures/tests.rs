@@ -28,7 +28,7 @@ fn columns(end: f64) -> Columns {
     NAMES.into_iter().zip(values).collect()
 }
 
-fn drawn(columns: &Columns) -> Result<[String; 2], PaperFigureError> {
+fn drawn(columns: &Columns) -> anyhow::Result<[String; 2]> {
     let run = Run::new(&|name| columns.get(name).map(Vec::as_slice), 40.0)?;
     Ok([run.motion().svg()?, run.friction().svg()?])
 }

@@ -99,8 +99,8 @@ fn a_csv_file_is_drawn_in_one_panel_or_with_the_units_that_are_known_elsewhere()
     let count = |svg: &str| svg.matches("<clipPath").count();
     assert_eq!(count(&svg(&results, &["plant.x_p", "plant.F"])), 1);
     let out = folder.path().join("out.svg");
-    let unit = |name: &str| (name == "plant.F").then(|| "N".to_owned());
-    plot_with_units(&results, &names(&["plant.x_p", "plant.F"]), &unit, &out).unwrap();
+    let units = [("plant.F".to_owned(), "N".to_owned())];
+    plot_with_units(&results, &names(&["plant.x_p", "plant.F"]), &units, &out).unwrap();
     let svg = fs::read_to_string(&out).unwrap();
     assert_eq!(count(&svg), 2);
     assert!(texts(&svg).contains(&"plant.F in N".to_owned()));
@@ -197,5 +197,5 @@ fn eight_curves_of_one_unit_are_two_panels_so_that_no_colour_has_two_meanings() 
 
 /// Plots variables of a file that states no units.
 fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
-    plot_with_units(results, variables, &|_| None, out)
+    plot_with_units(results, variables, &[], out)
 }

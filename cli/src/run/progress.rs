@@ -27,9 +27,9 @@ pub(super) struct Progress {
 impl Progress {
     /// Creates a bar from `start` to `stop`, in s.
     pub(super) fn new(start: f64, stop: f64) -> Self {
-        let bar = std::io::stderr()
-            .is_terminal()
-            .then(|| logging::bar("{bar:24} {percent:>3} %, {msg}, {eta} left", whole(PARTS)));
+        let bar = std::io::stderr().is_terminal().then(|| {
+            logging::bar("{bar:24} {percent:>3} %, {msg}, {eta} left", logging::position(PARTS))
+        });
         let next = if bar.is_some() { start } else { f64::INFINITY };
         let wall_clock_start = Instant::now();
         Self { bar, start, part: (stop - start) / PARTS, next, wall_clock_start }
@@ -52,7 +52,7 @@ impl Progress {
             let speed = done / elapsed.max(f64::MIN_POSITIVE);
             let (time, speed) = (rounded(time, DIGITS), rounded(speed, DIGITS));
             bar.set_message(format!("t = {time} s, {speed} times real time"));
-            bar.set_position(whole(done / self.part));
+            bar.set_position(logging::position(done / self.part));
         }
     }
 }
@@ -63,9 +63,4 @@ impl Drop for Progress {
             bar.finish_and_clear();
         }
     }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a display")]
-fn whole(value: f64) -> u64 {
-    value.max(0.0) as u64
 }

@@ -15,7 +15,9 @@ pub struct LogFields {
     pub category: String,
     /// Simulated time in s, if stated.
     pub time: Option<f64>,
-    /// All further fields except `lost`, each as `, name = value`.
+    /// Number of lost messages that the message reports, if it does; its text contains the number, too.
+    pub lost: Option<u64>,
+    /// All further fields, each as `, name = value`.
     pub others: String,
 }
 
@@ -23,6 +25,14 @@ impl Visit for LogFields {
     fn record_f64(&mut self, field: &Field, value: f64) {
         if field.name() == "time" {
             self.time = Some(value);
+        } else {
+            self.record_debug(field, &value);
+        }
+    }
+
+    fn record_u64(&mut self, field: &Field, value: u64) {
+        if field.name() == "lost" {
+            self.lost = Some(value);
         } else {
             self.record_debug(field, &value);
         }
@@ -40,8 +50,6 @@ impl Visit for LogFields {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
         match field.name() {
             "message" => self.message = format!("{value:?}"),
-            // The message text contains this number already.
-            "lost" => {}
             name => {
                 // Writing to a String cannot fail.
                 let _ = write!(self.others, ", {name} = {value:?}");
