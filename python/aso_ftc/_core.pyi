@@ -1,6 +1,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any, TypedDict, final
 
 from ._slave import Slave
 
@@ -9,7 +9,6 @@ __all__ = [
     "Designed",
     "LiveView",
     "Numbers",
-    "Outcome",
     "Stepper",
     "Study",
     "Table",
@@ -86,32 +85,14 @@ class Numbers:
     @property
     def __array_interface__(self) -> dict[str, Any]: ...
 
-@final
-class Outcome:
-    def __new__(
-        cls,
-        table: Table,
-        end: str,
-        time: float,
-        steps: int,
-        seconds: float,
-        settings: str,
-        reasons: list[str],
-    ) -> Outcome: ...
-    @property
-    def table(self) -> Table: ...
-    @property
-    def end(self) -> str: ...
-    @property
-    def time(self) -> float: ...
-    @property
-    def steps(self) -> int: ...
-    @property
-    def seconds(self) -> float: ...
-    @property
-    def settings(self) -> str: ...
-    @property
-    def reasons(self) -> list[str]: ...
+class Outcome(TypedDict):
+    table: Table
+    end: str
+    time: float
+    steps: int
+    seconds: float
+    settings: str
+    reasons: list[str]
 
 @final
 class Stepper:

@@ -51,7 +51,7 @@ class Results(Mapping[str, "NDArray[Any]"]):
 
     def __init__(self, outcome: _core.Outcome) -> None:
         self._outcome = outcome
-        self._table = outcome.table
+        self._table = outcome["table"]
         self._columns: dict[str, NDArray[Any]] = {}
         self._plot: tuple[str, ...] = ()
 
@@ -84,32 +84,32 @@ class Results(Mapping[str, "NDArray[Any]"]):
 
         Of an exception's results: ``"failed"``, ``"time limit"``, ``"cancelled"`` or ``"interrupted"``.
         """
-        return self._outcome.end
+        return self._outcome["end"]
 
     @property
     def end_time(self) -> float:
         """Simulated time in s that the run reached."""
-        return self._outcome.time
+        return self._outcome["time"]
 
     @property
     def steps(self) -> int:
         """Number of communication steps."""
-        return self._outcome.steps
+        return self._outcome["steps"]
 
     @property
     def seconds(self) -> float:
         """Wall-clock time of the steps in s."""
-        return self._outcome.seconds
+        return self._outcome["seconds"]
 
     @property
     def settings(self) -> dict[str, Any]:
         """The complete ``system.toml`` of the run as nested dicts, with all that was chosen."""
-        return _core.parse_toml(self._outcome.settings)
+        return _core.parse_toml(self._outcome["settings"])
 
     @property
     def explanation(self) -> list[str]:
         """One sentence for each setting that the system left open."""
-        return list(self._outcome.reasons)
+        return list(self._outcome["reasons"])
 
     def __len__(self) -> int:
         return len(self.names)

@@ -48,10 +48,7 @@ pub(crate) fn parse_toml<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py
 /// names the table and the text of a wrong entry.
 pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Config> {
     let py = description.py();
-    let text = match description.extract::<String>() {
-        Ok(text) => text,
-        Err(_) => Node::from_python(description)?.render()?,
-    };
+    let text = Node::text(description)?;
     parse(&text, &folder.join(NAME)).map_err(|place| {
         let shown = place.shown().trim();
         let before = text.lines().take(place.line().saturating_sub(1));

@@ -40,10 +40,7 @@ pub(crate) fn design_file(py: Python<'_>, path: PathBuf) -> PyResult<Designed> {
 #[pyfunction]
 pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<Designed> {
     let py = plant.py();
-    let text = match plant.extract::<String>() {
-        Ok(text) => text,
-        Err(_) => Node::from_python(plant)?.render()?,
-    };
+    let text = Node::text(plant)?;
     let design = detached(py, || design::design_text(&path, text))?;
     Ok(Designed { design: Mutex::new(design) })
 }

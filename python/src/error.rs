@@ -17,6 +17,7 @@ pub(crate) struct Exception {
 }
 
 /// The value of a field of an exception.
+#[derive(IntoPyObject)]
 enum Field {
     Text(String),
     Texts(Vec<String>),
@@ -60,12 +61,7 @@ impl Exception {
     fn object(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         let fields = PyDict::new(py);
         for (name, value) in self.fields {
-            match value {
-                Field::Text(value) => fields.set_item(name, value)?,
-                Field::Texts(value) => fields.set_item(name, value)?,
-                Field::Number(value) => fields.set_item(name, value)?,
-                Field::Count(value) => fields.set_item(name, value)?,
-            }
+            fields.set_item(name, value)?;
         }
         py.import(MODULE)?.getattr(self.class)?.call1((self.sentence, self.kind, fields))
     }

@@ -34,7 +34,7 @@ mod _core {
     #[pymodule_export]
     use super::live::LiveView;
     #[pymodule_export]
-    use super::run::{Outcome, Study, clear, open_fmus, set_worker};
+    use super::run::{Study, clear, open_fmus, set_worker};
     #[pymodule_export]
     use super::stepper::Stepper;
     #[pymodule_export]

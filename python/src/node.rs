@@ -87,6 +87,11 @@ impl<'de> Visitor<'de> for NodeVisitor {
 }
 
 impl Node {
+    /// Returns the text of a TOML file that is given as text or as nested dicts.
+    pub(crate) fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
+        value.extract().or_else(|_| Self::from_python(value)?.render())
+    }
+
     /// Reads the text of a TOML file.
     pub(crate) fn parse(text: &str) -> Result<Self, toml::de::Error> {
         toml::from_str(text)

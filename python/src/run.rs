@@ -155,7 +155,7 @@ impl Study {
             (None, RunEnd::ByFmu(name)) => (name, None),
             (None, RunEnd::AtStop | RunEnd::Interrupted) => ("stop time".to_owned(), None),
         };
-        let table = Py::new(py, Table::new(recorded, &binaries, prefix)?)?;
+        let table = Table::new(recorded, &binaries, prefix)?;
         let outcome = Outcome { table, end, time, steps, seconds, settings, reasons };
         Ok((outcome, exception.map(|error| error.into_value(py).into_any())))
     }
@@ -320,11 +320,11 @@ impl Input {
     }
 }
 
-/// The outcome of a run.
-#[pyclass(frozen, get_all, module = "aso_ftc._core")]
-pub(crate) struct Outcome {
+/// The outcome of a run, a dict in Python.
+#[derive(IntoPyObject)]
+struct Outcome {
     /// The recorded columns.
-    table: Py<Table>,
+    table: Table,
     /// `stop time`, `time limit`, `cancelled`, `interrupted`, `failed`, or the name of the FMU that requested the end.
     end: String,
     /// Time reached in s.
@@ -337,41 +337,4 @@ pub(crate) struct Outcome {
     settings: String,
     /// One sentence for each setting that was chosen.
     reasons: Vec<String>,
-}
-
-/// The arguments of [`Outcome::new`].
-type OutcomeArguments = (Py<Table>, String, f64, u64, f64, String, Vec<String>);
-
-#[pymethods]
-impl Outcome {
-    #[new]
-    fn new(
-        table: Py<Table>,
-        end: String,
-        time: f64,
-        steps: u64,
-        seconds: f64,
-        settings: String,
-        reasons: Vec<String>,
-    ) -> Self {
-        Self { table, end, time, steps, seconds, settings, reasons }
-    }
-
-    /// Returns the class and its arguments, for pickle.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> (Bound<'py, pyo3::types::PyType>, OutcomeArguments) {
-        let Self { table, end, time, steps, seconds, settings, reasons } = self;
-        let arguments = (
-            table.clone_ref(py),
-            end.clone(),
-            *time,
-            *steps,
-            *seconds,
-            settings.clone(),
-            reasons.clone(),
-        );
-        (py.get_type::<Self>(), arguments)
-    }
 }
