@@ -77,94 +77,72 @@ macro_rules! export {
             $crate::entry_points! { $model;
                 fmi2GetTypesPlatform = types_platform() -> fmi2String;
                 fmi2GetVersion = version() -> fmi2String;
-                fmuDescribe = describe(fmi2String, fmi2ComponentEnvironment,
-                    DescribeSink) -> fmi2Integer;
+                fmuDescribe = describe(fmi2String, fmi2ComponentEnvironment, DescribeSink) -> fmi2Integer;
                 fmi2Instantiate = instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
                     *const fmi2CallbackFunctions, fmi2Boolean, fmi2Boolean) -> fmi2Component;
                 fmi2FreeInstance = free_instance(fmi2Component) -> void;
                 fmi2SetDebugLogging = set_debug_logging(fmi2Component, fmi2Boolean, size_t,
-                    *const fmi2String) -> fmi2Status;
-                fmi2SetupExperiment = setup_experiment(fmi2Component, fmi2Boolean, fmi2Real,
-                    fmi2Real, fmi2Boolean, fmi2Real) -> fmi2Status;
-                fmi2EnterInitializationMode = enter_initialization_mode(fmi2Component) -> fmi2Status;
-                fmi2ExitInitializationMode = exit_initialization_mode(fmi2Component) -> fmi2Status;
-                fmi2Terminate = terminate(fmi2Component) -> fmi2Status;
-                fmi2Reset = reset(fmi2Component) -> fmi2Status;
-                fmi2GetReal = get_real(fmi2Component, *const fmi2ValueReference, size_t,
-                    *mut fmi2Real) -> fmi2Status;
-                fmi2GetInteger = get_integer(fmi2Component, *const fmi2ValueReference, size_t,
-                    *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBoolean = get_boolean(fmi2Component, *const fmi2ValueReference, size_t,
-                    *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetString = get_string(fmi2Component, *const fmi2ValueReference, size_t,
-                    *mut fmi2String) -> fmi2Status;
-                fmi2SetReal = set_real(fmi2Component, *const fmi2ValueReference, size_t,
-                    *const fmi2Real) -> fmi2Status;
-                fmi2SetInteger = set_integer(fmi2Component, *const fmi2ValueReference, size_t,
-                    *const fmi2Integer) -> fmi2Status;
-                fmi2SetBoolean = set_boolean(fmi2Component, *const fmi2ValueReference, size_t,
-                    *const fmi2Boolean) -> fmi2Status;
-                fmi2SetString = set_string(fmi2Component, *const fmi2ValueReference, size_t,
-                    *const fmi2String) -> fmi2Status;
-                fmi2GetFMUstate = get_fmu_state(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
-                fmi2SetFMUstate = set_fmu_state(fmi2Component, fmi2FMUstate) -> fmi2Status;
-                fmi2FreeFMUstate = free_fmu_state(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
+                    *const fmi2String);
+                fmi2SetupExperiment = setup_experiment(fmi2Component, fmi2Boolean, fmi2Real, fmi2Real,
+                    fmi2Boolean, fmi2Real);
+                fmi2EnterInitializationMode = enter_initialization_mode(fmi2Component);
+                fmi2ExitInitializationMode = exit_initialization_mode(fmi2Component);
+                fmi2Terminate = terminate(fmi2Component);
+                fmi2Reset = reset(fmi2Component);
+                fmi2GetReal = get_real(fmi2Component, References, size_t, *mut fmi2Real);
+                fmi2GetInteger = get_integer(fmi2Component, References, size_t, *mut fmi2Integer);
+                fmi2GetBoolean = get_boolean(fmi2Component, References, size_t, *mut fmi2Boolean);
+                fmi2GetString = get_string(fmi2Component, References, size_t, *mut fmi2String);
+                fmi2SetReal = set_real(fmi2Component, References, size_t, *const fmi2Real);
+                fmi2SetInteger = set_integer(fmi2Component, References, size_t, *const fmi2Integer);
+                fmi2SetBoolean = set_boolean(fmi2Component, References, size_t, *const fmi2Boolean);
+                fmi2SetString = set_string(fmi2Component, References, size_t, *const fmi2String);
+                fmi2GetFMUstate = get_fmu_state(fmi2Component, *mut fmi2FMUstate);
+                fmi2SetFMUstate = set_fmu_state(fmi2Component, fmi2FMUstate);
+                fmi2FreeFMUstate = free_fmu_state(fmi2Component, *mut fmi2FMUstate);
                 fmi2SerializedFMUstateSize = serialized_fmu_state_size(fmi2Component, fmi2FMUstate,
-                    *mut size_t) -> fmi2Status;
-                fmi2SerializeFMUstate = serialize_fmu_state(fmi2Component, fmi2FMUstate,
-                    *mut fmi2Byte, size_t) -> fmi2Status;
-                fmi2DeSerializeFMUstate = de_serialize_fmu_state(fmi2Component, *const fmi2Byte,
-                    size_t, *mut fmi2FMUstate) -> fmi2Status;
-                fmi2GetDirectionalDerivative = get_directional_derivative(fmi2Component,
-                    *const fmi2ValueReference, size_t, *const fmi2ValueReference, size_t,
-                    *const fmi2Real, *mut fmi2Real) -> fmi2Status;
-                fmi2EnterEventMode = enter_event_mode(fmi2Component) -> fmi2Status;
-                fmi2NewDiscreteStates = new_discrete_states(fmi2Component,
-                    *mut fmi2EventInfo) -> fmi2Status;
-                fmi2EnterContinuousTimeMode = enter_continuous_time_mode(fmi2Component) -> fmi2Status;
+                    *mut size_t);
+                fmi2SerializeFMUstate = serialize_fmu_state(fmi2Component, fmi2FMUstate, *mut fmi2Byte,
+                    size_t);
+                fmi2DeSerializeFMUstate = de_serialize_fmu_state(fmi2Component, *const fmi2Byte, size_t,
+                    *mut fmi2FMUstate);
+                fmi2GetDirectionalDerivative = get_directional_derivative(fmi2Component, References,
+                    size_t, References, size_t, *const fmi2Real, *mut fmi2Real);
+                fmi2EnterEventMode = enter_event_mode(fmi2Component);
+                fmi2NewDiscreteStates = new_discrete_states(fmi2Component, *mut fmi2EventInfo);
+                fmi2EnterContinuousTimeMode = enter_continuous_time_mode(fmi2Component);
                 fmi2CompletedIntegratorStep = completed_integrator_step(fmi2Component, fmi2Boolean,
-                    *mut fmi2Boolean, *mut fmi2Boolean) -> fmi2Status;
-                fmi2SetTime = set_time(fmi2Component, fmi2Real) -> fmi2Status;
-                fmi2SetContinuousStates = set_continuous_states(fmi2Component, *const fmi2Real,
-                    size_t) -> fmi2Status;
-                fmi2GetEventIndicators = get_event_indicators(fmi2Component, *mut fmi2Real,
-                    size_t) -> fmi2Status;
-                fmi2GetContinuousStates = get_continuous_states(fmi2Component, *mut fmi2Real,
-                    size_t) -> fmi2Status;
-                fmi2GetDerivatives = get_derivatives(fmi2Component, *mut fmi2Real,
-                    size_t) -> fmi2Status;
-                fmi2GetNominalsOfContinuousStates = get_nominals(fmi2Component, *mut fmi2Real,
-                    size_t) -> fmi2Status;
-                fmi2SetRealInputDerivatives = set_real_input_derivatives(fmi2Component,
-                    *const fmi2ValueReference, size_t, *const fmi2Integer,
-                    *const fmi2Real) -> fmi2Status;
-                fmi2GetRealOutputDerivatives = get_real_output_derivatives(fmi2Component,
-                    *const fmi2ValueReference, size_t, *const fmi2Integer,
-                    *mut fmi2Real) -> fmi2Status;
-                fmi2DoStep = do_step(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
-                fmi2CancelStep = cancel_step(fmi2Component) -> fmi2Status;
-                fmi2GetStatus = get_status(fmi2Component, fmi2StatusKind,
-                    *mut fmi2Status) -> fmi2Status;
-                fmi2GetRealStatus = get_real_status(fmi2Component, fmi2StatusKind,
-                    *mut fmi2Real) -> fmi2Status;
-                fmi2GetIntegerStatus = get_integer_status(fmi2Component, fmi2StatusKind,
-                    *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBooleanStatus = get_boolean_status(fmi2Component, fmi2StatusKind,
-                    *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetStringStatus = get_string_status(fmi2Component, fmi2StatusKind,
-                    *mut fmi2String) -> fmi2Status;
+                    *mut fmi2Boolean, *mut fmi2Boolean);
+                fmi2SetTime = set_time(fmi2Component, fmi2Real);
+                fmi2SetContinuousStates = set_continuous_states(fmi2Component, *const fmi2Real, size_t);
+                fmi2GetEventIndicators = get_event_indicators(fmi2Component, *mut fmi2Real, size_t);
+                fmi2GetContinuousStates = get_continuous_states(fmi2Component, *mut fmi2Real, size_t);
+                fmi2GetDerivatives = get_derivatives(fmi2Component, *mut fmi2Real, size_t);
+                fmi2GetNominalsOfContinuousStates = get_nominals(fmi2Component, *mut fmi2Real, size_t);
+                fmi2SetRealInputDerivatives = set_real_input_derivatives(fmi2Component, References,
+                    size_t, *const fmi2Integer, *const fmi2Real);
+                fmi2GetRealOutputDerivatives = get_real_output_derivatives(fmi2Component, References,
+                    size_t, *const fmi2Integer, *mut fmi2Real);
+                fmi2DoStep = do_step(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean);
+                fmi2CancelStep = cancel_step(fmi2Component);
+                fmi2GetStatus = get_status(fmi2Component, fmi2StatusKind, *mut fmi2Status);
+                fmi2GetRealStatus = get_real_status(fmi2Component, fmi2StatusKind, *mut fmi2Real);
+                fmi2GetIntegerStatus = get_integer_status(fmi2Component, fmi2StatusKind, *mut fmi2Integer);
+                fmi2GetBooleanStatus = get_boolean_status(fmi2Component, fmi2StatusKind, *mut fmi2Boolean);
+                fmi2GetStringStatus = get_string_status(fmi2Component, fmi2StatusKind, *mut fmi2String);
             }
             $crate::entry_points_of_fmi3! { $model }
         };
     };
 }
 
-/// Defines exported C functions from the types of their arguments. They call the generic functions for the model.
+/// Defines exported C functions from the types of their arguments. They call the generic functions for the model. A
+/// function without another type returns a status.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {
-    ($model:ty; $($name:ident = $($function:ident)::+ ($($types:tt)*) -> $result:ident;)*) => {
-        $($crate::entry_point! { $model; $name = [$($function)::+] -> $result;
+    ($model:ty; $($name:ident = $($function:ident)::+ ($($types:tt)*) $(-> $result:ident)?;)*) => {
+        $($crate::entry_point! { $model; $name = [$($function)::+] -> [$($result)? fmi2Status];
             [fmi_1 fmi_2 fmi_3 fmi_4 fmi_5 fmi_6 fmi_7 fmi_8 fmi_9 fmi_10 fmi_11 fmi_12] []; $($types)* })*
     };
 }
@@ -176,7 +154,7 @@ macro_rules! entry_points {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_point {
-    ($model:ty; $name:ident = [$($function:tt)*] -> $result:ident;
+    ($model:ty; $name:ident = [$($function:tt)*] -> [$result:ident $($status:ident)?];
         [$($unused:ident)*] [$(($argument:ident $($type:tt)*))*];) => {
         #[unsafe(no_mangle)]
         unsafe extern "C" fn $name($($argument: $($type)*),*) -> $crate::ffi::signature::$result {
@@ -184,7 +162,7 @@ macro_rules! entry_point {
             unsafe { $crate::ffi::$($function)*::<$model>($($argument),*) }
         }
     };
-    ($model:ty; $name:ident = $function:tt -> $result:ident;
+    ($model:ty; $name:ident = $function:tt -> $result:tt;
         [$next:ident $($unused:ident)*] [$($done:tt)*]; $(*$access:tt)? $type:ident $(, $($types:tt)*)?) => {
         $crate::entry_point! { $model; $name = $function -> $result;
             [$($unused)*] [$($done)* ($next $(*$access)? $crate::ffi::signature::$type)]; $($($types)*)? }
@@ -207,6 +185,8 @@ pub mod signature {
         fmi3LogMessageCallback, fmi3UnlockPreemptionCallback,
     };
 
+    /// An array of value references.
+    pub type References = *const fmi3ValueReference;
     /// `fmi3LogMessageCallback`, which may be null; likewise the other callbacks.
     pub type fmi3LogMessage = Option<fmi3LogMessageCallback>;
     /// `fmi3IntermediateUpdateCallback`.
