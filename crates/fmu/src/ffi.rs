@@ -185,18 +185,24 @@ pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
 
+/// Copies the path or URI of a folder; `None` if it is null or empty.
+unsafe fn folder(pointer: fmi2String, what: &str) -> Result<Option<String>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: not null, and zero-terminated by the standard.
+    Ok(Some(unsafe { text(pointer, what)? }).filter(|folder| !folder.is_empty()))
+}
+
 /// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] if it is null or empty, an error if it is no URI of
 /// a file.
 unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
-    if location.is_null() {
-        return Ok(PathBuf::from(NO_FOLDER));
+    // SAFETY: null or zero-terminated by the standard.
+    match unsafe { folder(location, "fmuResourceLocation")? } {
+        None => Ok(PathBuf::from(NO_FOLDER)),
+        Some(uri) => path_from_uri(&uri)
+            .map_err(|error| Failure::Error(format!("fmuResourceLocation: {error}"))),
     }
-    // SAFETY: not null, and zero-terminated by the standard.
-    let uri = unsafe { text(location, "fmuResourceLocation")? };
-    if uri.is_empty() {
-        return Ok(PathBuf::from(NO_FOLDER));
-    }
-    path_from_uri(&uri).map_err(|error| Failure::Error(format!("fmuResourceLocation: {error}")))
 }
 
 #[must_use]
@@ -278,11 +284,7 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     }
 }
 
-/// Renders a description.
-///
-/// # Errors
-///
-/// [`Failure::Error`] if the description breaks rules of the standard.
+/// Renders a description. An error if it breaks rules of the standard.
 fn render(description: &ModelDescription) -> Result<String, Failure> {
     let problems = description.problems();
     if problems.is_empty() {

@@ -8,6 +8,7 @@ mod instantiate;
 mod tests;
 mod values;
 
+pub use super::free_instance;
 pub use clocks::*;
 pub use entry::*;
 pub use instantiate::*;

@@ -1,8 +1,8 @@
-//! `fmi3InstantiateXXX` and `fmi3FreeInstance`.
+//! `fmi3InstantiateXXX`.
 
 use std::path::{Path, PathBuf};
 
-use super::super::{into_component, read, text};
+use super::super::{folder, into_component, read, text};
 use crate::callbacks::{Callbacks, IntermediateUpdate};
 use crate::instance::{Instance, Instantiation};
 use crate::model::{Failure, Model};
@@ -34,13 +34,9 @@ unsafe fn read_pointers<'a>(pointers: &Pointers) -> Result<(String, PathBuf, &'a
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
         let token = text(pointers.token, "instantiationToken")?;
-        let folder = if pointers.resources.is_null() {
-            String::new()
-        } else {
-            text(pointers.resources, "resourcePath")?
-        };
-        let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
-        Ok((token, Path::new(folder).to_owned(), read(pointers.required, pointers.required_count)?))
+        let folder = folder(pointers.resources, "resourcePath")?;
+        let folder = folder.unwrap_or_else(|| NO_FOLDER.to_owned());
+        Ok((token, folder.into(), read(pointers.required, pointers.required_count)?))
     }
 }
 
@@ -147,11 +143,4 @@ pub unsafe fn instantiate_scheduled_execution<M: Model>(
     );
     Callbacks::Version3 { environment, log }.log(Status::Error, "logStatusError", &message);
     std::ptr::null_mut()
-}
-
-/// Frees the instance. Does nothing for null, during another call of the instance, and while the importer sets inputs
-/// within a step.
-pub unsafe fn free_instance<M: Model>(instance: fmi3Instance) {
-    // SAFETY: an instance that is not null is one that this library made.
-    unsafe { super::super::free_instance::<M>(instance) }
 }
