@@ -112,6 +112,19 @@ macro_rules! constructors {
     };
 }
 
+/// Defines functions that set entries of the [`Declaration`].
+macro_rules! setters {
+    ($($(#[$documentation:meta])*
+        $name:ident($($argument:ident: $type:ty),*) $($($entry:ident).+ = $value:expr),+;)*) => {
+        $($(#[$documentation])*
+        #[must_use]
+        pub fn $name(mut self, $($argument: $type),*) -> Self {
+            $(self.declaration.$($entry).+ = $value;)+
+            self
+        })*
+    };
+}
+
 impl<M> Variable<M> {
     constructors! {
         /// Creates a `Real` variable with the value in the field that `field` borrows.
@@ -277,12 +290,71 @@ impl<M> Variable<M> {
         Self { declaration, fields: Fields { access, derivatives: Vec::new() } }
     }
 
-    /// Makes the variable an input.
-    #[must_use]
-    pub fn input(mut self) -> Self {
-        self.declaration.causality = Causality::Input;
-        self.declaration.initial = None;
-        self
+    setters! {
+        /// Makes the variable an input.
+        input() causality = Causality::Input, initial = None;
+        /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from
+        /// other parameters.
+        calculated_parameter() causality = Causality::CalculatedParameter, variability = Variability::Fixed;
+        /// Makes a local variable or output constant.
+        constant() variability = Variability::Constant, initial = Some(Initial::Exact);
+        /// Makes a Real discrete: it changes at events or communication points only.
+        discrete() variability = Variability::Discrete;
+        /// Sets `initial = exact` for a local variable or output: it starts with the value of its field after
+        /// [`Model::new`](crate::Model::new), unless the importer sets another value before the first step.
+        exact() initial = Some(Initial::Exact);
+        /// Sets `initial = approx` for a local variable or output: an iteration computes the initial value
+        /// from the value of its field, a guess that the importer may set before initialization mode.
+        approximate() initial = Some(Initial::Approx);
+        /// Sets the unit, an expression for [`Unit::parse`](fmu_description::unit::Unit::parse).
+        unit(unit: impl Into<String>) number.unit = Some(unit.into());
+        /// Sets the display unit, in which importers show the value: another unit of the same quantity, such as `degC`
+        /// for `K`. It is an expression for [`Unit::parse`](fmu_description::unit::Unit::parse), like the unit.
+        display_unit(unit: impl Into<String>) number.display_unit = Some(unit.into());
+        /// Makes a Real a difference, such as a rise of temperature, which has no offset in another unit: 5 K are shown
+        /// as 5 degC (`relativeQuantity`).
+        relative_quantity() number.relative_quantity = true;
+        /// Sets `quantity`, the physical quantity, such as `Force`.
+        quantity(quantity: impl Into<String>) number.quantity = Some(quantity.into());
+        /// Sets the media type of a [`Variable::binary`], such as `image/png` (`mimeType`).
+        mime_type(mime_type: impl Into<String>) number.mime_type = Some(mime_type.into());
+        /// Sets the smallest and the largest allowed value. Setting a value outside the range returns
+        /// `fmi2Discard`.
+        range(min: f64, max: f64) number.min = Some(min), number.max = Some(max);
+        /// Sets the smallest allowed value. See [`Variable::range`].
+        min(min: f64) number.min = Some(min);
+        /// Sets the largest allowed value. See [`Variable::range`].
+        max(max: f64) number.max = Some(max);
+        /// Sets the nominal value, greater than zero: the typical magnitude. Integrators scale the error of a
+        /// state with it.
+        nominal(nominal: f64) number.nominal = Some(nominal);
+        /// Declares the variable as the time derivative of the continuous state called `state`.
+        ///
+        /// In model exchange the importer integrates it.
+        derivative_of(state: impl Into<String>) derivative_of = Some(state.into());
+        /// Sets `reinit`: an event may change this continuous state.
+        reinit() reinit = true;
+        /// States the clocks of a discrete variable: it changes when one of them ticks (FMI 3.0.2, section
+        /// 2.2.8.3).
+        clocked_by(clocks: &[&str]) clocks = clocks.iter().map(|&name| name.to_owned()).collect();
+        /// States the structural parameters that are the extents of the array with this element, one
+        /// name for each dimension. All elements of the array state the same names.
+        ///
+        /// ```
+        /// # use fmu::Variable;
+        /// struct Filter { n: u64, gains: Vec<f64> }
+        /// # impl Filter {
+        /// fn variables(&self) -> Vec<Variable<Self>> {
+        ///     let mut all = vec![Variable::structural("n", "Order", |model: &mut Self| &mut model.n).max(9.0)];
+        ///     let gains = Variable::real_array("K", "Gain", &[self.gains.len()], |model: &mut Self| &mut model.gains[..]);
+        ///     all.extend(gains.map(|element| element.parameter().sized_by(&["n"])));
+        ///     all
+        /// }
+        /// # }
+        /// # let count = Filter { n: 2, gains: vec![0.0; 2] }.variables().len();
+        /// # assert_eq!(count, 3);
+        /// ```
+        sized_by(names: &[&str]) sized_by = names.iter().map(|&name| name.to_owned()).collect();
     }
 
     /// Makes the variable an output. `direct` names the inputs (and, in a model with continuous states,
@@ -313,160 +385,6 @@ impl<M> Variable<M> {
             declaration.causality = Causality::Parameter;
         }
         (declaration.variability, declaration.initial) = (variability, Some(Initial::Exact));
-        self
-    }
-
-    /// States the clocks of a discrete variable: it changes when one of them ticks (FMI 3.0.2, section
-    /// 2.2.8.3).
-    #[must_use]
-    pub fn clocked_by(mut self, clocks: &[&str]) -> Self {
-        self.declaration.clocks = clocks.iter().map(|&name| name.to_owned()).collect();
-        self
-    }
-
-    /// States the structural parameters that are the extents of the array with this element, one
-    /// name for each dimension. All elements of the array state the same names.
-    ///
-    /// ```
-    /// # use fmu::Variable;
-    /// struct Filter { n: u64, gains: Vec<f64> }
-    /// # impl Filter {
-    /// fn variables(&self) -> Vec<Variable<Self>> {
-    ///     let mut all = vec![Variable::structural("n", "Order", |model: &mut Self| &mut model.n).max(9.0)];
-    ///     let gains = Variable::real_array("K", "Gain", &[self.gains.len()], |model: &mut Self| &mut model.gains[..]);
-    ///     all.extend(gains.map(|element| element.parameter().sized_by(&["n"])));
-    ///     all
-    /// }
-    /// # }
-    /// # let count = Filter { n: 2, gains: vec![0.0; 2] }.variables().len();
-    /// # assert_eq!(count, 3);
-    /// ```
-    #[must_use]
-    pub fn sized_by(mut self, structural: &[&str]) -> Self {
-        self.declaration.sized_by = structural.iter().map(|&name| name.to_owned()).collect();
-        self
-    }
-
-    /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from
-    /// other parameters.
-    #[must_use]
-    pub fn calculated_parameter(mut self) -> Self {
-        self.declaration.causality = Causality::CalculatedParameter;
-        self.declaration.variability = Variability::Fixed;
-        self
-    }
-
-    /// Makes a local variable or output constant.
-    #[must_use]
-    pub fn constant(mut self) -> Self {
-        self.declaration.variability = Variability::Constant;
-        self.declaration.initial = Some(Initial::Exact);
-        self
-    }
-
-    /// Makes a Real discrete: it changes at events or communication points only.
-    #[must_use]
-    pub fn discrete(mut self) -> Self {
-        self.declaration.variability = Variability::Discrete;
-        self
-    }
-
-    /// Sets `initial = exact` for a local variable or output: it starts with the value of its field after
-    /// [`Model::new`](crate::Model::new), unless the importer sets another value before the first step.
-    #[must_use]
-    pub fn exact(mut self) -> Self {
-        self.declaration.initial = Some(Initial::Exact);
-        self
-    }
-
-    /// Sets `initial = approx` for a local variable or output: an iteration computes the initial value
-    /// from the value of its field, a guess that the importer may set before initialization mode.
-    #[must_use]
-    pub fn approximate(mut self) -> Self {
-        self.declaration.initial = Some(Initial::Approx);
-        self
-    }
-
-    /// Sets the unit, an expression for [`Unit::parse`](fmu_description::unit::Unit::parse).
-    #[must_use]
-    pub fn unit(mut self, unit: impl Into<String>) -> Self {
-        self.declaration.number.unit = Some(unit.into());
-        self
-    }
-
-    /// Sets the display unit, in which importers show the value: another unit of the same quantity, such as `degC`
-    /// for `K`. It is an expression for [`Unit::parse`](fmu_description::unit::Unit::parse), like the unit.
-    #[must_use]
-    pub fn display_unit(mut self, unit: impl Into<String>) -> Self {
-        self.declaration.number.display_unit = Some(unit.into());
-        self
-    }
-
-    /// Makes a Real a difference, such as a rise of temperature, which has no offset in another unit: 5 K are shown as
-    /// 5 degC (`relativeQuantity`).
-    #[must_use]
-    pub fn relative_quantity(mut self) -> Self {
-        self.declaration.number.relative_quantity = true;
-        self
-    }
-
-    /// Sets `quantity`, the physical quantity, such as `Force`.
-    #[must_use]
-    pub fn quantity(mut self, quantity: impl Into<String>) -> Self {
-        self.declaration.number.quantity = Some(quantity.into());
-        self
-    }
-
-    /// Sets the media type of a [`Variable::binary`], such as `image/png` (`mimeType`).
-    #[must_use]
-    pub fn mime_type(mut self, mime_type: impl Into<String>) -> Self {
-        self.declaration.number.mime_type = Some(mime_type.into());
-        self
-    }
-
-    /// Sets the smallest and the largest allowed value. Setting a value outside the range returns
-    /// `fmi2Discard`.
-    #[must_use]
-    pub fn range(mut self, min: f64, max: f64) -> Self {
-        (self.declaration.number.min, self.declaration.number.max) = (Some(min), Some(max));
-        self
-    }
-
-    /// Sets the smallest allowed value. See [`Variable::range`].
-    #[must_use]
-    pub fn min(mut self, min: f64) -> Self {
-        self.declaration.number.min = Some(min);
-        self
-    }
-
-    /// Sets the largest allowed value. See [`Variable::range`].
-    #[must_use]
-    pub fn max(mut self, max: f64) -> Self {
-        self.declaration.number.max = Some(max);
-        self
-    }
-
-    /// Sets the nominal value, greater than zero: the typical magnitude. Integrators scale the error of a
-    /// state with it.
-    #[must_use]
-    pub fn nominal(mut self, nominal: f64) -> Self {
-        self.declaration.number.nominal = Some(nominal);
-        self
-    }
-
-    /// Declares the variable as the time derivative of the continuous state called `state`.
-    ///
-    /// In model exchange the importer integrates it.
-    #[must_use]
-    pub fn derivative_of(mut self, state: impl Into<String>) -> Self {
-        self.declaration.derivative_of = Some(state.into());
-        self
-    }
-
-    /// Sets `reinit`: an event may change this continuous state.
-    #[must_use]
-    pub fn reinit(mut self) -> Self {
-        self.declaration.reinit = true;
         self
     }
 
