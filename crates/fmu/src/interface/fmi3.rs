@@ -5,7 +5,7 @@ mod arrays;
 mod describe;
 
 use crate::model::Failure;
-use fmu_description::{DependencyKind, ModelStructure, NativeType};
+use fmu_description::{DependencyKind, ModelStructure, NativeType, Unknown};
 
 pub(crate) use describe::describe;
 
@@ -72,10 +72,7 @@ impl Table {
     }
 
     /// Checks that no variable is calculated, that is, repeats the value of another one. Ignores unknown references.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] with the name of the first such variable.
+    /// The error names the first such variable.
     pub(crate) fn check_settable(&self, references: &[u32]) -> Result<(), Failure> {
         let entries =
             || references.iter().filter_map(|reference| self.entries.get(*reference as usize));
@@ -88,12 +85,8 @@ impl Table {
     }
 
     /// Replaces the content of `places` by the value references of FMI 2.0 of all elements of the variables, in
-    /// row-major order.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] for an unknown value reference, a variable of another type, and if the
-    /// variables have not `count` elements together (section 2.2.7.1).
+    /// row-major order. An error for an unknown value reference, a variable of another type, and if the variables have
+    /// not `count` elements together (section 2.2.7.1).
     pub(crate) fn locate(
         &self,
         kind: NativeType,
@@ -172,12 +165,9 @@ impl Table {
     }
 
     /// Returns the dependencies of a variable, or of its initial value if `initial`. There are none for a variable that
-    /// is no unknown. An output or a derivative that is neither a state nor an alias of one also depends on all parameters.
-    /// An event indicator depends on all knowns; its initial value is no unknown.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] for an unknown value reference.
+    /// is no unknown. An output or a derivative that is neither a state nor an alias of one also depends on all
+    /// parameters. An event indicator depends on all knowns; its initial value is no unknown. An error for an unknown
+    /// value reference.
     pub(crate) fn dependencies(
         &self,
         reference: u32,
@@ -186,7 +176,7 @@ impl Table {
         let entry = self.entry(reference, "exported")?;
         if entry.kind == NativeType::Float64 && entry.first & INDICATOR != 0 && !initial {
             let [_, all] = &self.knowns;
-            return Ok(all.iter().map(|&known| self.dependency(0, known, None)).collect());
+            return Ok(dependent(all).map(|(k, kind)| self.dependency(0, k, kind)).collect());
         }
         let scalars = &self.scalars;
         let later = || scalars.outputs.iter().chain(&scalars.derivatives);
@@ -201,24 +191,34 @@ impl Table {
             }
             rows_read.push(row.index);
             let all = &self.knowns[usize::from(!initial)];
-            let listed = row.dependencies.as_ref().unwrap_or(all);
-            for (position, &known) in listed.iter().enumerate() {
-                let kinds = row.kinds.as_ref();
-                let kind = kinds.and_then(|kinds| kinds.get(position).copied());
+            for (known, kind) in pairs(row).unwrap_or_else(|| dependent(all).collect()) {
                 dependencies.push(self.dependency(element, known, kind));
             }
             if !initial && row.dependencies.is_some() && !self.states.contains(&row.index) {
-                dependencies
-                    .extend(self.parameters.iter().map(|&k| self.dependency(element, k, None)));
+                let parameters = dependent(&self.parameters);
+                dependencies.extend(parameters.map(|(k, kind)| self.dependency(element, k, kind)));
             }
         }
         Ok(dependencies)
     }
 
     /// Returns the dependency on the known with this 1-based index in FMI 2.0.
-    fn dependency(&self, element: usize, index: u32, kind: Option<DependencyKind>) -> Dependency {
+    fn dependency(&self, element: usize, index: u32, kind: DependencyKind) -> Dependency {
         let (known, element_of_known) = self.elements[index as usize - 1];
-        let kind = kind.unwrap_or(DependencyKind::Dependent);
         Dependency { element, known, element_of_known, kind }
     }
+}
+
+/// Returns the dependencies of a row with their kinds; `None` if the row lists none.
+fn pairs(row: &Unknown) -> Option<Vec<(u32, DependencyKind)>> {
+    let known = row.dependencies.as_ref()?;
+    Some(match &row.kinds {
+        Some(kinds) => known.iter().copied().zip(kinds.iter().copied()).collect(),
+        None => dependent(known).collect(),
+    })
+}
+
+/// Returns the knowns with the kind [`DependencyKind::Dependent`].
+fn dependent(knowns: &[u32]) -> impl Iterator<Item = (u32, DependencyKind)> {
+    knowns.iter().map(|&known| (known, DependencyKind::Dependent))
 }

@@ -84,18 +84,24 @@ fn dependency_row(
     let mut row = Vec::with_capacity(variable.direct.len() + 1);
     row.extend(own_state.map(|state| (index(state), DependencyKind::Constant)));
     for (name, kind) in &variable.direct {
-        let known = if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) };
-        row.push((known, *kind));
+        row.push((known(variables, variable, name)?, *kind));
     }
     row.sort_by_key(|(known, _)| *known);
     row.dedup_by_key(|(known, _)| *known);
-    let (dependencies, kinds): (Vec<_>, Vec<_>) = row.into_iter().unzip();
+    Ok(self::row(index(position), row))
+}
+
+/// Returns the row of the variable with this index and these dependencies; it states no kinds if all of them are
+/// [`DependencyKind::Dependent`].
+pub(super) fn row(index: u32, dependencies: Vec<(u32, DependencyKind)>) -> Unknown {
+    let (dependencies, kinds): (Vec<_>, Vec<_>) = dependencies.into_iter().unzip();
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
-    Ok(Unknown {
-        index: index(position),
-        dependencies: Some(dependencies),
-        kinds: (!plain).then_some(kinds),
-    })
+    Unknown { index, dependencies: Some(dependencies), kinds: (!plain).then_some(kinds) }
+}
+
+/// Returns the index of the known called `name` of `variable`.
+fn known(variables: &[Declaration], variable: &Declaration, name: &str) -> Result<u32, Failure> {
+    Ok(if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) })
 }
 
 /// Returns the row of an initial unknown.
@@ -106,7 +112,7 @@ fn initial_row(variables: &[Declaration], position: usize) -> Result<Unknown, Fa
     };
     let mut row = Vec::with_capacity(names.len());
     for name in names {
-        row.push(if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) });
+        row.push(known(variables, variable, name)?);
     }
     row.sort_unstable();
     row.dedup();

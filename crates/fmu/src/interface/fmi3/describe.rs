@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use super::super::structure;
 use super::arrays::{Block, blocks, starts, without_start};
-use super::{Entry, INDICATOR, INT64, Table};
+use super::{Entry, INDICATOR, INT64, Table, dependent, pairs};
 use fmu_description::{
     Causality, CoSimulation, DependencyKind, Dimension, Initial, Kind, ModelDescription,
     ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown, Variability,
@@ -246,16 +247,11 @@ impl Builder {
     }
 
     fn row(&self, old: &Unknown, index: u32, more: &[u32]) -> Unknown {
-        let Some(known) = &old.dependencies else {
+        let Some(listed) = pairs(old) else {
             return Unknown { index, dependencies: None, kinds: None };
         };
-        let kind = |position: usize| {
-            let kinds = old.kinds.as_ref().and_then(|kinds| kinds.get(position).copied());
-            kinds.unwrap_or(DependencyKind::Dependent)
-        };
-        let listed = known.iter().enumerate().map(|(at, &known)| (self.index(known), kind(at)));
-        let more = more.iter().map(|&known| (known, DependencyKind::Dependent));
-        from_pairs(index, listed.chain(more).collect())
+        let listed = listed.into_iter().map(|(known, kind)| (self.index(known), kind));
+        from_pairs(index, listed.chain(dependent(more)).collect())
     }
 
     fn table(&self, old: &ModelDescription) -> Table {
@@ -329,20 +325,11 @@ fn from_pairs(index: u32, mut pairs: Vec<(u32, DependencyKind)>) -> Unknown {
             None => merged.push((known, kind)),
         }
     }
-    let (dependencies, kinds): (Vec<_>, Vec<_>) = merged.into_iter().unzip();
-    let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
-    Unknown { index, dependencies: Some(dependencies), kinds: (!plain).then_some(kinds) }
+    structure::row(index, merged)
 }
 
 /// Adds the dependencies of `other` to `row`. The result has no list of dependencies if one of the rows has none.
 fn merge(row: &mut Unknown, other: &Unknown) {
-    let pairs = |row: &Unknown| {
-        let kinds = row.kinds.clone();
-        row.dependencies.clone().map(|known| {
-            let none = vec![DependencyKind::Dependent; known.len()];
-            known.into_iter().zip(kinds.unwrap_or(none)).collect::<Vec<_>>()
-        })
-    };
     *row = match (pairs(row), pairs(other)) {
         (Some(mut one), Some(two)) => {
             one.extend(two);
