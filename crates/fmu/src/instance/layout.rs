@@ -17,13 +17,9 @@ pub(super) type Layout = [u8; 8];
 
 /// Computes the hash of the layout of `value`.
 ///
-/// It covers, in the order of serialisation, the names of structs, fields, enums and variants, the
-/// type of each number or text, the kind of each collection, and which elements, variants and options
-/// are present. It does not cover the values of numbers, texts and lengths.
-///
-/// # Errors
-///
-/// [`Refusal`] if the value's `Serialize` implementation fails.
+/// It covers, in the order of serialisation, the names of structs, fields, enums and variants, the type of each number
+/// or text, the kind of each collection, and which elements, variants and options are present. It does not cover the
+/// values of numbers, texts and lengths. An error if the `Serialize` implementation of the value fails.
 pub(super) fn layout(value: &impl Serialize) -> Result<Layout, Refusal> {
     let mut hasher = LayoutHasher(0);
     value.serialize(&mut hasher)?;
@@ -207,45 +203,19 @@ impl ser::Serializer for &mut LayoutHasher {
     }
 }
 
-/// Defines the serialisation of collections whose parts have no names.
-macro_rules! elements {
-    ($($collection:ident $function:ident;)*) => {
+/// Defines the serialisation of collections, whose parts may have names.
+macro_rules! parts {
+    ($($collection:ident $function:ident($($name:ident)?);)*) => {
         $(impl $collection for &mut LayoutHasher {
             type Ok = ();
             type Error = Refusal;
 
-            fn $function<T: ?Sized + Serialize>(&mut self, value: &T) -> Hashed {
-                value.serialize(&mut **self)
-            }
-
-            fn end(self) -> Hashed {
-                self.word("end");
-                Ok(())
-            }
-        })*
-    };
-}
-
-elements! {
-    SerializeSeq serialize_element;
-    SerializeTuple serialize_element;
-    SerializeTupleStruct serialize_field;
-    SerializeTupleVariant serialize_field;
-}
-
-/// Defines the serialisation of collections whose parts have names.
-macro_rules! fields {
-    ($($collection:ident)*) => {
-        $(impl $collection for &mut LayoutHasher {
-            type Ok = ();
-            type Error = Refusal;
-
-            fn serialize_field<T: ?Sized + Serialize>(
+            fn $function<T: ?Sized + Serialize>(
                 &mut self,
-                name: &'static str,
+                $($name: &'static str,)?
                 value: &T,
             ) -> Hashed {
-                self.word(name);
+                $(self.word($name);)?
                 value.serialize(&mut **self)
             }
 
@@ -257,7 +227,14 @@ macro_rules! fields {
     };
 }
 
-fields! { SerializeStruct SerializeStructVariant }
+parts! {
+    SerializeSeq serialize_element();
+    SerializeTuple serialize_element();
+    SerializeTupleStruct serialize_field();
+    SerializeTupleVariant serialize_field();
+    SerializeStruct serialize_field(name);
+    SerializeStructVariant serialize_field(name);
+}
 
 impl SerializeMap for &mut LayoutHasher {
     type Ok = ();
