@@ -132,7 +132,7 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let instance = Self::build(
+        let (instance, _) = Self::build(
             || new_model::<M>(resources),
             callbacks,
             |interface, description| {
@@ -150,7 +150,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// Makes the model and its interface inside the panic fence. `session` checks the arguments of the importer and
-    /// makes the part of FMI 3.0; it runs inside the fence, too, because the model is dropped if it fails.
+    /// makes the part of FMI 3.0; it runs inside the fence, too, because the model is dropped if it fails. Returns the
+    /// model description, too.
     fn build(
         make: impl FnOnce() -> Result<M, Failure>,
         callbacks: Callbacks,
@@ -158,17 +159,17 @@ impl<M: Model> Instance<M> {
             &mut Interface<M>,
             &mut ModelDescription,
         ) -> Result<Option<Box<Session>>, Failure>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<(Self, ModelDescription), Failure> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
-        let complete = guarded(|| {
+        let (complete, description) = guarded(|| {
             let mut fresh = make()?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, mut description) = Interface::new(&mut fresh)?;
             let session = session(&mut interface, &mut description)?;
             let stepper = Stepper::new(&interface, description.default_experiment);
             let core = Core::new(fresh.clone(), InterfaceType::CoSimulation);
-            Ok(move |hook_guard| Self {
+            let complete = move |hook_guard| Self {
                 core,
                 fresh,
                 interface,
@@ -182,9 +183,10 @@ impl<M: Model> Instance<M> {
                 session,
                 lay_out: None,
                 hook_guard,
-            })
+            };
+            Ok((complete, description))
         })?;
-        Ok(complete(hook_guard))
+        Ok((complete(hook_guard), description))
     }
 
     /// An instance for co-simulation of `model` in the same program, with its model description of FMI 2.0.
@@ -192,18 +194,14 @@ impl<M: Model> Instance<M> {
         model: M,
         callbacks: Callbacks,
     ) -> Result<(Self, ModelDescription), Failure> {
-        let mut described = None;
-        let instance = Self::build(
+        Self::build(
             || Ok(model),
             callbacks,
             |interface, description| {
                 interface.restrict(description)?;
-                described = Some(description.clone());
                 Ok(None)
             },
-        )?;
-        let missing = || Failure::Error("the model has no description".to_owned());
-        Ok((instance, described.ok_or_else(missing)?))
+        )
     }
 
     fn into_type(mut self, interface_type: InterfaceType) -> Self {

@@ -60,7 +60,7 @@ impl<M: Model> Instance<M> {
         arguments: &Instantiation<'_>,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let mut instance = Self::build(
+        let (mut instance, _) = Self::build(
             || new_model::<M>(arguments.resources),
             callbacks,
             |interface, description| {
