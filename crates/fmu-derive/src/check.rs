@@ -6,11 +6,7 @@ use syn::{Error, Expr, ExprLit, ExprUnary, Ident, Lit, Result, UnOp};
 use crate::attributes::Role;
 use crate::field::{Base, Variable};
 
-/// Marks the states, and checks each variable alone and all together.
-///
-/// # Errors
-///
-/// All mistakes, each at its place.
+/// Marks the states, and checks each variable alone and all together. The error has all mistakes, each at its place.
 pub(crate) fn check(variables: &mut [Variable<'_>]) -> Result<()> {
     let mut errors = Vec::new();
     errors.extend(mark_states(variables));

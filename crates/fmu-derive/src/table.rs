@@ -59,11 +59,7 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
     })
 }
 
-/// Reads all fields.
-///
-/// # Errors
-///
-/// A second field of type `Log`, or the mistakes of all fields.
+/// Reads all fields. The error is a second field of type `Log`, or has the mistakes of all fields.
 fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
     let mut model = Model { variables: Vec::new(), logs: Vec::new(), starts: Vec::new() };
     let mut errors: Option<Error> = None;

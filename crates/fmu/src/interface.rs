@@ -17,7 +17,7 @@ use fmu_description::call_order::{InterfaceType, settable};
 use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
 use fmu_description::{
-    Causality, Guid, Initial, IntegerType, Kind, LogCategory, ModelDescription, Problem, RealType,
+    Causality, Guid, Initial, IntegerType, Kind, ModelDescription, Problem, RealType,
     ScalarVariable, Unknown,
 };
 use typed::{Slots, integer};
@@ -70,6 +70,7 @@ impl<M: Model> Interface<M> {
         description.log_categories = general::categories(model.log().is_some(), M::LOG_CATEGORIES);
         describe_variables(&variables, &mut description)?;
         let states = structure::states(&variables)?;
+        let names = description.log_categories.iter().map(|category| category.name.clone());
         let mut interface = Self {
             reals: Vec::new(),
             integers: Vec::new(),
@@ -80,7 +81,7 @@ impl<M: Model> Interface<M> {
             event_indicators: model.model_exchange().map(|interface| interface.event_indicators),
             max_output_derivative_order: 0,
             interpolated: Vec::new(),
-            log_categories: names(&description.log_categories),
+            log_categories: names.collect(),
             guid: Guid([0; 16]),
             sizes: sizes::Sizes::of(&variables),
             clocks: clocks::Clocks::of(&variables),
@@ -211,10 +212,6 @@ fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
     first.into_iter().chain(last).map(|variable| (variable.declaration, variable.fields)).unzip()
 }
 
-fn names(categories: &[LogCategory]) -> Vec<String> {
-    categories.iter().map(|category| category.name.clone()).collect()
-}
-
 pub(crate) fn real(number: Number) -> RealType {
     RealType {
         quantity: number.quantity,
@@ -305,11 +302,8 @@ pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescript
 
 impl<M> Interface<M> {
     /// Removes clocks and structural parameters, which FMI 2.0 does not have, from the description, and sets the GUID
-    /// of what remains. Arrays have their present extents.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] for a variable of another type that FMI 2.0 does not have.
+    /// of what remains. Arrays have their present extents. An error for a variable of another type that FMI 2.0 does
+    /// not have.
     pub(crate) fn restrict(&mut self, description: &mut ModelDescription) -> Result<(), Failure> {
         let left_out = |variable: &ScalarVariable| {
             variable.causality == Causality::StructuralParameter
@@ -332,12 +326,8 @@ impl<M> Interface<M> {
 
     /// Converts the description to FMI 3.0, and sets when each Real may be set in an instance of `interface_type`. The
     /// GUID becomes the `instantiationToken`. In model exchange continuous states may be set in event mode unless an
-    /// event changes them (section 2.3.5).
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if the extents of an array are not the values of its structural parameters, or if a name in
-    /// the clocks of a variable is not the name of a clock.
+    /// event changes them (section 2.3.5). An error if the extents of an array are not the values of its structural
+    /// parameters, or if a name in the clocks of a variable is not the name of a clock.
     pub(crate) fn convert(
         &mut self,
         description: &ModelDescription,

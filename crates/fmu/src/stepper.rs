@@ -56,22 +56,15 @@ impl Stepper {
         }
     }
 
-    /// Checks the size of a communication step in s, before the model sees it.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Discard`] if it is too long.
+    /// Checks the size of a communication step in s, before the model sees it. [`Failure::Discard`] if it is too long.
     #[inline]
     pub(crate) fn check_size(&self, size: f64) -> Result<(), Failure> {
         if size <= self.longest { Ok(()) } else { Err(too_long(size, self.longest)) }
     }
 
     /// Checks that an event at `time` is at most as long after `next`, the time for which an event was announced, as a
-    /// communication step may be; both in s. A model that samples might not return from a later one.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if it is later.
+    /// communication step may be; both in s. A model that samples might not return from a later one. An error if it is
+    /// later.
     pub(crate) fn check_delay(&self, next: f64, time: f64) -> Result<(), Failure> {
         if time - next <= self.longest {
             return Ok(());
@@ -101,11 +94,8 @@ impl Stepper {
     }
 
     /// Advances the model to the end of the step, to the first state event or to the event at `next` in s, whichever is
-    /// first. It handles no event, and does nothing if `next` is not after the start of the step.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`Stepper::run`].
+    /// first. It handles no event, and does nothing if `next` is not after the start of the step. Errors as of
+    /// [`Stepper::run`].
     pub(crate) fn run_to_event<M: Model>(
         &mut self,
         model: &mut M,

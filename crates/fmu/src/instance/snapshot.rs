@@ -98,13 +98,9 @@ impl<M: Model> Snapshot<M> {
         Ok(bytes)
     }
 
-    /// Reads a serialised state.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if `bytes` is truncated or altered, has another version of the format, belongs to an FMU
-    /// other than `guid`, was written by a build whose model has other fields, or is a state that no instance can
-    /// reach.
+    /// Reads a serialised state. An error if `bytes` is truncated or altered, has another version of the format,
+    /// belongs to an FMU other than `guid`, was written by a build whose model has other fields, or is a state that no
+    /// instance can reach.
     pub(crate) fn from_bytes(bytes: &[u8], guid: Guid) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
         if !bytes.starts_with(&MAGIC[..6]) {

@@ -18,11 +18,7 @@ impl Clocks {
         !self.0.is_empty()
     }
 
-    /// Sets `clocks` of the variables of a description of FMI 3.0.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] for a name that is not the name of a clock.
+    /// Sets `clocks` of the variables of a description of FMI 3.0. An error for a name that is not the name of a clock.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         for (name, clocks) in &self.0 {
             let index = |clock: &String| {

@@ -21,12 +21,9 @@ impl Sizes {
         Self { by_element }
     }
 
-    /// Replaces the extents in a description of FMI 3.0 by references to the structural parameters.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if an extent is not the value of its structural parameter, or if elements that state
-    /// structural parameters do not form arrays with one dimension for each of them.
+    /// Replaces the extents in a description of FMI 3.0 by references to the structural parameters. An error if an
+    /// extent is not the value of its structural parameter, or if elements that state structural parameters do not form
+    /// arrays with one dimension for each of them.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         if self.by_element.is_empty() {
             return Ok(());

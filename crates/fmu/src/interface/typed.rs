@@ -16,12 +16,8 @@ pub(crate) trait Native: Clone + Sized + 'static {
     /// Returns the variables of this type.
     fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>];
 
-    /// Makes the description of a variable of this type.
-    ///
-    /// # Errors
-    ///
-    /// Returns a message for a limit that is no value of the type, for an interval of a clock that is not positive, and
-    /// for a timed clock with a constant or triggered interval.
+    /// Makes the description of a variable of this type. An error for a limit that is no value of the type, for an
+    /// interval of a clock that is not positive, and for a timed clock with a constant or triggered interval.
     fn kind(start: Option<Self>, number: Number) -> Result<Kind, String>;
 
     /// Returns the value of a number; `None` for a clock and a binary.
@@ -45,12 +41,8 @@ macro_rules! slots {
         }
 
         impl<M> Slots<M> {
-            /// Appends the slot that `builder` builds to the list of its type. Returns the description of the
-            /// variable and the position of the slot.
-            ///
-            /// # Errors
-            ///
-            /// Same as [`Native::kind`].
+            /// Appends the slot that `builder` builds to the list of its type. Returns the description of the variable
+            /// and the position of the slot. Errors as of [`Native::kind`].
             pub(crate) fn add(
                 &mut self,
                 model: &mut M,
