@@ -6,7 +6,6 @@ mod variables;
 
 use std::path::Path;
 
-use fmu::description::DefaultExperiment;
 use fmu::{About, At, Event, Experiment, Failure, Log, Model, ModelExchange, Step, Variable};
 use nalgebra::DMatrix;
 use num_dual::Dual64;
@@ -154,17 +153,10 @@ impl Model for AsoController {
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
 
     fn about(&self) -> About {
+        let (stop, step) = (self.design.experiment.stop_time, self.design.step_size());
         About {
             description: self.design.description.clone(),
-            author: String::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: env!("CARGO_PKG_LICENSE").to_owned(),
-            default_experiment: DefaultExperiment {
-                start_time: Some(0.0),
-                stop_time: Some(self.design.experiment.stop_time),
-                tolerance: Some(1e-9),
-                step_size: Some(self.design.step_size()),
-            },
+            ..fmu::about!(start_time: 0.0, stop_time: stop, tolerance: 1e-9, step_size: step)
         }
     }
 

@@ -145,15 +145,13 @@ impl Model for KalmanFilter {
                 || "Template of Kalman filters that carry their plant".to_owned(),
                 |design| design.description.clone(),
             ),
-            author: String::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: env!("CARGO_PKG_LICENSE").to_owned(),
             default_experiment: DefaultExperiment {
                 start_time: Some(0.0),
                 stop_time: design.map(|design| design.stop_time),
                 tolerance: None,
                 step_size: design.map(|design| design.sample_time),
             },
+            ..fmu::about!()
         }
     }
 

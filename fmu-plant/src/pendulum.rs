@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use fmu::description::DefaultExperiment;
 use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
@@ -110,15 +109,7 @@ impl Model for FrictionPendulum {
     fn about(&self) -> About {
         About {
             description: "Inverted pendulum on a cart with set-valued Stribeck friction".to_owned(),
-            author: String::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: env!("CARGO_PKG_LICENSE").to_owned(),
-            default_experiment: DefaultExperiment {
-                start_time: Some(0.0),
-                stop_time: Some(10.0),
-                tolerance: Some(1e-9),
-                step_size: Some(0.001),
-            },
+            ..fmu::about!(start_time: 0.0, stop_time: 10.0, tolerance: 1e-9, step_size: 0.001)
         }
     }
 

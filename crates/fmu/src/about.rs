@@ -19,9 +19,13 @@ macro_rules! about {
             author: ::std::env!("CARGO_PKG_AUTHORS").replace(':', ", "),
             version: ::std::env!("CARGO_PKG_VERSION").to_owned(),
             license: ::std::env!("CARGO_PKG_LICENSE").to_owned(),
-            default_experiment: $crate::description::DefaultExperiment {
-                $($field: ::core::option::Option::Some(::core::convert::Into::into($value)),)*
-                ..::core::default::Default::default()
+            default_experiment: {
+                #[allow(clippy::needless_update, reason = "the arguments may be all fields")]
+                let experiment = $crate::description::DefaultExperiment {
+                    $($field: ::core::option::Option::Some(::core::convert::Into::into($value)),)*
+                    ..::core::default::Default::default()
+                };
+                experiment
             },
         }
     };
