@@ -67,12 +67,8 @@ pub(crate) enum Part<'a> {
     },
 }
 
-/// Reads a field.
-///
-/// # Errors
-///
-/// A field without name, with invalid attributes, without attribute unless its type is `Log`, or of a type
-/// that no variable has.
+/// Reads a field. An error for one without name, with invalid attributes, without attribute unless its type is `Log`,
+/// or of a type that no variable has.
 pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
     let Some(ident) = &field.ident else {
         return Err(Error::new(field.span(), "expected a field with a name"));
@@ -137,29 +133,21 @@ fn base(field_type: &Type) -> Result<(Base, Vec<&Expr>)> {
         "bool" => Base::Boolean,
         "String" => Base::String,
         "Vec" if is_bytes(field_type) => Base::Typed("binary"),
-        other => {
+        "f32" => Base::Typed("float32"),
+        "i8" => Base::Typed("int8"),
+        "u8" => Base::Typed("uint8"),
+        "i16" => Base::Typed("int16"),
+        "u16" => Base::Typed("uint16"),
+        "u32" => Base::Typed("uint32"),
+        "i64" => Base::Typed("int64"),
+        "u64" => Base::Typed("uint64"),
+        _ => {
             let message = "no variable has this type: expected f64, i32, bool, String; for FMI 3.0 only \
                            f32, i8, u8, i16, u16, u32, i64, u64, Vec<u8>; an array of them, or #[fmu(skip)] for a field that is no variable";
-            let constructor = fmi3_constructor(other);
-            Base::Typed(constructor.ok_or_else(|| Error::new(field_type.span(), message))?)
+            return Err(Error::new(field_type.span(), message));
         }
     };
     Ok((base, Vec::new()))
-}
-
-/// The constructor of variables of the number type `name`; `None` if it is no type that only FMI 3.0 has.
-fn fmi3_constructor(name: &str) -> Option<&'static str> {
-    const TYPES: [(&str, &str); 8] = [
-        ("f32", "float32"),
-        ("i8", "int8"),
-        ("u8", "uint8"),
-        ("i16", "int16"),
-        ("u16", "uint16"),
-        ("u32", "uint32"),
-        ("i64", "int64"),
-        ("u64", "uint64"),
-    ];
-    TYPES.iter().find(|(native, _)| *native == name).map(|(_, constructor)| *constructor)
 }
 
 /// Whether the type, a `Vec`, is `Vec<u8>`.

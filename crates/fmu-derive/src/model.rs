@@ -12,20 +12,16 @@ const KNOWN: [&str; 5] = ["event_indicators", "start_time", "stop_time", "step_s
 /// The arguments of `#[fmu::model(...)]`.
 pub(crate) struct Arguments(Vec<(Ident, Expr)>);
 
-struct Argument(Ident, Expr);
-
-impl Parse for Argument {
-    fn parse(input: ParseStream<'_>) -> Result<Self> {
-        let name: Ident = input.parse()?;
-        input.parse::<Token![=]>()?;
-        Ok(Self(name, input.parse()?))
-    }
+fn argument(input: ParseStream<'_>) -> Result<(Ident, Expr)> {
+    let name = input.parse()?;
+    input.parse::<Token![=]>()?;
+    Ok((name, input.parse()?))
 }
 
 impl Parse for Arguments {
     fn parse(input: ParseStream<'_>) -> Result<Self> {
         let mut all: Vec<(Ident, Expr)> = Vec::new();
-        for Argument(name, value) in Punctuated::<Argument, Token![,]>::parse_terminated(input)? {
+        for (name, value) in Punctuated::<_, Token![,]>::parse_terminated_with(input, argument)? {
             if !KNOWN.iter().any(|known| name == known) {
                 let message = format!("unknown argument, expected one of: {}", KNOWN.join(", "));
                 return Err(Error::new(name.span(), message));
