@@ -24,7 +24,6 @@ use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
 use crate::validity::MeasurementCheck;
 use aso_controller::Design;
-use aso_controller::design::Refusal;
 
 /// The part of the range of an actuator by which a free command passes a limit, and the part of a command by which a
 /// loss passes its fraction, before that is an event: no event indicator is zero after an event, and rounding causes no
@@ -187,12 +186,7 @@ impl Model for AsoController {
         let detection = self.design.detection.as_ref();
         let refused = detection.and_then(|detection| detection.refused_number(&self.design));
         let of_laws = self.design.refused_filter().or_else(|| self.design.refused_sliding_mode());
-        match of_laws.or(refused) {
-            Some(Refusal { name, value, rule }) => {
-                Err(Failure::Error(format!("{name} = {value}, expected {rule}")))
-            }
-            None => Ok(()),
-        }
+        of_laws.or(refused).map_or(Ok(()), |refusal| Err(Failure::Error(refusal.to_string())))
     }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {

@@ -13,7 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::number::Number;
-use aso_controller::Design;
+use aso_controller::design::{self, Design};
 
 /// One fault that is a loss of effectiveness.
 #[derive(Clone, Serialize, Deserialize)]
@@ -33,21 +33,14 @@ pub(crate) struct Loss {
 impl Loss {
     /// The losses of `design`, in the order of its faults.
     pub(crate) fn all(design: &Design) -> Vec<Self> {
-        let mut all = Vec::new();
-        for (fault, signal) in design.faults.iter().enumerate() {
-            let (Some(name), Some(least_command)) = (&signal.loss_of, signal.least_command) else {
-                continue;
-            };
-            let actuator = design.actuators.iter().position(|actuator| actuator.name == *name);
-            all.extend(actuator.map(|actuator| Self {
-                fault,
-                actuator,
-                least_command,
-                estimate: 0.0,
-                slope: 0.0,
-            }));
-        }
-        all
+        let loss = |design::Loss { fault, actuator, least_command }| Self {
+            fault,
+            actuator,
+            least_command,
+            estimate: 0.0,
+            slope: 0.0,
+        };
+        design.losses().into_iter().map(loss).collect()
     }
 
     /// The estimate of its fault: an element of `f_hat`, or, if `f_hat` is empty (no direct term), the element of `z`

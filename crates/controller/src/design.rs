@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 use crate::matrix::Matrix;
 pub use checks::Refusal;
 use detection::DetectionDesign;
-pub use error::DesignError;
+pub use error::{DesignError, Reason};
 pub use reconfiguration::{Combination, Fallback, GainSet, Reconfiguration};
 use schedule::Schedule;
-pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Measurement, Signal};
+pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Loss, Measurement, Signal};
 
 /// The matrices of a design or of a point of its schedule with their names: the eight required ones, then the optional
 /// ones of the listed fields that are stated.
@@ -53,14 +53,11 @@ pub struct Design {
     #[serde(default)]
     pub monitor: bool,
     /// The sample time of a sampled controller in s; its matrices describe the sampled plant.
-    #[serde(default)]
     pub sample_time: Option<f64>,
     /// The estimator of a sampled controller.
-    #[serde(default)]
     pub estimator: Option<Estimator>,
     /// The diagonal of W, p numbers, in 1/s; in a sampled controller without unit. Without it measurements are not
     /// filtered.
-    #[serde(default)]
     pub filter: Option<Vec<f64>>,
     /// A, n x n.
     #[serde(rename = "A")]
@@ -72,19 +69,18 @@ pub struct Design {
     #[serde(rename = "C")]
     pub c: Matrix,
     /// D, p x m, of y = C x + D u, stated together with a filter; without it there is none.
-    #[serde(rename = "D", default)]
+    #[serde(rename = "D")]
     pub d: Option<Matrix>,
     /// F_a, n x q.
     #[serde(rename = "F_a")]
     pub f_a: Matrix,
     /// A_f, q x q; without it the fault is constant.
-    #[serde(rename = "A_f", default)]
+    #[serde(rename = "A_f")]
     pub a_f: Option<Matrix>,
     /// P_f, q x p: the direct term of the fault estimate; without it there is none.
-    #[serde(rename = "P_f", default)]
+    #[serde(rename = "P_f")]
     pub p_f: Option<Matrix>,
     /// The sliding-mode law that estimates the faults, if it is one.
-    #[serde(default)]
     pub sliding_mode: Option<SlidingMode>,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
@@ -99,23 +95,22 @@ pub struct Design {
     #[serde(rename = "L_f")]
     pub l_f: Matrix,
     /// H, t x p, of the integral action x_i' = r - H y + ...; see `fmu-controller/src/equations.rs`.
-    #[serde(rename = "H", default)]
+    #[serde(rename = "H")]
     pub h: Option<Matrix>,
     /// K_i, m x t: the gain of the integral action, stated together with H.
-    #[serde(rename = "K_i", default)]
+    #[serde(rename = "K_i")]
     pub k_i: Option<Matrix>,
     /// F_i, t x q: H times the estimated sensor faults.
-    #[serde(rename = "F_i", default)]
+    #[serde(rename = "F_i")]
     pub f_i: Option<Matrix>,
     /// L_w, t x m: the back-calculation of commands at a limit.
-    #[serde(rename = "L_w", default)]
+    #[serde(rename = "L_w")]
     pub l_w: Option<Matrix>,
     /// N_r, m x t: the feedforward of the references.
-    #[serde(rename = "N_r", default)]
+    #[serde(rename = "N_r")]
     pub n_r: Option<Matrix>,
     /// The decay of u_t, which keeps the commands where they are when the law changes: u_t' = -transfer u_t, in 1/s; in
     /// a sampled controller the fraction that decays in one sample. Without it the commands jump.
-    #[serde(default)]
     pub transfer: Option<f64>,
     /// The n states.
     pub states: Vec<Signal>,
@@ -135,15 +130,12 @@ pub struct Design {
     #[serde(default)]
     pub combinations: Vec<Combination>,
     /// The feedback that does not need to know which actuator has failed.
-    #[serde(default)]
     pub fallback: Option<Fallback>,
     /// The experiment that importers run by default.
     pub experiment: Defaults,
     /// Matrices and operating points by a scheduling variable, in place of those above.
-    #[serde(default)]
     pub schedule: Option<Schedule>,
     /// The detection of faults, if there is one.
-    #[serde(default)]
     pub detection: Option<DetectionDesign>,
 }
 
@@ -174,7 +166,6 @@ pub struct Defaults {
     /// End of the experiment.
     pub stop_time: f64,
     /// The communication step. Without it, it is the sample time of a sampled controller; a continuous one states it.
-    #[serde(default)]
     pub step_size: Option<f64>,
 }
 
@@ -186,27 +177,29 @@ impl Design {
     /// [`DesignError`] if the text is no TOML, or for the first entry that is missing, unknown, out of its range, or
     /// does not fit the others.
     pub fn parse(text: &str, path: &str) -> Result<Self, DesignError> {
-        let malformed = |error: toml::de::Error| {
-            let message = error.to_string().trim_end().to_owned();
-            DesignError::Malformed { path: path.to_owned(), message }
-        };
-        let mut design: Self = toml::from_str(text).map_err(malformed)?;
+        let refused = |reason| DesignError { path: path.to_owned(), reason };
+        let mut design: Self = toml::from_str(text)
+            .map_err(|error| refused(Reason::Malformed(error.to_string().trim_end().to_owned())))?;
         design.complete_operating_point();
-        design.check(path)?;
+        design.check().map_err(refused)?;
         design.locate_reconfigurations();
         Ok(design)
     }
 
+    /// The values of the operating point: states, commands, measurements, references.
+    pub(crate) fn operating_mut(&mut self) -> impl Iterator<Item = &mut Option<f64>> {
+        let Self { states, actuators, measurements, references, .. } = self;
+        let commands = actuators.iter_mut().map(|signal| &mut signal.operating);
+        let measured = measurements.iter_mut().map(|signal| &mut signal.operating);
+        let [states, references] =
+            [states, references].map(|all| all.iter_mut().map(|signal| &mut signal.operating));
+        states.chain(commands).chain(measured).chain(references)
+    }
+
     /// Sets the missing values of the operating point to 0 if the file states at least one value.
     fn complete_operating_point(&mut self) {
-        let signals = self.states.iter_mut().chain(&mut self.references);
-        let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
-        values.extend(self.measurements.iter_mut().map(|measurement| &mut measurement.operating));
-        values.extend(self.actuators.iter_mut().map(|actuator| &mut actuator.operating));
-        if values.iter().any(|value| value.is_some()) {
-            for value in values {
-                *value = value.or(Some(0.0));
-            }
+        if self.operating_mut().any(|value| value.is_some()) {
+            self.operating_mut().for_each(|value| *value = value.or(Some(0.0)));
         }
     }
 
@@ -223,6 +216,17 @@ impl Design {
             let gone = positions.filter(|(_, actuator)| combination.gone.contains(&actuator.name));
             combination.mask = gone.fold(0, |mask, (j, _)| mask | 1 << j);
         }
+    }
+
+    /// The faults that are losses of effectiveness, in the order of the faults.
+    #[must_use]
+    pub fn losses(&self) -> Vec<Loss> {
+        let loss = |(fault, signal): (usize, &Fault)| {
+            let name = signal.loss_of.as_ref()?;
+            let actuator = self.actuators.iter().position(|actuator| actuator.name == *name)?;
+            Some(Loss { fault, actuator, least_command: signal.least_command? })
+        };
+        self.faults.iter().enumerate().filter_map(loss).collect()
     }
 
     /// The gains without the actuators whose bits are set in `gone`, bit j for actuator j; `None` if the design has no

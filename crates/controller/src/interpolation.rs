@@ -79,18 +79,9 @@ impl Schedule {
                 *value = mix([*from, *to]);
             }
         }
-        let point = |values: [&[f64]; 2], k: usize| Some(mix(values.map(|values| values[k])));
-        for (k, state) in design.states.iter_mut().enumerate() {
-            state.operating = point([&from.x_op, &to.x_op], k);
-        }
-        for (k, actuator) in design.actuators.iter_mut().enumerate() {
-            actuator.operating = point([&from.u_op, &to.u_op], k);
-        }
-        for (k, signal) in design.measurements.iter_mut().enumerate() {
-            signal.operating = point([&from.y_op, &to.y_op], k);
-        }
-        for (k, signal) in design.references.iter_mut().enumerate() {
-            signal.operating = point([&from.r_op, &to.r_op], k);
+        let ends = from.operating().zip(to.operating());
+        for (place, (from, to)) in design.operating_mut().zip(ends) {
+            *place = Some(mix([*from, *to]));
         }
     }
 }

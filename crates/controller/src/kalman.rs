@@ -47,7 +47,6 @@ pub struct CarriedFault {
     /// Its name.
     pub name: String,
     /// Its unit, as FMI writes it.
-    #[serde(default)]
     pub unit: Option<String>,
     /// What it is, for a reader.
     #[serde(default)]
@@ -56,7 +55,6 @@ pub struct CarriedFault {
     pub enters: Entry,
     /// The position of the rate of a ramp among the states of the fault model; none for a constant fault. The first of
     /// these states are the faults, in their order.
-    #[serde(default)]
     pub rate: Option<usize>,
 }
 

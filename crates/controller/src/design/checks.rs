@@ -1,6 +1,6 @@
 //! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
-use super::{Defaults, Design, DesignError, Estimator, Fault, Measurement, SlidingMode};
+use super::{Defaults, Design, Estimator, Fault, Measurement, Reason, SlidingMode};
 use crate::channel::channel;
 use crate::matrix::Matrix;
 
@@ -10,7 +10,8 @@ const COMMANDS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 const MOST_SAMPLES: f64 = 1e6;
 
 /// A number that is out of its range.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} = {value}, expected {rule}")]
 pub struct Refusal {
     /// The entry.
     pub name: String,
@@ -34,22 +35,17 @@ impl Refusal {
 
 impl Design {
     /// Checks combinations of entries, names that refer to others, shapes, the schedule and ranges, in this order.
-    pub(super) fn check(&self, path: &str) -> Result<(), DesignError> {
-        if let Some(what) = self.contradiction() {
-            return Err(DesignError::Entry { path: path.to_owned(), what });
-        }
-        self.check_shapes(path)?;
-        self.check_schedule(path)?;
+    pub(super) fn check(&self) -> Result<(), Reason> {
+        let entry = |contradiction| Err(Reason::Entry(contradiction));
+        self.contradiction().map_or(Ok(()), entry)?;
+        self.check_shapes()?;
+        self.contradiction_of_schedule().map_or(Ok(()), entry)?;
         let refused = self.refused_number().or_else(|| self.refused_signal());
-        match refused.or_else(|| self.refused_time()) {
-            Some(Refusal { name: what, value, rule }) => {
-                Err(DesignError::Value { path: path.to_owned(), what, value, rule })
-            }
-            None => Ok(()),
-        }
+        let refused = refused.or_else(|| self.refused_time());
+        refused.map_or(Ok(()), |refusal| Err(Reason::Value(refusal)))
     }
 
-    fn check_shapes(&self, path: &str) -> Result<(), DesignError> {
+    fn check_shapes(&self) -> Result<(), Reason> {
         let n = ("states", self.states.len());
         let m = ("actuators", self.actuators.len());
         let p = ("measurements", self.measurements.len());
@@ -74,8 +70,7 @@ impl Design {
         for (what, matrix) in self.matrices() {
             let (rows, columns) = expected(what);
             if (matrix.rows, matrix.columns) != (rows.1, columns.1) {
-                return Err(DesignError::Shape {
-                    path: path.to_owned(),
+                return Err(Reason::Shape {
                     what,
                     actual: format!("{} x {}", matrix.rows, matrix.columns),
                     expected: format!("{} x {}", rows.1, columns.1),
@@ -84,8 +79,7 @@ impl Design {
             }
         }
         match &self.filter {
-            Some(filter) if filter.len() != p.1 => Err(DesignError::Shape {
-                path: path.to_owned(),
+            Some(filter) if filter.len() != p.1 => Err(Reason::Shape {
                 what: "filter",
                 actual: format!("{} numbers", filter.len()),
                 expected: format!("{} numbers", p.1),
@@ -95,28 +89,27 @@ impl Design {
         }
     }
 
-    /// Checks the grid of a schedule, and the shapes and numbers at its points.
-    fn check_schedule(&self, path: &str) -> Result<(), DesignError> {
-        let Some(schedule) = &self.schedule else { return Ok(()) };
-        let refuse = |what: String| Err(DesignError::Entry { path: path.to_owned(), what });
+    /// Describes what is wrong in the grid of a schedule, or in the shapes and numbers at its points.
+    fn contradiction_of_schedule(&self) -> Option<String> {
+        let schedule = self.schedule.as_ref()?;
         if self.sliding_mode.is_some() {
             let text = "schedule and sliding_mode are stated, expected one of them";
-            return refuse(text.to_owned());
+            return Some(text.to_owned());
         }
         // Its equations are integrated: no function of a whole step checks measurements or computes residuals.
         if self.sample_time.is_none() && (self.checks_measurements() || self.detection.is_some()) {
             let text = "schedule is stated together with detection, or with range or longest_hold of a measurement; \
                         expected sample_time, too";
-            return refuse(text.to_owned());
+            return Some(text.to_owned());
         }
         if schedule.points.len() < 2 {
-            return refuse("schedule: expected at least two points".to_owned());
+            return Some("schedule: expected at least two points".to_owned());
         }
         let mut last = f64::NEG_INFINITY;
         for (at, point) in schedule.points.iter().enumerate() {
             let place = format!("point {} of the schedule", at + 1);
             if !(point.at > last && point.at.is_finite()) {
-                return refuse(format!(
+                return Some(format!(
                     "{place}: at = {}, expected a finite number above {last}",
                     point.at
                 ));
@@ -131,7 +124,7 @@ impl Design {
             let stated = names(&mut point.matrices().map(|(name, _)| name));
             let expected = names(&mut self.matrices().map(|(name, _)| name));
             if stated != expected {
-                return refuse(format!(
+                return Some(format!(
                     "{place}: of P_f, K_i, L_w, N_r it states [{stated}], expected [{expected}] as above"
                 ));
             }
@@ -140,14 +133,14 @@ impl Design {
                     continue;
                 };
                 if (matrix.rows, matrix.columns) != (expected.rows, expected.columns) {
-                    return refuse(format!(
+                    return Some(format!(
                         "{place}: {name} is {} x {}, expected {} x {}",
                         matrix.rows, matrix.columns, expected.rows, expected.columns
                     ));
                 }
                 if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
                     let name = matrix.element(name, k);
-                    return refuse(format!("{place}: {name} is not a finite number"));
+                    return Some(format!("{place}: {name} is not a finite number"));
                 }
             }
             let lists = [
@@ -158,27 +151,25 @@ impl Design {
             ];
             for (name, values, expected) in lists {
                 if values.len() != expected || values.iter().any(|value| !value.is_finite()) {
-                    return refuse(format!("{place}: {name}: expected {expected} finite numbers"));
+                    return Some(format!("{place}: {name}: expected {expected} finite numbers"));
                 }
             }
-            for (signal, value) in self.measurements.iter().zip(&point.y_op) {
-                if signal.range.is_some_and(|[low, high]| *value < low || *value > high) {
-                    let name = &signal.name;
-                    return refuse(format!(
-                        "{place}: y_op of {name} is {value}, outside of its range"
-                    ));
-                }
-            }
-            for (actuator, value) in self.actuators.iter().zip(&point.u_op) {
-                if actuator.limits.is_some_and(|[low, high]| *value < low || *value > high) {
-                    let name = &actuator.name;
-                    return refuse(format!(
-                        "{place}: u_op of {name} is {value}, outside of its limits"
+            let measured = self.measurements.iter().zip(&point.y_op);
+            let measured =
+                measured.map(|(signal, value)| ("y_op", &signal.name, signal.range, value));
+            let commands = self.actuators.iter().zip(&point.u_op);
+            let commands =
+                commands.map(|(signal, value)| ("u_op", &signal.name, signal.limits, value));
+            for (list, name, limits, value) in measured.chain(commands) {
+                if limits.is_some_and(|[low, high]| *value < low || *value > high) {
+                    let limits = if list == "y_op" { "range" } else { "limits" };
+                    return Some(format!(
+                        "{place}: {list} of {name} is {value}, outside of its {limits}"
                     ));
                 }
             }
         }
-        Ok(())
+        None
     }
 
     /// Describes the first entry that is missing, not allowed, or without its counterpart.

@@ -19,7 +19,6 @@ use crate::matrix::Matrix;
 pub struct DetectionDesign {
     /// The interval in s between two tests of a continuous controller; a sampled one states none, and tests in each
     /// sample.
-    #[serde(default)]
     pub sample_time: Option<f64>,
     /// Time in s after the start of the run from which the residuals are tested.
     pub from: f64,
@@ -58,10 +57,8 @@ pub struct TestDesign {
     /// How many rows of r it takes.
     pub residuals: usize,
     /// kappa of the cumulative sums.
-    #[serde(default)]
     pub drift: Option<f64>,
     /// The number of samples of a window.
-    #[serde(default)]
     pub window: Option<u32>,
     /// The value of the statistic above which there is an alarm.
     pub threshold: f64,

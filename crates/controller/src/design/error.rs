@@ -1,22 +1,27 @@
 //! Errors of design files.
 
-/// Why a design file cannot be used; `path` is that of the file.
+use super::Refusal;
+
+/// A design file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {reason}")]
+pub struct DesignError {
+    /// The file.
+    pub path: String,
+    /// Why it cannot be used.
+    pub reason: Reason,
+}
+
+/// Why a design file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum DesignError {
-    /// The text is no TOML, an entry is unknown or missing, or a value has the wrong type.
-    #[error("{path}: {message}")]
-    Malformed {
-        /// The file.
-        path: String,
-        /// The reason, with the line.
-        message: String,
-    },
+pub enum Reason {
+    /// The text is no TOML, an entry is unknown or missing, or a value has the wrong type; with the line.
+    #[error("{0}")]
+    Malformed(String),
     /// A matrix has a wrong number of rows or columns.
-    #[error("{path}: {what} is {actual}, expected {expected} ({meaning})")]
+    #[error("{what} is {actual}, expected {expected} ({meaning})")]
     Shape {
-        /// The file.
-        path: String,
         /// The matrix or the list.
         what: &'static str,
         /// Its shape.
@@ -27,23 +32,9 @@ pub enum DesignError {
         meaning: String,
     },
     /// A number is out of its range.
-    #[error("{path}: {what} = {value}, expected {rule}")]
-    Value {
-        /// The file.
-        path: String,
-        /// The entry.
-        what: String,
-        /// The number.
-        value: f64,
-        /// The range.
-        rule: &'static str,
-    },
+    #[error("{0}")]
+    Value(Refusal),
     /// Entries do not fit together.
-    #[error("{path}: {what}")]
-    Entry {
-        /// The file.
-        path: String,
-        /// The contradiction.
-        what: String,
-    },
+    #[error("{0}")]
+    Entry(String),
 }

@@ -16,13 +16,13 @@ pub struct Reconfiguration {
     /// The command at which it is stuck.
     pub stuck_at: f64,
     /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
-    #[serde(rename = "K_x", default)]
+    #[serde(rename = "K_x")]
     pub k_x: Option<Matrix>,
     /// K_f, m x q.
-    #[serde(rename = "K_f", default)]
+    #[serde(rename = "K_f")]
     pub k_f: Option<Matrix>,
     /// K_s, m numbers.
-    #[serde(rename = "K_s", default)]
+    #[serde(rename = "K_s")]
     pub k_s: Option<Vec<f64>>,
     /// The states of the fault model that restart at 0 when the actuator fails or comes back.
     #[serde(default)]
@@ -32,10 +32,8 @@ pub struct Reconfiguration {
     pub restarted: Vec<usize>,
     /// The actuator counts as gone after its estimated loss of effectiveness has been above `loss` for `time` s.
     /// Without both, only an input of the FMU reports it.
-    #[serde(default)]
     pub loss: Option<f64>,
     /// See `loss`; in s.
-    #[serde(default)]
     pub time: Option<f64>,
 }
 
@@ -67,7 +65,7 @@ pub struct Fallback {
     #[serde(rename = "K_x")]
     pub k_x: Matrix,
     /// K_f, m x q; without it the estimated faults are not compensated.
-    #[serde(rename = "K_f", default)]
+    #[serde(rename = "K_f")]
     pub k_f: Option<Matrix>,
 }
 

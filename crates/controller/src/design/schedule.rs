@@ -11,7 +11,6 @@ pub struct Schedule {
     /// The name of the scheduling variable: a measurement, or an input of its own.
     pub variable: String,
     /// The unit of the input.
-    #[serde(default)]
     pub unit: Option<String>,
     /// What the input is, for a reader.
     #[serde(default)]
@@ -57,16 +56,16 @@ pub struct Point {
     #[serde(rename = "L_f")]
     pub l_f: Matrix,
     /// P_f at this value, if the design states one.
-    #[serde(rename = "P_f", default)]
+    #[serde(rename = "P_f")]
     pub p_f: Option<Matrix>,
     /// K_i at this value, if the design states one.
-    #[serde(rename = "K_i", default)]
+    #[serde(rename = "K_i")]
     pub k_i: Option<Matrix>,
     /// L_w at this value, if the design states one.
-    #[serde(rename = "L_w", default)]
+    #[serde(rename = "L_w")]
     pub l_w: Option<Matrix>,
     /// N_r at this value, if the design states one.
-    #[serde(rename = "N_r", default)]
+    #[serde(rename = "N_r")]
     pub n_r: Option<Matrix>,
     /// The references at the operating point; empty without references.
     #[serde(default)]
@@ -74,6 +73,11 @@ pub struct Point {
 }
 
 impl Point {
+    /// The values of the operating point: states, commands, measurements, references.
+    pub(crate) fn operating(&self) -> impl Iterator<Item = &f64> {
+        [&self.x_op, &self.u_op, &self.y_op, &self.r_op].into_iter().flatten()
+    }
+
     /// The matrices, in the order of [`super::Design::scheduled_mut`].
     pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         super::named_matrices! { self: "P_f" p_f, "K_i" k_i, "L_w" l_w, "N_r" n_r }

@@ -11,6 +11,17 @@ pub struct Label<'a> {
     pub meaning: &'a str,
 }
 
+/// A fault that is a loss of effectiveness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loss {
+    /// The position of the fault.
+    pub fault: usize,
+    /// The position of the actuator.
+    pub actuator: usize,
+    /// u_e, the smallest command from which the loss can be estimated.
+    pub least_command: f64,
+}
+
 /// Declares signals: each has a name, a unit and a description, and then its own entries.
 macro_rules! signals {
     ($($(#[$about:meta])* $signal:ident { $($(#[$text:meta])* $entry:ident: $kind:ty,)* })*) => {$(
