@@ -16,6 +16,8 @@
 mod decision;
 mod tests_of_residuals;
 
+use std::ops::{AddAssign as _, SubAssign as _};
+
 use control::Error;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -271,17 +273,13 @@ fn system(
         column.rows_mut(order, k).copy_from(&(&b_u * &u));
         column.rows_mut(order + k, rows).copy_from(&(&d_u * &u));
         if (order..order + p).contains(&at) {
-            let mut part = column.rows_mut(order, k);
-            part += b_y.column(at - order);
-            let mut part = column.rows_mut(order + k, rows);
-            part += d_y.column(at - order);
+            column.rows_mut(order, k).add_assign(b_y.column(at - order));
+            column.rows_mut(order + k, rows).add_assign(d_y.column(at - order));
         }
         if let Some(d) = &feedthrough {
             let fed = d * &u;
-            let mut part = column.rows_mut(order, k);
-            part -= &b_y * &fed;
-            let mut part = column.rows_mut(order + k, rows);
-            part -= &d_y * &fed;
+            column.rows_mut(order, k).sub_assign(&b_y * &fed);
+            column.rows_mut(order + k, rows).sub_assign(&d_y * &fed);
         }
         match at.checked_sub(order) {
             None => state.set_column(at, &column),

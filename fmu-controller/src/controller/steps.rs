@@ -167,11 +167,8 @@ impl AsoController {
         }
     }
 
-    /// Makes a step of a continuous controller without a schedule.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if too many samples of the detection are due, or if the observer cannot be stepped.
+    /// Makes a step of a continuous controller without a schedule. An error if too many samples of the detection are
+    /// due, or if the observer cannot be stepped.
     pub(super) fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
         if let (Some(detector), Some(detection)) = (&self.detector, &self.design.detection)
             && detector.has_too_many_samples(detection, step.end())
