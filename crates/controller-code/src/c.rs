@@ -16,6 +16,7 @@ use super::fields::Fields;
 use super::rounding::RoundingBound;
 use super::summary::Vocabulary;
 use super::symbols::Kind;
+use super::text::Lines;
 use super::{Precision, Request};
 
 /// The largest number of characters in a line of a table.
@@ -119,7 +120,7 @@ impl Source<'_> {
     }
 
     /// Adds a table: a vector, a matrix, or a matrix for each point of a schedule or set of gains.
-    fn table(&self, lines: &mut Vec<String>, table: &Constants) {
+    fn table(&self, lines: &mut Lines, table: &Constants) {
         let Constants { name, meaning, rows, columns, layers, values } = table;
         if !meaning.is_empty() {
             lines.extend([String::new(), format!("/* The {meaning}. */")]);
@@ -132,54 +133,46 @@ impl Source<'_> {
             None => format!("[{rows}]"),
         };
         lines.push(format!("static const {} {name}{sizes} =", self.real));
-        lines.push("{".to_owned());
+        lines.push("{");
         let mut indent = "    ".to_owned();
         if layers.is_some() {
             indent.push_str("    ");
             for rows in values.chunks(count) {
-                lines.push("    {".to_owned());
+                lines.push("    {");
                 self.rows(lines, rows, &indent);
-                lines.push("    },".to_owned());
+                lines.push("    },");
             }
-            end_list(lines);
+            lines.end_list();
         } else if columns.is_some() {
             self.rows(lines, values, &indent);
         } else {
             for row in values {
-                lines.extend(self.numbers(row, &indent));
+                lines.extend(self.numbers(row, &indent).0);
             }
         }
-        lines.push("};".to_owned());
+        lines.push("};");
     }
 
     /// Lines of numbers, without a comma after the last one.
-    fn numbers(&self, values: &[f64], indent: &str) -> Vec<String> {
-        let mut lines = wrapped(values.iter().map(|value| self.literal(*value)), indent);
-        end_list(&mut lines);
+    fn numbers(&self, values: &[f64], indent: &str) -> Lines {
+        let mut lines = Lines(wrapped(values.iter().map(|value| self.literal(*value)), indent));
+        lines.end_list();
         lines
     }
 
     /// Adds the rows of a matrix, without a comma after the last one.
-    fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], indent: &str) {
+    fn rows(&self, lines: &mut Lines, rows: &[Vec<f64>], indent: &str) {
         for row in rows {
-            match self.numbers(row, &format!("{indent}    ")).as_slice() {
+            match self.numbers(row, &format!("{indent}    ")).0.as_slice() {
                 [only] => lines.push(format!("{indent}{{{}}},", only.trim())),
                 several => {
                     lines.push(format!("{indent}{{"));
-                    lines.extend_from_slice(several);
+                    lines.extend(several);
                     lines.push(format!("{indent}}},"));
                 }
             }
         }
-        end_list(lines);
-    }
-}
-
-/// Removes the comma after the last entry of a list.
-fn end_list(lines: &mut [String]) {
-    if let Some(last) = lines.last_mut() {
-        let trimmed = last.trim_end_matches(',').len();
-        last.truncate(trimmed);
+        lines.end_list();
     }
 }
 

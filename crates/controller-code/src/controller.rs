@@ -1,13 +1,13 @@
 //! The sampled controller as its design file states it.
 
 use aso_controller::Design;
-use aso_controller::design::{Actuator, Estimator, Fault, SlidingMode};
+use aso_controller::design::{Estimator, Loss, SlidingMode};
 use nalgebra::DMatrix;
 
 use super::Precision;
 use super::detection::Detection;
-use super::parts::{Loss, Signal, dense, first_at};
-use super::reconfiguration::{Plant, Reconfiguration};
+use super::parts::{Signal, dense, first_at};
+use super::reconfiguration::Reconfiguration;
 use super::schedule::Schedule;
 use super::symbols::Matrix;
 use crate::Error;
@@ -67,13 +67,20 @@ impl Controller {
     /// The controller of a design file. The error says why there is no code: the design is continuous, a time is beyond
     /// 2^32 samples, or tests of both methods are stated.
     pub(super) fn of(file: Design) -> Result<Self, Error> {
+        let (Some(sample_time), Some(estimator)) = (file.sample_time, file.estimator) else {
+            let text = "there is code for sampled designs only, and this one is continuous; state `sample_time` in \
+                        the plant file";
+            return Err(Error(text.to_owned()));
+        };
+        let losses = file.losses();
+        let reconfiguration = Reconfiguration::of(&file, &losses, sample_time);
         // Each entry of a design file has code, or the reason why it needs none.
         let Design {
             description,
             t_on,
             monitor,
-            sample_time,
-            estimator,
+            sample_time: _,
+            estimator: _,
             filter,
             a,
             b,
@@ -98,39 +105,24 @@ impl Controller {
             measurements,
             faults,
             references,
-            reconfigurations,
-            combinations,
-            fallback,
+            reconfigurations: _,
+            combinations: _,
+            fallback: _,
             // For importers of the FMU.
             experiment: _,
             schedule,
             detection,
         } = file;
-        let (Some(sample_time), Some(estimator)) = (sample_time, estimator) else {
-            return Err(continuous());
-        };
-        let first_compensated = first_compensated(t_on, sample_time)?;
+        let first_compensated = first_at("t_on", t_on, sample_time)?;
         let detection =
             detection.map(|detection| Detection::of(detection, sample_time)).transpose()?;
         let schedule = schedule.map(|schedule| Schedule::of(schedule, &measurements));
-        let (k_x, k_f) = (dense(&k_x), dense(&k_f));
-        let losses = losses(&faults, &actuators);
-        let plant = Plant {
-            sample_time,
-            actuators: &actuators,
-            faults: &faults,
-            losses: &losses,
-            k_x: &k_x,
-            k_f: &k_f,
-        };
-        let reconfiguration =
-            Reconfiguration::of(&reconfigurations, &combinations, fallback.as_ref(), &plant)?;
         let stated = |matrix: Option<aso_controller::Matrix>| matrix.as_ref().map(dense);
         let q = faults.len();
         let signals =
             |all: Vec<aso_controller::design::Signal>| all.into_iter().map(Signal::from).collect();
         Ok(Self {
-            reconfiguration,
+            reconfiguration: reconfiguration?,
             schedule,
             detection,
             losses,
@@ -148,8 +140,8 @@ impl Controller {
             f_a: dense(&f_a),
             constant_faults: a_f.is_none(),
             a_f: stated(a_f).unwrap_or_else(|| DMatrix::identity(q, q)),
-            k_x,
-            k_f,
+            k_x: dense(&k_x),
+            k_f: dense(&k_f),
             l_x: dense(&l_x),
             l_f: dense(&l_f),
             p_f: stated(p_f),
@@ -285,29 +277,4 @@ fn too_large(name: &str, value: f64) -> Error {
     Error(format!(
         "{name} has the number {value:?}; `float` code has constants up to {LARGEST_SINGLE:?} only"
     ))
-}
-
-fn continuous() -> Error {
-    let text = "there is code for sampled designs only, and this one is continuous; state `sample_time` in the plant file";
-    Error(text.to_owned())
-}
-
-/// The number of the first sample at which faults are compensated; an error if it needs more than 32 bits.
-fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
-    first_at(t_on, sample_time).ok_or_else(|| {
-        Error(format!(
-            "t_on = {t_on} s is more than 2^32 samples of {sample_time} s after the start; a counter of \
-             the code has 32 bits"
-        ))
-    })
-}
-
-/// The faults that are losses of effectiveness, with their actuators.
-fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
-    let loss = |(fault, entry): (usize, &Fault)| {
-        let name = entry.loss_of.as_ref()?;
-        let actuator = actuators.iter().position(|actuator| actuator.name == *name)?;
-        Some(Loss { fault, actuator, least_command: entry.least_command? })
-    };
-    faults.iter().enumerate().filter_map(loss).collect()
 }

@@ -54,13 +54,7 @@ impl Detection {
     /// The detection of a design file with this sample time in s; an error if `from` is beyond 2^32 samples, or if the
     /// tests have both methods.
     pub(super) fn of(file: DetectionDesign, sample_time: f64) -> Result<Self, Error> {
-        let first_tested = first_at(file.from, sample_time).ok_or_else(|| {
-            Error(format!(
-                "detection.from = {} s is more than 2^32 samples of {sample_time} s after the start; a \
-                 counter of the code has 32 bits",
-                file.from
-            ))
-        })?;
+        let first_tested = first_at("detection.from", file.from, sample_time)?;
         let cusums = file.tests.iter().filter(|test| test.drift.is_some()).count();
         let method = match file.tests.len() - cusums {
             0 => Method::Cusum,

@@ -3,6 +3,8 @@
 use aso_controller::design::{Actuator, Fault, Measurement};
 use nalgebra::DMatrix;
 
+use crate::Error;
+
 /// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
 pub(super) struct Signal {
     pub(super) name: String,
@@ -54,22 +56,14 @@ impl From<Fault> for Signal {
     }
 }
 
-/// A loss of effectiveness: the positions of its fault and of its actuator.
-pub(super) struct Loss {
-    pub(super) fault: usize,
-    pub(super) actuator: usize,
-    /// `u_e`.
-    pub(super) least_command: f64,
-}
-
 /// A matrix of the design file for linear algebra.
 pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
     DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
 }
 
-/// The number of the first sample at or after `start`, both in s, with the tolerance of the FMU; sample 0 is at time 0.
-/// `None` if the number does not fit into 32 bits.
-pub(super) fn first_at(start: f64, period: f64) -> Option<u32> {
+/// The number of the first sample at or after the entry called `name`, `start` in s, with the tolerance of the FMU;
+/// sample 0 is at time 0. An error if the number needs more than 32 bits.
+pub(super) fn first_at(name: &str, start: f64, period: f64) -> Result<u32, Error> {
     let is_reached = |sample: f64| {
         let time = sample * period;
         time >= start - 8.0 * f64::EPSILON * time
@@ -78,8 +72,14 @@ pub(super) fn first_at(start: f64, period: f64) -> Option<u32> {
     while !is_reached(sample) && sample <= f64::from(u32::MAX) {
         sample += 1.0;
     }
+    if sample > f64::from(u32::MAX) {
+        return Err(Error(format!(
+            "{name} = {start} s is more than 2^32 samples of {period} s after the start; a counter of the code has 32 \
+             bits"
+        )));
+    }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
-    (sample <= f64::from(u32::MAX)).then_some(sample as u32)
+    Ok(sample as u32)
 }
 
 #[cfg(test)]
@@ -96,8 +96,8 @@ mod tests {
             (5.0, 1e-3, 5000),
             (0.7, 0.1, 7),
         ] {
-            assert_eq!(first_at(t_on, period), Some(expected), "{t_on} {period}");
+            assert_eq!(first_at("t_on", t_on, period).unwrap(), expected, "{t_on} {period}");
         }
-        assert_eq!(first_at(1e9, 1e-3), None);
+        assert!(first_at("t_on", 1e9, 1e-3).is_err());
     }
 }

@@ -1,11 +1,11 @@
 //! The reconfiguration of a controller: gains without actuators that are gone, and the fall-back.
 //! `fmu-controller/src/reconfiguration.rs` has the equations.
 
-use aso_controller::design::{self, Actuator, Fault};
+use aso_controller::design::{self, Design, Loss};
 use nalgebra::DMatrix;
 
 use super::constants::Constants;
-use super::parts::{Loss, Signal, dense};
+use super::parts::{Signal, dense};
 use super::symbols::{Kind, Matrix};
 use crate::Error;
 
@@ -52,33 +52,17 @@ pub(super) struct GainSet {
     k_s: DMatrix<f64>,
 }
 
-/// The parts of the controller that a reconfiguration refers to.
-pub(super) struct Plant<'a> {
-    pub(super) sample_time: f64,
-    pub(super) actuators: &'a [Actuator],
-    pub(super) faults: &'a [Fault],
-    pub(super) losses: &'a [Loss],
-    /// The gains of the intact plant.
-    pub(super) k_x: &'a DMatrix<f64>,
-    pub(super) k_f: &'a DMatrix<f64>,
-}
-
 impl Reconfiguration {
-    /// The reconfiguration of a design file; `None` if it has neither cases nor a fall-back. An error if the time of a
-    /// case is beyond 2^32 samples.
-    pub(super) fn of(
-        cases: &[design::Reconfiguration],
-        combinations: &[design::Combination],
-        fallback: Option<&design::Fallback>,
-        plant: &Plant<'_>,
-    ) -> Result<Option<Self>, Error> {
-        if cases.is_empty() && fallback.is_none() {
+    /// The reconfiguration of a design file with these losses, sampled every `period` s; `None` if it has neither cases
+    /// nor a fall-back. An error if the time of a case is beyond 2^32 samples.
+    pub(super) fn of(file: &Design, losses: &[Loss], period: f64) -> Result<Option<Self>, Error> {
+        if !file.is_reconfigurable() {
             return Ok(None);
         }
-        let m = plant.actuators.len();
-        let gone = |names: &[String]| {
-            let is_among = |actuator: &Actuator| names.contains(&actuator.name);
-            plant.actuators.iter().map(is_among).collect::<Vec<_>>()
+        let Design { reconfigurations, combinations, fallback, actuators, faults, .. } = file;
+        let m = actuators.len();
+        let gone = |names: &[String]| -> Vec<_> {
+            actuators.iter().map(|actuator| names.contains(&actuator.name)).collect()
         };
         // Moves the columns of `k_s`, one for each stuck actuator in order, to the places of these actuators.
         let scatter = |k_s: &DMatrix<f64>, gone: &[bool]| {
@@ -89,20 +73,16 @@ impl Reconfiguration {
             }
             all
         };
-        let (k_x, k_f) = (plant.k_x.clone(), plant.k_f.clone());
+        let (k_x, k_f) = (dense(&file.k_x), dense(&file.k_f));
         let none = vec![false; m];
         let mut sets = vec![GainSet { gone: none.clone(), k_x, k_f, k_s: DMatrix::zeros(m, m) }];
-        let mut all_cases = Vec::new();
-        for case in cases {
-            all_cases.push(Case {
+        let mut cases = Vec::new();
+        for case in reconfigurations {
+            cases.push(Case {
                 actuator: case.actuator,
                 stuck_at: case.stuck_at,
-                restarts: plant
-                    .faults
-                    .iter()
-                    .map(|fault| case.restart.contains(&fault.name))
-                    .collect(),
-                decision: decision(case, plant)?,
+                restarts: faults.iter().map(|fault| case.restart.contains(&fault.name)).collect(),
+                decision: decision(case, losses, period)?,
             });
             if let (Some(k_x), Some(k_f), Some(k_s)) = (&case.k_x, &case.k_f, &case.k_s) {
                 let gone = gone(std::slice::from_ref(&case.gone));
@@ -120,13 +100,13 @@ impl Reconfiguration {
                 k_s,
             });
         }
-        let compensates = fallback.map(|design| design.k_f.is_some());
         if let Some(design::Fallback { k_x, k_f }) = fallback {
-            let no_compensation = || DMatrix::zeros(m, plant.faults.len());
+            let no_compensation = || DMatrix::zeros(m, faults.len());
             let k_f = k_f.as_ref().map_or_else(no_compensation, dense);
             sets.push(GainSet { gone: none, k_x: dense(k_x), k_f, k_s: DMatrix::zeros(m, m) });
         }
-        Ok(Some(Self { cases: all_cases, sets, fallback: compensates }))
+        let fallback = fallback.as_ref().map(|design| design.k_f.is_some());
+        Ok(Some(Self { cases, sets, fallback }))
     }
 
     /// A matrix in each of the sets; `None` if it is the same in all of them.
@@ -204,15 +184,19 @@ impl Reconfiguration {
 
 /// The decision about an actuator by its estimated loss; `None` if the case states no limit, or if no fault is its
 /// loss. An error if the time is beyond 2^32 samples.
-fn decision(case: &design::Reconfiguration, plant: &Plant<'_>) -> Result<Option<Decision>, Error> {
+fn decision(
+    case: &design::Reconfiguration,
+    losses: &[Loss],
+    period: f64,
+) -> Result<Option<Decision>, Error> {
     let (Some(fraction), Some(time)) = (case.loss, case.time) else { return Ok(None) };
-    let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == case.gone;
-    let Some(loss) = plant.losses.iter().position(of_actuator) else { return Ok(None) };
+    let of_actuator = |loss: &Loss| loss.actuator == case.actuator;
+    let Some(loss) = losses.iter().position(of_actuator) else { return Ok(None) };
     // The smallest whole number of samples that last as long, with the tolerance of the FMU.
     let least = time * (1.0 - 1e-9);
-    let mut samples = (least / plant.sample_time).floor().max(0.0);
+    let mut samples = (least / period).floor().max(0.0);
     let most = f64::from(u32::MAX);
-    while samples * plant.sample_time < least && samples <= most {
+    while samples * period < least && samples <= most {
         samples += 1.0;
     }
     if samples > most {
@@ -244,23 +228,8 @@ mod tests {
             loss: Some(0.5),
             time: Some(7.0),
         };
-        let actuator = Actuator {
-            name: "u".to_owned(),
-            unit: None,
-            description: String::new(),
-            operating: None,
-            limits: None,
-        };
-        let gain = DMatrix::zeros(1, 1);
-        let plant = Plant {
-            sample_time: 3e-16,
-            actuators: &[actuator],
-            faults: &[],
-            losses: &[Loss { fault: 0, actuator: 0, least_command: 1.0 }],
-            k_x: &gain,
-            k_f: &gain,
-        };
-        let refused = decision(&case, &plant).err().unwrap().to_string();
+        let losses = [Loss { fault: 0, actuator: 0, least_command: 1.0 }];
+        let refused = decision(&case, &losses, 3e-16).err().unwrap().to_string();
         assert!(refused.contains("7 s are more than 2^32 samples"), "{refused}");
     }
 }

@@ -13,7 +13,7 @@ use super::fields::Fields;
 use super::rounding::RoundingBound;
 use super::summary::{Vocabulary, summary};
 use super::symbols::Kind;
-use super::text::{ascii, file_text};
+use super::text::{Lines, ascii};
 use super::{Precision, Request};
 
 /// The data of the files: the request, the controller, its identifiers, and `f64` or `f32`.
@@ -83,21 +83,26 @@ impl Source<'_> {
 
     fn library(&self, bound: Option<&RoundingBound>) -> String {
         let Self { request, controller, fields, real } = self;
-        let mut lines = vec!["//! ```text".to_owned()];
+        let mut lines = Lines::default();
+        lines.push("//! ```text");
         for line in summary(request, controller, fields, bound, &self.vocabulary()) {
-            lines.push(format!("//! {line}").trim_end().to_owned());
+            lines.push(format!("//! {line}").trim_end());
         }
-        lines.extend([
-            "//! ```".to_owned(),
-            "#![no_std]".to_owned(),
-            "#![forbid(unsafe_code)]".to_owned(),
-            "#![allow(non_snake_case)] // Fields have the names of the signals.".to_owned(),
-            String::new(),
-            "pub mod sample;".to_owned(),
-            String::new(),
-            self.imports(),
-            String::new(),
-        ]);
+        lines.push(format!(
+            "//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)] // Fields have the names of the signals.
+
+pub mod sample;
+
+{}
+",
+            self.imports()
+        ));
+        let mut constant = |text: &str, head: &str, value: String| {
+            lines.push(format!("/// {text}.\n{head} = {value};"));
+        };
         for (kind, what) in [
             (Kind::State, "states"),
             (Kind::Fault, "faults"),
@@ -114,32 +119,32 @@ impl Source<'_> {
         ] {
             let count = kind.count(controller);
             if count > 0 {
-                lines.push(format!("/// Number of {what}."));
-                lines.push(format!("pub const {}: usize = {count};", kind.plural()));
+                let head = format!("pub const {}: usize", kind.plural());
+                constant(&format!("Number of {what}"), &head, count.to_string());
             }
         }
-        lines.push("/// Number of estimates.".to_owned());
-        lines.push(format!("pub const ESTIMATES: usize = {};", fields.estimates(controller).len()));
-        lines.push("/// The sample time in s.".to_owned());
+        let estimates = fields.estimates(controller).len();
+        constant("Number of estimates", "pub const ESTIMATES: usize", estimates.to_string());
         let sample_time = self.literal(controller.sample_time);
-        lines.push(format!("pub const SAMPLE_TIME: {real} = {sample_time};"));
+        constant("The sample time in s", &format!("pub const SAMPLE_TIME: {real}"), sample_time);
         if controller.first_compensated > 0 {
-            lines.push("/// The first sample at which faults are compensated.".to_owned());
-            let first = controller.first_compensated;
-            lines.push(format!("const FIRST_COMPENSATED: u32 = {first};"));
+            let text = "The first sample at which faults are compensated";
+            let first = controller.first_compensated.to_string();
+            constant(text, "const FIRST_COMPENSATED: u32", first);
         }
         if let Some(transfer) = controller.transfer {
-            lines.push("/// The part of what a change of the law left in the commands that goes in a sample.".to_owned());
-            lines.push(format!("const TRANSFER: {real} = {};", self.literal(transfer)));
+            let text =
+                "The part of what a change of the law left in the commands that goes in a sample";
+            constant(text, &format!("const TRANSFER: {real}"), self.literal(transfer));
         }
         if let Some(detection) = &controller.detection {
-            lines.push("/// The first sample whose residuals are tested.".to_owned());
-            lines.push(format!("const FIRST_TESTED: u32 = {};", detection.first_tested));
+            let text = "The first sample whose residuals are tested";
+            constant(text, "const FIRST_TESTED: u32", detection.first_tested.to_string());
         }
         self.tables(&mut lines);
         self.structures(&mut lines);
         self.start(&mut lines);
         self.step(&mut lines);
-        file_text(&lines)
+        lines.text()
     }
 }

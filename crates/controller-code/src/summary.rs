@@ -5,11 +5,11 @@ mod options;
 use super::arithmetic::{Arithmetic, Memory};
 use super::controller::Controller;
 use super::fields::Fields;
-use super::parts::{Loss, Signal};
+use super::parts::Signal;
 use super::rounding::RoundingBound;
 use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
-use aso_controller::design::{Estimator, SlidingMode};
+use aso_controller::design::{Estimator, Loss, SlidingMode};
 
 /// The functions and flags of a language, as its users write them.
 pub(super) struct Vocabulary {

@@ -3,11 +3,38 @@
 /// The largest number of bytes in a line of a paragraph.
 const WIDTH: usize = 92;
 
-/// The lines as the text of a file.
-pub(super) fn file_text(lines: &[String]) -> String {
-    let mut text = lines.join("\n");
-    text.push('\n');
-    text
+/// The lines of a file, or of a part of it.
+#[derive(Default)]
+pub(super) struct Lines(pub(super) Vec<String>);
+
+impl Lines {
+    /// Adds a line, or several.
+    pub(super) fn push(&mut self, line: impl Into<String>) {
+        self.0.push(line.into());
+    }
+
+    /// Adds a line, or several, if `is_stated`.
+    pub(super) fn push_if(&mut self, is_stated: bool, line: impl Into<String>) {
+        self.0.extend(is_stated.then(|| line.into()));
+    }
+
+    /// Removes the comma after the last entry of a list.
+    pub(super) fn end_list(&mut self) {
+        if let Some(last) = self.0.last_mut() {
+            last.truncate(last.trim_end_matches(',').len());
+        }
+    }
+
+    /// The text of the file.
+    pub(super) fn text(&self) -> String {
+        self.0.join("\n") + "\n"
+    }
+}
+
+impl<S: Into<String>> Extend<S> for Lines {
+    fn extend<I: IntoIterator<Item = S>>(&mut self, lines: I) {
+        self.0.extend(lines.into_iter().map(Into::into));
+    }
 }
 
 /// Breaks a paragraph into lines of at most [`WIDTH`]; a longer word has a line of its own.

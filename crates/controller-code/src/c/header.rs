@@ -6,153 +6,125 @@ use crate::rounding::RoundingBound;
 use crate::summary::summary;
 use crate::symbols::{Kind, Vector};
 use crate::tables::stored;
-use crate::text::file_text;
+use crate::text::Lines;
 
 impl Source<'_> {
     pub(super) fn header(&self, bound: Option<&RoundingBound>) -> String {
         let Self { request, controller, fields, real, capital } = self;
         let name = &request.prefix;
-        let mut lines = vec!["/*".to_owned()];
+        let mut lines = Lines::default();
+        lines.push("/*");
         for line in summary(request, controller, fields, bound, &self.vocabulary()) {
-            lines.push(format!(" * {line}").trim_end().to_owned());
+            lines.push(format!(" * {line}").trim_end());
         }
-        lines.push(" */".to_owned());
-        lines.extend([
-            format!("#ifndef {capital}_H"),
-            format!("#define {capital}_H"),
-            String::new(),
-            "#include <stdbool.h>".to_owned(),
-            "#include <stdint.h>".to_owned(),
-            String::new(),
-            "#ifdef __cplusplus".to_owned(),
-            "extern \"C\" {".to_owned(),
-            "#endif".to_owned(),
-            String::new(),
-            "/* Numbers of signals. */".to_owned(),
-        ]);
+        lines.push(format!(
+            " */
+#ifndef {capital}_H
+#define {capital}_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern \"C\" {{
+#endif
+
+/* Numbers of signals. */"
+        ));
         self.macros(&mut lines);
-        self.structure(&mut lines, "Measurements", &fields.measurements);
-        if !fields.references.is_empty() {
-            self.structure(&mut lines, "References", &fields.references);
+        for (kind, what, fields) in [
+            (*real, "Measurements", &fields.measurements),
+            (*real, "References", &fields.references),
+            (*real, "Schedule", &fields.schedule),
+            ("bool", "Actuators", &fields.switches(controller)),
+            (*real, "Commands", &fields.actuators),
+            (*real, "Estimates", &fields.estimates(controller)),
+        ] {
+            if !fields.is_empty() {
+                lines.push("typedef struct\n{");
+                lines.extend(fields.iter().map(|field| format!("    {kind} {field};")));
+                lines.push(format!("}} {name}_{what};\n"));
+            }
         }
-        if !fields.schedule.is_empty() {
-            self.structure(&mut lines, "Schedule", &fields.schedule);
-        }
-        self.actuators_structure(&mut lines);
-        self.structure(&mut lines, "Commands", &fields.actuators);
-        self.structure(&mut lines, "Estimates", &fields.estimates(controller));
         self.detection_structure(&mut lines);
-        lines.push("/* One instance; its fields belong to the functions below. */".to_owned());
-        lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
+        lines.push(
+            "/* One instance; its fields belong to the functions below. */\ntypedef struct\n{",
+        );
         for vector in stored(controller).into_iter().chain([Vector::U]) {
             let count = self.count(vector.kind());
             lines.push(format!("    {real} {}[{count}];", vector.name()));
         }
-        if !fields.schedule.is_empty() {
-            lines.push(format!("    {real} theta;"));
-        }
+        lines.push_if(!fields.schedule.is_empty(), format!("    {real} theta;"));
         self.detection_state(&mut lines, true);
         self.reconfiguration_state(&mut lines, true);
-        let first_integer = lines.len();
-        if controller.has_counter() {
-            lines.push("    uint32_t sample;".to_owned());
-        }
-        if controller.limits_holds() {
-            lines.push(format!("    uint32_t held[{}];", self.count(Kind::Measurement)));
-        }
-        if controller.counts_since_rest() {
-            lines.push("    uint32_t running;".to_owned());
-        }
+        let first_integer = lines.0.len();
+        lines.push_if(controller.has_counter(), "    uint32_t sample;");
+        let held = format!("    uint32_t held[{}];", self.count(Kind::Measurement));
+        lines.push_if(controller.limits_holds(), held);
+        lines.push_if(controller.counts_since_rest(), "    uint32_t running;");
         let is_transferred = controller.transfer.is_some();
         let is_reconfigurable = controller.reconfiguration.is_some();
-        if is_transferred {
-            lines.push("    uint32_t law;".to_owned());
-        }
-        if is_transferred && is_reconfigurable {
-            lines.push("    uint32_t last_set;".to_owned());
-        }
+        lines.push_if(is_transferred, "    uint32_t law;");
+        lines.push_if(is_transferred && is_reconfigurable, "    uint32_t last_set;");
         self.reconfiguration_state(&mut lines, false);
-        if is_transferred && is_reconfigurable {
-            lines.push(format!("    bool was_gone[{}];", self.count(Kind::Actuator)));
-        }
+        let was_gone = format!("    bool was_gone[{}];", self.count(Kind::Actuator));
+        lines.push_if(is_transferred && is_reconfigurable, was_gone);
         self.detection_state(&mut lines, false);
-        if controller.filter.is_some() {
-            lines.push("    bool started;".to_owned());
-        }
+        lines.push_if(controller.filter.is_some(), "    bool started;");
         // The flags come last, so that there is no padding between the fields.
-        lines[first_integer..].sort_by_key(|line| line.starts_with("    bool "));
+        lines.0[first_integer..].sort_by_key(|line| line.starts_with("    bool "));
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
-        lines.extend([
-            format!("}} {name}_State;"),
-            String::new(),
-            "/* Starts at the operating point, without faults. */".to_owned(),
-            format!("void {name}_init({name}_State *state);"),
-            String::new(),
-            "/* Starts at these estimates of states and faults. */".to_owned(),
-            format!("void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],"),
-            format!("    const {real} f_hat_0[{q}]);"),
-            String::new(),
-            "/* Takes a sample; returns the bits of the status. */".to_owned(),
-            format!("{};", self.signature()),
-            String::new(),
-            "#ifdef __cplusplus".to_owned(),
-            "}".to_owned(),
-            "#endif".to_owned(),
-            String::new(),
-            format!("#endif /* {capital}_H */"),
-        ]);
-        file_text(&lines)
+        lines.push(format!(
+            "}} {name}_State;
+
+/* Starts at the operating point, without faults. */
+void {name}_init({name}_State *state);
+
+/* Starts at these estimates of states and faults. */
+void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
+    const {real} f_hat_0[{q}]);
+
+/* Takes a sample; returns the bits of the status. */
+{};
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif /* {capital}_H */",
+            self.signature()
+        ));
+        lines.text()
     }
 
     /// Adds macros: the numbers of signals, the sample time, the first samples, the bits of the status.
-    fn macros(&self, lines: &mut Vec<String>) {
+    fn macros(&self, lines: &mut Lines) {
         let Self { controller, capital, .. } = self;
         for kind in self.kinds() {
             lines.push(format!("#define {} {}U", self.count(kind), kind.count(controller)));
         }
-        lines.extend([
-            String::new(),
-            "/* The sample time in s. */".to_owned(),
-            format!("#define {capital}_SAMPLE_TIME {}", self.literal(controller.sample_time)),
-        ]);
+        let mut constant = |meaning: &str, name: &str, value: String| {
+            lines.push(format!("\n/* {meaning} */\n#define {capital}_{name} {value}"));
+        };
+        let sample_time = self.literal(controller.sample_time);
+        constant("The sample time in s.", "SAMPLE_TIME", sample_time);
         if controller.first_compensated > 0 {
-            lines.extend([
-                String::new(),
-                "/* The first sample at which faults are compensated. */".to_owned(),
-                format!("#define {capital}_FIRST_COMPENSATED {}U", controller.first_compensated),
-            ]);
+            let meaning = "The first sample at which faults are compensated.";
+            constant(meaning, "FIRST_COMPENSATED", format!("{}U", controller.first_compensated));
         }
         if let Some(detection) = &controller.detection {
-            lines.extend([
-                String::new(),
-                "/* The first sample whose residuals are tested. */".to_owned(),
-                format!("#define {capital}_FIRST_TESTED {}U", detection.first_tested),
-            ]);
+            let meaning = "The first sample whose residuals are tested.";
+            constant(meaning, "FIRST_TESTED", format!("{}U", detection.first_tested));
         }
-        lines.extend([
-            String::new(),
-            "/* Bits of the status. */".to_owned(),
-            format!("#define {capital}_HELD 1U"),
-            format!("#define {capital}_AT_LIMIT 2U"),
-            format!("#define {capital}_OVERFLOW 4U"),
-        ]);
-        if controller.schedule.is_some() {
-            lines.push(format!("#define {capital}_OUTSIDE 8U"));
-        }
-        if controller.limits_holds() {
-            lines.push(format!("#define {capital}_LOST 16U"));
-        }
-        lines.push(String::new());
-    }
-
-    fn structure(&self, lines: &mut Vec<String>, what: &str, fields: &[String]) {
-        lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
-        lines.extend(fields.iter().map(|field| format!("    {} {field};", self.real)));
-        lines.extend([format!("}} {}_{what};", self.request.prefix), String::new()]);
+        constant("Bits of the status.", "HELD", "1U".to_owned());
+        lines.push(format!("#define {capital}_AT_LIMIT 2U\n#define {capital}_OVERFLOW 4U"));
+        lines.push_if(controller.schedule.is_some(), format!("#define {capital}_OUTSIDE 8U"));
+        lines.push_if(controller.limits_holds(), format!("#define {capital}_LOST 16U"));
+        lines.push("");
     }
 
     /// Adds the structure with decision, residuals and statistics of a sample; nothing without a detection.
-    fn detection_structure(&self, lines: &mut Vec<String>) {
+    fn detection_structure(&self, lines: &mut Lines) {
         if self.controller.detection.is_none() {
             return;
         }
@@ -173,7 +145,7 @@ impl Source<'_> {
     }
 
     /// Adds the fields of the detection in an instance: the real numbers if `of_reals`, else counters and flags.
-    fn detection_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+    fn detection_state(&self, lines: &mut Lines, of_reals: bool) {
         let Some(detection) = &self.controller.detection else { return };
         let (real, tests) = (self.real, self.count(Kind::Test));
         lines.extend(match (of_reals, detection.method) {
@@ -201,30 +173,18 @@ impl Source<'_> {
         });
     }
 
-    /// Adds the structure with the inputs about actuators that are gone; nothing without a reconfiguration.
-    fn actuators_structure(&self, lines: &mut Vec<String>) {
-        if self.controller.reconfiguration.is_none() {
-            return;
-        }
-        lines.push("typedef struct\n{".to_owned());
-        let fields = self.fields.switches(self.controller);
-        lines.extend(fields.iter().map(|field| format!("    bool {field};")));
-        lines.push(format!("}} {}_Actuators;\n", self.request.prefix));
-    }
-
     /// Adds the fields of the reconfiguration in an instance: the real numbers if `of_reals`, else counters and flags.
-    fn reconfiguration_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+    fn reconfiguration_state(&self, lines: &mut Lines, of_reals: bool) {
         let Some(reconfiguration) = &self.controller.reconfiguration else { return };
         let (real, cases, actuators) =
             (self.real, self.count(Kind::Case), self.count(Kind::Actuator));
         let has_cases = !reconfiguration.cases.is_empty();
         if of_reals {
-            lines.extend(has_cases.then(|| format!("    {real} lost[{cases}];")));
-            return;
+            return lines.push_if(has_cases, format!("    {real} lost[{cases}];"));
         }
-        lines.extend(has_cases.then(|| format!("    uint32_t above_for[{cases}];")));
-        lines.extend(["    uint32_t set;", "    int32_t reconfiguration;"].map(str::to_owned));
+        lines.push_if(has_cases, format!("    uint32_t above_for[{cases}];"));
+        lines.extend(["    uint32_t set;", "    int32_t reconfiguration;"]);
         lines.push(format!("    bool gone[{actuators}];"));
-        lines.extend(has_cases.then(|| format!("    bool decided[{cases}];")));
+        lines.push_if(has_cases, format!("    bool decided[{cases}];"));
     }
 }

@@ -1,14 +1,15 @@
 //! The tables of a design that are whole numbers or flags: of tests, of actuators that may be gone, of losses, of
 //! holds.
 
-use super::{Source, end_list, wrapped};
+use super::{Source, wrapped};
 use crate::detection::{Detection, Method, Test};
-use crate::parts::Loss;
 use crate::reconfiguration::{Case, Reconfiguration};
 use crate::symbols::Kind;
+use crate::text::Lines;
+use aso_controller::design::Loss;
 
 impl Source<'_> {
-    pub(super) fn integer_tables(&self, lines: &mut Vec<String>) {
+    pub(super) fn integer_tables(&self, lines: &mut Lines) {
         if let Some(detection) = &self.controller.detection {
             self.tables_of_tests(lines, detection);
         }
@@ -25,7 +26,7 @@ impl Source<'_> {
         }
     }
 
-    fn tables_of_tests(&self, lines: &mut Vec<String>, detection: &Detection) {
+    fn tables_of_tests(&self, lines: &mut Lines, detection: &Detection) {
         let (tests, suspects) = (self.count(Kind::Test), self.count(Kind::Suspect));
         if detection.method == Method::Window {
             let of_tests = detection.tests.iter();
@@ -34,19 +35,15 @@ impl Source<'_> {
             let samples = |test: &Test| test.window as usize;
             numbers(lines, ["window", &tests], of_tests.map(samples));
         }
-        lines.push("\n/* Which tests react to each fault. */".to_owned());
+        lines.push("\n/* Which tests react to each fault. */");
         flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(detection).into_iter());
     }
 
-    fn tables_of_reconfiguration(
-        &self,
-        lines: &mut Vec<String>,
-        reconfiguration: &Reconfiguration,
-    ) {
+    fn tables_of_reconfiguration(&self, lines: &mut Lines, reconfiguration: &Reconfiguration) {
         let (cases, actuators) = (self.count(Kind::Case), self.count(Kind::Actuator));
         let (sets, faults) = (self.count(Kind::GainSet), self.count(Kind::Fault));
         let row = |row: &[bool]| row.iter().map(bool::to_string).collect();
-        lines.push("\n/* The actuators without which each set of gains is. */".to_owned());
+        lines.push("\n/* The actuators without which each set of gains is. */");
         let gone = reconfiguration.sets.iter().map(|set| row(&set.gone));
         flags(lines, &format!("set_gone[{sets}][{actuators}]"), gone);
         if reconfiguration.cases.is_empty() {
@@ -71,46 +68,45 @@ impl Source<'_> {
             let loss = |case: &Case| case.decision.map_or(losses, |decision| decision.loss);
             numbers(lines, ["case_loss", &cases], of_cases.clone().map(loss));
         }
-        lines.push("\n/* The faults whose estimates restart at 0. */".to_owned());
+        lines.push("\n/* The faults whose estimates restart at 0. */");
         let restarts = of_cases.map(|case| row(&case.restarts));
         flags(lines, &format!("case_restarts[{cases}][{faults}]"), restarts);
     }
 
-    fn tables_of_losses(&self, lines: &mut Vec<String>) {
+    fn tables_of_losses(&self, lines: &mut Lines) {
         let losses = &self.controller.losses;
         if losses.is_empty() {
             return;
         }
-        lines.push(
-            "\n/* Faults and actuators of the losses of effectiveness, and u_e^2. */".to_owned(),
-        );
+        lines.push("\n/* Faults and actuators of the losses of effectiveness, and u_e^2. */");
         let fault = |loss: &Loss| loss.fault;
         numbers(lines, ["loss_fault", "ASO_LOSSES"], losses.iter().map(fault));
         let actuator = |loss: &Loss| loss.actuator;
         numbers(lines, ["loss_actuator", "ASO_LOSSES"], losses.iter().map(actuator));
         let squared =
             losses.iter().map(|loss| self.literal(loss.least_command * loss.least_command));
-        lines.push(format!("static const {} squared_least_command[ASO_LOSSES] =\n{{", self.real));
-        lines.extend(wrapped(squared, "    "));
-        end_list(lines);
-        lines.push("};".to_owned());
+        let head = format!("{} squared_least_command[ASO_LOSSES]", self.real);
+        list(lines, &head, wrapped(squared, "    "));
     }
 }
 
 /// Adds a table of whole numbers.
-fn numbers(lines: &mut Vec<String>, [name, size]: [&str; 2], values: impl Iterator<Item = usize>) {
-    lines.push(format!("static const uint32_t {name}[{size}] =\n{{"));
-    lines.extend(wrapped(values.map(|value| format!("{value}U")), "    "));
-    end_list(lines);
-    lines.push("};".to_owned());
+fn numbers(lines: &mut Lines, [name, size]: [&str; 2], values: impl Iterator<Item = usize>) {
+    let values = values.map(|value| format!("{value}U"));
+    list(lines, &format!("uint32_t {name}[{size}]"), wrapped(values, "    "));
 }
 
 /// Adds a table of flags; `head` is its name with its sizes.
-fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<String>>) {
-    lines.push(format!("static const bool {head} =\n{{"));
-    lines.extend(rows.map(|row| format!("    {{{}}},", row.join(", "))));
-    end_list(lines);
-    lines.push("};".to_owned());
+fn flags(lines: &mut Lines, head: &str, rows: impl Iterator<Item = Vec<String>>) {
+    list(lines, &format!("bool {head}"), rows.map(|row| format!("    {{{}}},", row.join(", "))));
+}
+
+/// Adds a table of these rows; `head` is its type and its name with its sizes.
+fn list(lines: &mut Lines, head: &str, rows: impl IntoIterator<Item = String>) {
+    lines.push(format!("static const {head} =\n{{"));
+    lines.extend(rows);
+    lines.end_list();
+    lines.push("};");
 }
 
 /// For each fault whether each test reacts to it: `true` or `false`, as C and Rust write it.

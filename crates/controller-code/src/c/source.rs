@@ -4,28 +4,28 @@ use super::{RUNTIME, Source};
 use crate::arithmetic::Memory;
 use crate::symbols::Kind;
 use crate::tables::tables;
-use crate::text::file_text;
+use crate::text::{Lines, ascii};
 
 impl Source<'_> {
     pub(super) fn implementation(&self) -> String {
         let Self { request, controller, .. } = self;
         let name = &request.prefix;
         let Memory { constants, .. } = Memory::of(controller, request.precision);
-        let mut lines = vec![
-            format!(
-                "/* Written by {}; {name}.h describes it. */",
-                crate::text::ascii(request.identity)
-            ),
-            format!("#include \"{name}.h\""),
-            String::new(),
-            "#include <float.h>".to_owned(),
-            String::new(),
-            "/* The numbers and the instance of this design. */".to_owned(),
-            format!("typedef {} aso_real;", self.real),
-            format!("typedef {name}_State aso_State;"),
-        ];
+        let mut lines = Lines::default();
+        lines.push(format!(
+            "/* Written by {}; {name}.h describes it. */
+#include \"{name}.h\"
+
+#include <float.h>
+
+/* The numbers and the instance of this design. */
+typedef {} aso_real;
+typedef {name}_State aso_State;",
+            ascii(request.identity),
+            self.real
+        ));
         self.settings(&mut lines);
-        lines.extend([String::new(), format!("/* Constants: {constants} bytes. */")]);
+        lines.push(format!("\n/* Constants: {constants} bytes. */"));
         for table in tables(controller) {
             self.table(&mut lines, &table);
         }
@@ -34,14 +34,14 @@ impl Source<'_> {
             lines.push(format!("static const {} theta_start = {start};", self.real));
         }
         self.integer_tables(&mut lines);
-        lines.extend([String::new(), format!("#include \"{RUNTIME}\"")]);
+        lines.push(format!("\n#include \"{RUNTIME}\""));
         self.starts(&mut lines);
         self.step(&mut lines);
-        file_text(&lines)
+        lines.text()
     }
 
     /// Adds the functions that start an instance.
-    fn starts(&self, lines: &mut Vec<String>) {
+    fn starts(&self, lines: &mut Lines) {
         let (name, real) = (&self.request.prefix, self.real);
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
         lines.push(format!(
@@ -60,10 +60,9 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
     }
 
     /// Adds the function that takes a sample. It copies the named signals into vectors, and the results back.
-    fn step(&self, lines: &mut Vec<String>) {
-        lines.extend([String::new(), self.signature(), "{".to_owned()]);
-        lines
-            .extend(["    aso_Sample sample;", "    uint32_t status = 0U;", ""].map(str::to_owned));
+    fn step(&self, lines: &mut Lines) {
+        lines.push(format!("\n{}\n{{", self.signature()));
+        lines.push("    aso_Sample sample;\n    uint32_t status = 0U;\n");
         self.inputs(lines);
         self.reconfigure(lines);
         let reset = if self.controller.detection.is_some() { "detection_reset" } else { "false" };
@@ -71,11 +70,11 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
             "    status = status | aso_sample(state, &sample, compensate, {reset});\n"
         ));
         self.outputs(lines);
-        lines.extend(["    return status;", "}"].map(str::to_owned));
+        lines.push("    return status;\n}");
     }
 
     /// Adds the statements that store the inputs that are used.
-    fn inputs(&self, lines: &mut Vec<String>) {
+    fn inputs(&self, lines: &mut Lines) {
         let is_checked = self.controller.checks_measurements();
         for (owner, fields, vector) in [
             ("measurements", &self.fields.measurements, "y"),
@@ -95,11 +94,11 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
     }
 
     /// Adds the choice of the gains at the start of a sample; nothing without a reconfiguration.
-    fn reconfigure(&self, lines: &mut Vec<String>) {
+    fn reconfigure(&self, lines: &mut Lines) {
         let Some(reconfiguration) = &self.controller.reconfiguration else { return };
         let fall_back =
             if reconfiguration.fallback.is_some() { "actuators->fall_back" } else { "false" };
-        lines.push("    if (state->sample > 0U)\n    {".to_owned());
+        lines.push("    if (state->sample > 0U)\n    {");
         if !reconfiguration.cases.is_empty() {
             let fields = self.fields.switches(self.controller);
             let fields = fields.iter().take(reconfiguration.cases.len());
@@ -113,7 +112,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         lines.push(format!("        choose_gains(state, {fall_back});\n    }}"));
     }
 
-    fn outputs(&self, lines: &mut Vec<String>) {
+    fn outputs(&self, lines: &mut Lines) {
         let Self { controller, fields, .. } = self;
         let mut copy = |target: &str, fields: &[String], source: &str| {
             let fields = fields.iter().enumerate();
@@ -126,21 +125,18 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
             controller.losses.iter().map(|loss| fields.faults[loss.fault].clone()).collect();
         copy("estimates->E_hat_", &losses, "sample.lost");
         copy("estimates->x_i_", &fields.integrals, "sample.x_i_value");
-        if controller.reconfiguration.is_some() {
-            lines.push("    *reconfiguration = state->reconfiguration;".to_owned());
-        }
-        if controller.detection.is_some() {
-            lines.extend(
-                [
-                    "    detection->detected = state->isolated != 0;",
-                    "    detection->isolated = state->isolated;",
-                    "    detection->t_detected = decision_time(state, state->detected_at);",
-                    "    detection->t_onset = decision_time(state, state->onset);",
-                    "    copy(detection->residual, state->residual, ASO_RESIDUALS);",
-                    "    copy(detection->statistic, state->statistic, ASO_TESTS);",
-                ]
-                .map(str::to_owned),
-            );
-        }
+        lines.push_if(
+            controller.reconfiguration.is_some(),
+            "    *reconfiguration = state->reconfiguration;",
+        );
+        lines.push_if(
+            controller.detection.is_some(),
+            "    detection->detected = state->isolated != 0;
+    detection->isolated = state->isolated;
+    detection->t_detected = decision_time(state, state->detected_at);
+    detection->t_onset = decision_time(state, state->onset);
+    copy(detection->residual, state->residual, ASO_RESIDUALS);
+    copy(detection->statistic, state->statistic, ASO_TESTS);",
+        );
     }
 }

@@ -1,11 +1,11 @@
 //! The sizes, numbers and switches that a design states for `aso_controller.h`.
 
 use super::Source;
-use crate::Precision;
 use crate::detection::Method;
 use crate::reconfiguration::Reconfiguration;
 use crate::symbols::Kind;
 use crate::tables::has_constant_matrix;
+use crate::text::Lines;
 use aso_controller::design::Estimator;
 
 impl Source<'_> {
@@ -15,12 +15,8 @@ impl Source<'_> {
         signals.chain(Kind::OTHERS).filter(|kind| kind.count(self.controller) > 0)
     }
 
-    pub(super) fn settings(&self, lines: &mut Vec<String>) {
-        let Self { request, controller, capital, .. } = self;
-        let largest = match request.precision {
-            Precision::Double => "DBL_MAX",
-            Precision::Single => "FLT_MAX",
-        };
+    pub(super) fn settings(&self, lines: &mut Lines) {
+        let Self { controller, capital, .. } = self;
         let mut set = |name: &str, value: String| {
             lines.push(format!("#define ASO_{name} {value}"));
         };
@@ -35,7 +31,7 @@ impl Source<'_> {
         if let Some(transfer) = controller.transfer {
             set("TRANSFER", self.literal(transfer));
         }
-        set("LARGEST", largest.to_owned());
+        set("LARGEST", self.literal(f64::INFINITY));
         let first_compensated = controller.first_compensated;
         set("FIRST_COMPENSATED", format!("{first_compensated}U"));
         if let Some(detection) = &controller.detection {

@@ -368,12 +368,9 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of [`Self::system`];
-    /// s of a sliding-mode law is not among these outputs.
-    ///
-    /// # Errors
-    ///
-    /// The slope of the sliding-mode law changes too much for the small-gain theorem.
+    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of [`Self::system`]; s
+    /// of a sliding-mode law is not among these outputs. An error if the slope of the sliding-mode law changes too much
+    /// for the small-gain theorem.
     pub(super) fn bound(&self, gains: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
         let linear = gains * self.kappa();
         let count = self.chords.len();

@@ -6,12 +6,13 @@ use crate::numbers::SIGNALS;
 use crate::reconfiguration::Case;
 use crate::symbols::{Matrix, Vector};
 use crate::tables::operating_vectors;
+use crate::text::Lines;
 use aso_controller::design::Estimator;
 
 impl Source<'_> {
     /// The imports of the library from the sources that are the same for each design.
     pub(super) fn imports(&self) -> String {
-        let mut lines = Vec::new();
+        let mut lines = Lines::default();
         if let Some(detection) = &self.controller.detection {
             let test = match detection.method {
                 Method::Cusum => "Cumulative",
@@ -24,15 +25,13 @@ impl Source<'_> {
                 if reconfiguration.cases.is_empty() { "" } else { "Case, Request, Watch, " };
             lines.push(format!("use sample::reconfiguration::{{{cases}Choice, Sets, Stuck}};"));
         }
-        if self.controller.checks_measurements() {
-            lines.push("use sample::measurements::Validity;".to_owned());
-        }
-        lines.push("use sample::{Design, Matrix, Signals, State};".to_owned());
-        lines.join("\n")
+        lines.push_if(self.controller.checks_measurements(), "use sample::measurements::Validity;");
+        lines.push("use sample::{Design, Matrix, Signals, State};");
+        lines.0.join("\n")
     }
 
     /// Adds the function that takes a sample, and the functions that it calls.
-    pub(super) fn step(&self, lines: &mut Vec<String>) {
+    pub(super) fn step(&self, lines: &mut Lines) {
         let Self { controller, fields, real, .. } = self;
         let (mut parameters, mut inputs) = (String::new(), String::new());
         for (owner, name, fields, count, stored) in [
@@ -99,15 +98,13 @@ impl Controller {{
         lines.push(format!("        let compensating = {compensating};"));
         self.reconfigure(lines);
         self.follow_schedule(lines);
-        if controller.filter.is_some() {
-            lines.push(
-                "        if !self.started {
+        lines.push_if(
+            controller.filter.is_some(),
+            "        if !self.started {
             self.y_f = self.y;
             self.started = true;
-        }"
-                .to_owned(),
-            );
-        }
+        }",
+        );
         if controller.h.is_some() {
             let mutable = if controller.limits_holds() { "mut " } else { "" };
             lines.push(format!("        let {mutable}x_i_value = self.x_i;"));
@@ -115,11 +112,11 @@ impl Controller {{
         self.design(lines);
         self.signals(lines);
         if controller.limits_holds() {
-            let mut regular = Vec::new();
+            let mut regular = Lines::default();
             self.take_sample(&mut regular);
             self.rest(lines);
-            lines.extend(regular.iter().map(|part| indented(part)));
-            lines.push("        }".to_owned());
+            lines.extend(regular.0.iter().map(|part| indented(part)));
+            lines.push("        }");
         } else {
             self.take_sample(lines);
         }
@@ -128,43 +125,35 @@ impl Controller {{
     }
 
     /// Adds the branch for a sample with a lost measurement, and opens the branch for all other samples.
-    fn rest(&self, lines: &mut Vec<String>) {
+    fn rest(&self, lines: &mut Lines) {
         let controller = self.controller;
-        lines.push("        if status.lost {\n            signals.rest(&design);".to_owned());
-        if controller.reconfiguration.is_some() {
-            lines.push(
-                "            let stuck = Stuck {
+        lines.push("        if status.lost {\n            signals.rest(&design);");
+        lines.push_if(
+            controller.reconfiguration.is_some(),
+            "            let stuck = Stuck {
                 k_s: Matrix::NONE,
                 without: &[false; ACTUATORS],
                 gone: &self.gone,
                 commands: [&U_STUCK, &STUCK_AT],
             };
-            signals.add_stuck(&design, &stuck);"
-                    .to_owned(),
-            );
-        }
-        lines.push("            signals.keep(&mut state, true);".to_owned());
-        if controller.transfer.is_some() {
-            lines.push("            self.law = None;".to_owned());
-        }
-        if controller.filter.is_some() {
-            lines.push("            self.started = false;".to_owned());
-        }
-        if controller.h.is_some() {
-            lines.push("            x_i_value = [0.0; REFERENCES];".to_owned());
-        }
+            signals.add_stuck(&design, &stuck);",
+        );
+        lines.push("            signals.keep(&mut state, true);");
+        lines.push_if(controller.transfer.is_some(), "            self.law = None;");
+        lines.push_if(controller.filter.is_some(), "            self.started = false;");
+        lines.push_if(controller.h.is_some(), "            x_i_value = [0.0; REFERENCES];");
         if controller.detection.is_some() {
-            lines.push("            self.x_r = [0.0; RESIDUAL_STATES];".to_owned());
-            lines.push("            self.residual = [0.0; RESIDUALS];".to_owned());
+            lines.push("            self.x_r = [0.0; RESIDUAL_STATES];");
+            lines.push("            self.residual = [0.0; RESIDUALS];");
             // The decision stays, and the alarms from which it follows.
             let fields = self.fields_of_tests().into_iter();
             let cleared = fields.filter(|field| !["alarmed", "decision"].contains(&field.name));
             lines.extend(
                 cleared.map(|field| format!("            self.{} = {};", field.name, field.start)),
             );
-            lines.push("            self.running = 0;".to_owned());
+            lines.push("            self.running = 0;");
         }
-        lines.push("        } else {".to_owned());
+        lines.push("        } else {");
     }
 
     /// The counter of samples that the detection uses: since the controller rested if it can rest, else since the
@@ -174,7 +163,7 @@ impl Controller {{
     }
 
     /// Adds the choice of the gains at the start of a sample, and whether faults are estimated.
-    fn reconfigure(&self, lines: &mut Vec<String>) {
+    fn reconfigure(&self, lines: &mut Lines) {
         let controller = self.controller;
         let estimating = if controller.monitor { "true" } else { "compensating" };
         let Some(reconfiguration) = &controller.reconfiguration else {
@@ -184,7 +173,7 @@ impl Controller {{
         let last = reconfiguration.sets.len() - 1;
         let fall_back =
             if reconfiguration.fallback.is_some() { "actuators.fall_back" } else { "false" };
-        lines.push("        if self.sample > 0 {".to_owned());
+        lines.push("        if self.sample > 0 {");
         if !reconfiguration.cases.is_empty() {
             lines.push(format!(
                 "            let reported: [bool; SWITCHES] = (*actuators).into();
@@ -217,7 +206,7 @@ impl Controller {{
 
     /// Adds the place in the grid, the operating point there, and the limits as deviations from it; nothing without a
     /// schedule.
-    fn follow_schedule(&self, lines: &mut Vec<String>) {
+    fn follow_schedule(&self, lines: &mut Lines) {
         let controller = self.controller;
         let Some(schedule) = &controller.schedule else { return };
         // `theta` shadows the input in a sample.
@@ -249,13 +238,11 @@ impl Controller {{
     }
 
     /// Adds the numbers of the design in this sample.
-    fn design(&self, lines: &mut Vec<String>) {
+    fn design(&self, lines: &mut Lines) {
         let controller = self.controller;
         let stated: Vec<_> = Matrix::all_stated(controller).collect();
         let is_scheduled = controller.schedule.is_some();
-        lines.push(
-            "        let design = Design {\n            sample_time: &SAMPLE_TIME,".to_owned(),
-        );
+        lines.push("        let design = Design {\n            sample_time: &SAMPLE_TIME,");
         let is_current = controller.estimator == Estimator::Current;
         lines.push(format!("            is_current: {is_current},"));
         for matrix in Matrix::of_sample() {
@@ -302,22 +289,22 @@ impl Controller {{
             let (deviations, values) = (stated(&table, is_limited), stated(values, is_limited));
             lines.push(format!("            {name}: [{deviations}, {values}],"));
         }
-        lines.push("        };".to_owned());
+        lines.push("        };");
     }
 
     /// Adds the vectors of a sample and the state.
-    fn signals(&self, lines: &mut Vec<String>) {
+    fn signals(&self, lines: &mut Lines) {
         let controller = self.controller;
         lines.extend(Vector::of_sample(controller).map(|vector| {
             format!("        let mut {} = [0.0; {}];", vector.name(), vector.kind().plural())
         }));
-        lines.push("        let mut signals = Signals {".to_owned());
+        lines.push("        let mut signals = Signals {");
         lines.extend(SIGNALS.map(|vector| {
             let name = vector.name();
             let place = if vector.length(controller) > 0 { name } else { "[]" };
             format!("            {name}: &mut {place},")
         }));
-        lines.push("        };\n        let mut state = State {".to_owned());
+        lines.push("        };\n        let mut state = State {");
         for (name, is_stated) in [
             ("x_hat", true),
             ("f_hat", true),
@@ -335,13 +322,12 @@ impl Controller {{
     }
 
     /// Adds the equations of a sample, and the storage of its results.
-    fn take_sample(&self, lines: &mut Vec<String>) {
+    fn take_sample(&self, lines: &mut Lines) {
         let controller = self.controller;
         lines.push(
             "        signals.estimate(&design, &state, estimating);
         signals.set_commands(&design, &state, compensating);
-        signals.set_command_values(&design);"
-                .to_owned(),
+        signals.set_command_values(&design);",
         );
         let gone = if controller.reconfiguration.is_some() {
             lines.push(
@@ -351,8 +337,7 @@ impl Controller {{
             gone: &self.gone,
             commands: [&U_STUCK, &STUCK_AT],
         };
-        signals.add_stuck(&design, &stuck);"
-                    .to_owned(),
+        signals.add_stuck(&design, &stuck);",
             );
             "&self.gone"
         } else {
@@ -382,10 +367,8 @@ impl Controller {{
         let is_finite = RESIDUAL_FILTER.advance(inputs, {running} == 0, &mut x_r, &mut residual) && is_finite;"
             ));
         }
-        lines.push("        if signals.keep(&mut state, is_finite) {".to_owned());
-        if controller.transfer.is_some() {
-            lines.push("            self.law = law;".to_owned());
-        }
+        lines.push("        if signals.keep(&mut state, is_finite) {");
+        lines.push_if(controller.transfer.is_some(), "            self.law = law;");
         if controller.detection.is_some() {
             lines.push(format!(
                 "            (self.x_r, self.residual) = (x_r, residual);
@@ -397,33 +380,32 @@ impl Controller {{
         lines.push(
             "        } else {
             (status.at_limit, status.overflow) = (false, true);
-        }"
-            .to_owned(),
+        }",
         );
-        if controller.counts_since_rest() {
-            lines.push("        self.running = self.running.saturating_add(1);".to_owned());
-        }
+        lines.push_if(
+            controller.counts_since_rest(),
+            "        self.running = self.running.saturating_add(1);",
+        );
     }
 
     /// Adds the statement that counts the sample; nothing if no time depends on the number.
-    fn count_sample(&self, lines: &mut Vec<String>) {
+    fn count_sample(&self, lines: &mut Lines) {
         let controller = self.controller;
         if controller.counts_all() {
             // The times of a detection follow from the number of samples.
-            lines.push("        self.sample = self.sample.saturating_add(1);".to_owned());
+            lines.push("        self.sample = self.sample.saturating_add(1);");
         } else if controller.first_compensated > 0 {
             lines.push(
-                "        self.sample = FIRST_COMPENSATED.min(self.sample.saturating_add(1));"
-                    .to_owned(),
+                "        self.sample = FIRST_COMPENSATED.min(self.sample.saturating_add(1));",
             );
         }
     }
 
-    fn outputs(&self, lines: &mut Vec<String>) {
+    fn outputs(&self, lines: &mut Lines) {
         let Self { controller, fields, .. } = self;
         let [states, faults] = [("x", fields.states.len()), ("f", fields.faults.len())]
             .map(|(letter, count)| (1..=count).map(|k| format!("{letter}{k}")).collect::<Vec<_>>());
-        lines.push("        let commands = Commands::from(self.u);".to_owned());
+        lines.push("        let commands = Commands::from(self.u);");
         lines.push(format!("        let [{}] = x_value;", states.join(", ")));
         lines.push(format!("        let [{}] = f_value;", faults.join(", ")));
         let integrals: Vec<_> = (1..=fields.integrals.len()).map(|k| format!("i{k}")).collect();
@@ -439,11 +421,11 @@ impl Controller {{
             )
         });
         let values = states.iter().chain(&faults).cloned().chain(losses).chain(integrals);
-        lines.push("        let estimates = Estimates {".to_owned());
+        lines.push("        let estimates = Estimates {");
         for (field, value) in fields.estimates(controller).iter().zip(values) {
             lines.push(format!("            {field}: {value},"));
         }
-        lines.push("        };".to_owned());
+        lines.push("        };");
         let cases = controller.reconfiguration.iter().flat_map(|all| &all.cases);
         let lost = |case: &Case| match case.decision {
             None => "0.0".to_owned(),
@@ -465,12 +447,12 @@ impl Controller {{
         }
         lines.push(format!("        Outputs {{ {results} }}\n    }}"));
         self.detect(lines);
-        lines.push("}".to_owned());
+        lines.push("}");
         self.places(lines);
     }
 
     /// Adds the methods that test the residuals and return the decision; nothing without a detection.
-    fn detect(&self, lines: &mut Vec<String>) {
+    fn detect(&self, lines: &mut Lines) {
         let Some(detection) = &self.controller.detection else { return };
         let tests = match detection.method {
             Method::Cusum => {
@@ -520,7 +502,7 @@ impl Controller {{
     }
 
     /// Adds the functions of a schedule; nothing without one.
-    fn places(&self, lines: &mut Vec<String>) {
+    fn places(&self, lines: &mut Lines) {
         if self.controller.schedule.is_none() {
             return;
         }

@@ -7,9 +7,10 @@ use crate::detection::Method;
 use crate::reconfiguration::{Case, Reconfiguration};
 use crate::symbols::Kind;
 use crate::tables::tables;
+use crate::text::Lines;
 
 impl Source<'_> {
-    pub(super) fn tables(&self, lines: &mut Vec<String>) {
+    pub(super) fn tables(&self, lines: &mut Lines) {
         for table in tables(self.controller) {
             self.table(lines, &table);
         }
@@ -21,7 +22,7 @@ impl Source<'_> {
     }
 
     /// Adds the ranges and the longest holds of measurements; nothing without them.
-    fn validity(&self, lines: &mut Vec<String>) {
+    fn validity(&self, lines: &mut Lines) {
         if !self.controller.checks_measurements() {
             return;
         }
@@ -45,7 +46,7 @@ static VALIDITY: Validity<'static, {}> = Validity {{
     }
 
     /// Adds a vector, a matrix row by row, or the vectors or matrices of all points of a schedule or sets of gains.
-    fn table(&self, lines: &mut Vec<String>, table: &Constants) {
+    fn table(&self, lines: &mut Lines, table: &Constants) {
         let Constants { name, rows, columns, layers, values, .. } = table;
         let real = self.real;
         let (size, layers, per_layer) = match (columns, layers) {
@@ -67,18 +68,18 @@ static VALIDITY: Validity<'static, {}> = Validity {{
         lines.push(format!("\nstatic {}: {kind} = [", name.to_ascii_uppercase()));
         for layer in values.chunks(if layers.is_some() { per_layer } else { values.len().max(1) }) {
             let indent = if layers.is_some() { "        " } else { "    " };
-            lines.extend(layers.map(|_| "    [".to_owned()));
+            lines.push_if(layers.is_some(), "    [");
             for row in layer {
                 lines.extend(wrapped(row.iter().map(|value| self.literal(*value)), indent));
             }
-            lines.extend(layers.map(|_| "    ],".to_owned()));
+            lines.push_if(layers.is_some(), "    ],");
         }
-        lines.push("];".to_owned());
+        lines.push("];");
     }
 
     /// Adds the tables of the tests that are no real numbers, and the filter of the residuals; nothing without a
     /// detection.
-    fn tables_of_tests(&self, lines: &mut Vec<String>) {
+    fn tables_of_tests(&self, lines: &mut Lines) {
         let Some(detection) = &self.controller.detection else { return };
         if detection.method == Method::Window {
             let counts = detection.tests.iter().map(|test| test.residuals.to_string());
@@ -106,11 +107,7 @@ static RESIDUAL_FILTER: Filter<'static, {}> = Filter {{
         ));
     }
 
-    fn tables_of_reconfiguration(
-        &self,
-        lines: &mut Vec<String>,
-        reconfiguration: &Reconfiguration,
-    ) {
+    fn tables_of_reconfiguration(&self, lines: &mut Lines, reconfiguration: &Reconfiguration) {
         let row = |row: &[bool]| {
             format!("[{}]", row.iter().map(bool::to_string).collect::<Vec<_>>().join(", "))
         };
@@ -158,8 +155,8 @@ fn of_set<T, const N: usize>(table: &[[T; N]; GAIN_SETS], set: u32) -> &[T] {{
 }
 
 /// Adds a static list; `head` is its name and type.
-fn list(lines: &mut Vec<String>, head: &str, values: impl Iterator<Item = String>) {
+fn list(lines: &mut Lines, head: &str, values: impl Iterator<Item = String>) {
     lines.push(format!("\nstatic {head} = ["));
     lines.extend(wrapped(values, "    "));
-    lines.push("];".to_owned());
+    lines.push("];");
 }

@@ -4,9 +4,10 @@ use super::Source;
 use crate::summary::{descriptions, descriptions_of_estimates};
 use crate::symbols::Vector;
 use crate::tables::{starts, stored};
+use crate::text::Lines;
 
 impl Source<'_> {
-    pub(super) fn structures(&self, lines: &mut Vec<String>) {
+    pub(super) fn structures(&self, lines: &mut Lines) {
         let Self { controller, fields, real, .. } = self;
         let estimates = fields.estimates(controller);
         let described = [
@@ -27,13 +28,13 @@ impl Source<'_> {
             if fields.is_empty() {
                 continue;
             }
-            lines.push(format!("\n/// {text}"));
-            lines.push("#[derive(Clone, Copy, Debug, Default, PartialEq)]".to_owned());
-            lines.push(format!("pub struct {name} {{"));
+            lines.push(format!(
+                "\n/// {text}\n#[derive(Clone, Copy, Debug, Default, PartialEq)]\npub struct {name} {{"
+            ));
             for (field, text) in fields.iter().zip(described) {
                 lines.push(format!("    /// {text}.\n    pub {field}: {real},"));
             }
-            lines.push("}".to_owned());
+            lines.push("}");
             lines.push(conversions(name, fields, &format!("[{real}; {count}]")));
         }
         self.actuators_structure(lines);
@@ -43,29 +44,23 @@ impl Source<'_> {
             "
 /// One instance of the controller.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Controller {"
-                .to_owned(),
+pub struct Controller {",
         );
         for vector in stored(controller).into_iter().chain([Vector::U]) {
             lines.push(format!("    {}: [{real}; {}],", vector.name(), vector.kind().plural()));
         }
-        if !controller.schedule_inputs().is_empty() {
-            lines.push(format!("    theta: [{real}; 1],"));
-        }
+        let is_input = !controller.schedule_inputs().is_empty();
+        lines.push_if(is_input, format!("    theta: [{real}; 1],"));
         lines.extend(
             self.other_fields().map(|field| format!("    {}: {},", field.name, field.kind)),
         );
-        if controller.has_counter() {
-            lines.push("    sample: u32,".to_owned());
-        }
-        if controller.filter.is_some() {
-            lines.push("    started: bool,".to_owned());
-        }
-        lines.push("}".to_owned());
+        lines.push_if(controller.has_counter(), "    sample: u32,");
+        lines.push_if(controller.filter.is_some(), "    started: bool,");
+        lines.push("}");
     }
 
     /// Adds the structures of the status of a sample, and of its results.
-    fn outputs_structure(&self, lines: &mut Vec<String>) {
+    fn outputs_structure(&self, lines: &mut Lines) {
         let controller = self.controller;
         let reconfiguration = match controller.reconfiguration {
             None => "",
@@ -130,7 +125,7 @@ pub struct Outputs {{
     }
 
     /// Adds the functions that start an instance.
-    pub(super) fn start(&self, lines: &mut Vec<String>) {
+    pub(super) fn start(&self, lines: &mut Lines) {
         let Self { controller, real, .. } = self;
         let [x, u, y, r] = starts(controller).map(|(name, _)| name.to_ascii_uppercase());
         let filter = match controller.detection {
@@ -166,31 +161,23 @@ impl Controller {{
             x_hat,
             f_hat,"
         ));
-        if controller.filter.is_some() {
-            lines.push(format!("            y_f: {y},\n            started: false,"));
-        }
+        lines.push_if(
+            controller.filter.is_some(),
+            format!("            y_f: {y},\n            started: false,"),
+        );
         lines.extend(
             self.other_fields()
                 .map(|field| format!("            {}: {},", field.name, field.start)),
         );
-        if controller.has_counter() {
-            lines.push("            sample: 0,".to_owned());
-        }
-        if controller.detection.is_some() {
-            lines.push("            x_r,\n            residual: [0.0; RESIDUALS],".to_owned());
-        }
-        if !controller.references.is_empty() {
-            lines.push(format!("            r: {r},"));
-        }
-        if controller.h.is_some() {
-            lines.push("            x_i: [0.0; REFERENCES],".to_owned());
-        }
-        if controller.d.is_some() {
-            lines.push("            u_before: [0.0; ACTUATORS],".to_owned());
-        }
-        if controller.transfer.is_some() {
-            lines.push("            u_t: [0.0; ACTUATORS],".to_owned());
-        }
+        lines.push_if(controller.has_counter(), "            sample: 0,");
+        lines.push_if(
+            controller.detection.is_some(),
+            "            x_r,\n            residual: [0.0; RESIDUALS],",
+        );
+        lines.push_if(!controller.references.is_empty(), format!("            r: {r},"));
+        lines.push_if(controller.h.is_some(), "            x_i: [0.0; REFERENCES],");
+        lines.push_if(controller.d.is_some(), "            u_before: [0.0; ACTUATORS],");
+        lines.push_if(controller.transfer.is_some(), "            u_t: [0.0; ACTUATORS],");
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("            theta: [{}],", self.literal(input.operating)));
         }
@@ -198,7 +185,7 @@ impl Controller {{
     }
 
     /// Adds the structure with decision, residuals and statistics of a sample; nothing without a detection.
-    fn detection_structure(&self, lines: &mut Vec<String>) {
+    fn detection_structure(&self, lines: &mut Lines) {
         if self.controller.detection.is_none() {
             return;
         }
@@ -238,7 +225,7 @@ impl Default for Detection {{
     }
 
     /// Adds the structure with the inputs about actuators that are gone; nothing without a reconfiguration.
-    fn actuators_structure(&self, lines: &mut Vec<String>) {
+    fn actuators_structure(&self, lines: &mut Lines) {
         if self.controller.reconfiguration.is_none() {
             return;
         }
@@ -263,7 +250,7 @@ pub struct Actuators {{"
             };
             lines.push(format!("    /// {text}.\n    pub {field}: bool,"));
         }
-        lines.push("}".to_owned());
+        lines.push("}");
         lines.push(conversions("Actuators", &fields, "[bool; SWITCHES]"));
     }
 }
