@@ -5,39 +5,36 @@ use crate::number::Number;
 use crate::parameters::Parameters;
 
 /// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s; also its derivative.
-pub type State<D = f64> = [D; 4];
+pub(crate) type State<D = f64> = [D; 4];
 
 /// The force on the cart without friction, `u + f_a`, as a polynomial of time:
 /// `value + slope (t - start) + curvature (t - start)² / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Force {
+pub(crate) struct Force {
     /// Force at `start`, in N.
-    pub value: f64,
+    pub(crate) value: f64,
     /// First derivative at `start`, in N/s.
-    pub slope: f64,
+    pub(crate) slope: f64,
     /// Second derivative, in N/s².
-    pub curvature: f64,
+    pub(crate) curvature: f64,
     /// The time in s to which `value` and `slope` belong.
-    pub start: f64,
+    pub(crate) start: f64,
 }
 
 impl Force {
     /// A force that does not change.
-    #[must_use]
-    pub fn constant(value: f64) -> Self {
+    pub(crate) fn constant(value: f64) -> Self {
         Self { value, slope: 0.0, curvature: 0.0, start: 0.0 }
     }
 
     /// The force at a time in s, in N.
-    #[must_use]
-    pub fn at(&self, time: f64) -> f64 {
+    pub(crate) fn at(&self, time: f64) -> f64 {
         let elapsed = time - self.start;
         self.value + elapsed * (self.slope + 0.5 * elapsed * self.curvature)
     }
 
     /// The derivative of the force at a time in s, in N/s.
-    #[must_use]
-    pub fn rate_at(&self, time: f64) -> f64 {
+    pub(crate) fn rate_at(&self, time: f64) -> f64 {
         self.slope + (time - self.start) * self.curvature
     }
 
@@ -47,8 +44,7 @@ impl Force {
     }
 
     /// Whether all coefficients are finite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         [self.value, self.slope, self.curvature, self.start].iter().all(|part| part.is_finite())
     }
 
@@ -76,7 +72,7 @@ impl Force {
 /// `(M + m) J - (m l cos theta)²` is positive for checked parameters.
 /// Source: Patton and Klinkhieo (2009), equation (20).
 #[derive(Clone, Debug, PartialEq)]
-pub struct RigidBody<D = f64> {
+pub(crate) struct RigidBody<D = f64> {
     total_mass: D,
     coupling: D,
     inertia: D,
@@ -96,8 +92,7 @@ struct Position<D> {
 
 impl<D: Number> RigidBody<D> {
     /// The body with these parameters, which must have passed their check.
-    #[must_use]
-    pub fn new(parameters: &Parameters<D>) -> Self {
+    pub(crate) fn new(parameters: &Parameters<D>) -> Self {
         let coupling = parameters.pendulum_mass * parameters.length;
         Self {
             total_mass: parameters.cart_mass + parameters.pendulum_mass,
@@ -123,9 +118,13 @@ impl<D: Number> RigidBody<D> {
 
     /// Derivative of the state of a sliding cart under `net_force`, the force less the friction
     /// in N.
-    #[must_use]
     #[inline]
-    pub fn slide(&self, functions: &impl Functions<D>, state: &State<D>, net_force: D) -> State<D> {
+    pub(crate) fn slide(
+        &self,
+        functions: &impl Functions<D>,
+        state: &State<D>,
+        net_force: D,
+    ) -> State<D> {
         let [_, angle, velocity, rate] = *state;
         let at = self.position(functions, angle, rate);
         let push = net_force - self.cart_damping * velocity + self.coupling * at.centrifugal;
@@ -138,9 +137,8 @@ impl<D: Number> RigidBody<D> {
     }
 
     /// Derivative of the state of a cart held at rest: `J theta'' = m l g sin theta - F_theta theta'`.
-    #[must_use]
     #[inline]
-    pub fn stick(&self, functions: &impl Functions<D>, state: &State<D>) -> State<D> {
+    pub(crate) fn stick(&self, functions: &impl Functions<D>, state: &State<D>) -> State<D> {
         let [_, angle, _, rate] = *state;
         let sine = if self.linearised { angle } else { functions.sine(angle) };
         let torque = self.weight * sine - self.pendulum_damping * rate;
@@ -150,9 +148,13 @@ impl<D: Number> RigidBody<D> {
     /// The friction in N that keeps a cart at rest: (20) with `x_p' = x_p'' = 0`, solved for `f`,
     ///
     /// `f = u + m l theta'² sin theta - (m l / J) cos theta (m l g sin theta - F_theta theta')`.
-    #[must_use]
     #[inline]
-    pub fn balancing_force(&self, functions: &impl Functions<D>, state: &State<D>, force: D) -> D {
+    pub(crate) fn balancing_force(
+        &self,
+        functions: &impl Functions<D>,
+        state: &State<D>,
+        force: D,
+    ) -> D {
         let [_, angle, _, rate] = *state;
         let at = self.position(functions, angle, rate);
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
@@ -163,9 +165,8 @@ impl<D: Number> RigidBody<D> {
 impl RigidBody {
     /// The balancing force in N, and its time derivative in N/s while the cart is held and the force
     /// changes at `force_rate` in N/s.
-    #[must_use]
     #[inline]
-    pub fn balancing(
+    pub(crate) fn balancing(
         &self,
         functions: &impl Functions<f64>,
         state: &State,

@@ -7,29 +7,23 @@ use serde::{Deserialize, Serialize};
 
 /// The motion of the cart on its rail: stick or slip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Regime {
+pub(crate) enum Regime {
     /// The cart slides in the negative direction.
-    Backward,
+    Backward = -1,
     /// The cart is held at rest.
-    Stick,
+    Stick = 0,
     /// The cart slides in the positive direction.
-    Forward,
+    Forward = 1,
 }
 
 impl Regime {
     /// -1, 0, +1: sliding backward, sticking, sliding forward.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        match self {
-            Self::Backward => -1,
-            Self::Stick => 0,
-            Self::Forward => 1,
-        }
+    pub(crate) fn number(self) -> i32 {
+        self as i32
     }
 
     /// [`Regime::number`] as `f64`.
-    #[must_use]
-    pub fn sign(self) -> f64 {
+    pub(crate) fn sign(self) -> f64 {
         f64::from(self.number())
     }
 }
@@ -40,7 +34,7 @@ impl Regime {
 ///
 /// Source: Patton and Klinkhieo (2009), equation (21); the exponent and the velocity are repaired.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StribeckLaw<D = f64> {
+pub(crate) struct StribeckLaw<D = f64> {
     coulomb: D,
     excess: D,
     inverse_velocity: D,
@@ -49,8 +43,7 @@ pub struct StribeckLaw<D = f64> {
 
 impl<D: Number> StribeckLaw<D> {
     /// The law with these parameters, which must have passed their check.
-    #[must_use]
-    pub fn new(parameters: &Parameters<D>) -> Self {
+    pub(crate) fn new(parameters: &Parameters<D>) -> Self {
         Self {
             coulomb: parameters.coulomb,
             excess: parameters.static_friction - parameters.coulomb,
@@ -61,17 +54,20 @@ impl<D: Number> StribeckLaw<D> {
 
     /// `g(v)` in N for a velocity in m/s of either sign; at zero its derivative is the one from
     /// the right.
-    #[must_use]
     #[inline]
-    pub fn magnitude(&self, functions: &impl Functions<D>, velocity: D) -> D {
+    pub(crate) fn magnitude(&self, functions: &impl Functions<D>, velocity: D) -> D {
         let power = (velocity.absolute() * self.inverse_velocity).power(self.exponent);
         self.coulomb + self.excess * functions.exponential(-power)
     }
 
     /// The friction in N of a cart that slides in this direction, forward or backward, at this velocity in m/s.
-    #[must_use]
     #[inline]
-    pub fn sliding(&self, functions: &impl Functions<D>, direction: Regime, velocity: D) -> D {
+    pub(crate) fn sliding(
+        &self,
+        functions: &impl Functions<D>,
+        direction: Regime,
+        velocity: D,
+    ) -> D {
         let (speed, sign) = match direction {
             Regime::Backward => (-velocity, -1.0),
             _ => (velocity, 1.0),
@@ -82,8 +78,7 @@ impl<D: Number> StribeckLaw<D> {
     /// The friction in N of a cart at rest: the balancing force, kept between `-F_s` and `F_s`.
     ///
     /// The derivative is that of the balancing force within these limits, and that of the limit beyond them.
-    #[must_use]
-    pub fn holding(&self, balancing: D) -> D {
+    pub(crate) fn holding(&self, balancing: D) -> D {
         let limit = self.limit();
         if balancing > limit {
             limit
@@ -95,30 +90,26 @@ impl<D: Number> StribeckLaw<D> {
     }
 
     /// Whether there is static friction, so that a cart can be held.
-    #[must_use]
-    pub fn holds(&self) -> bool {
+    pub(crate) fn holds(&self) -> bool {
         self.limit() > D::zero()
     }
 
     /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
     ///
     /// As both are the same number, rounding never starts a cart that breaks away backward.
-    #[must_use]
-    pub fn limit(&self) -> D {
+    pub(crate) fn limit(&self) -> D {
         self.coulomb + self.excess
     }
 }
 
 impl StribeckLaw {
     /// The velocity in m/s over which the friction falls: `v_s`, or infinity if `F_s = F_c`.
-    #[must_use]
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         if self.excess > 0.0 { 1.0 / self.inverse_velocity } else { f64::INFINITY }
     }
 
     /// The regime of a cart at velocity zero, where `balancing` in N is the friction that would hold it.
-    #[must_use]
-    pub fn regime_at_rest(&self, balancing: f64) -> Regime {
+    pub(crate) fn regime_at_rest(&self, balancing: f64) -> Regime {
         if balancing > self.limit() {
             Regime::Forward
         } else if balancing < -self.limit() {

@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 
-use crate::number::Number;
+use num_dual::Dual64;
 
 /// Sine, cosine and exponential of numbers `D`.
-pub trait Functions<D> {
+pub(crate) trait Functions<D> {
     /// The sine.
     fn sine(&self, angle: D) -> D;
 
@@ -18,22 +18,39 @@ pub trait Functions<D> {
 
 /// Computes each value, without memory.
 #[derive(Clone, Copy, Debug)]
-pub struct Direct;
+pub(crate) struct Direct;
 
-impl<D: Number> Functions<D> for Direct {
+impl Functions<f64> for Direct {
     #[inline]
-    fn sine(&self, angle: D) -> D {
-        angle.sine()
+    fn sine(&self, angle: f64) -> f64 {
+        libm::sin(angle)
     }
 
     #[inline]
-    fn sine_and_cosine(&self, angle: D) -> (D, D) {
-        angle.sine_and_cosine()
+    fn sine_and_cosine(&self, angle: f64) -> (f64, f64) {
+        libm::sincos(angle)
     }
 
     #[inline]
-    fn exponential(&self, exponent: D) -> D {
-        exponent.exponential()
+    fn exponential(&self, exponent: f64) -> f64 {
+        libm::exp(exponent)
+    }
+}
+
+impl Functions<Dual64> for Direct {
+    fn sine(&self, angle: Dual64) -> Dual64 {
+        self.sine_and_cosine(angle).0
+    }
+
+    fn sine_and_cosine(&self, angle: Dual64) -> (Dual64, Dual64) {
+        let (sine, cosine) = self.sine_and_cosine(angle.re);
+        (Dual64::new(sine, cosine * angle.eps), Dual64::new(cosine, -sine * angle.eps))
+    }
+
+    fn exponential(&self, exponent: Dual64) -> Dual64 {
+        let value = self.exponential(exponent.re);
+        // e^x tends to zero faster than any power of x, whose derivative may be infinite.
+        Dual64::new(value, if value == 0.0 { 0.0 } else { value * exponent.eps })
     }
 }
 
@@ -44,7 +61,7 @@ impl<D: Number> Functions<D> for Direct {
 /// a step is the start of the next one. The values depend on the arguments alone, so results do not
 /// depend on what is remembered: all memories are equal, and none is part of the FMU state.
 #[derive(Clone, Debug)]
-pub struct Memory {
+pub(crate) struct Memory {
     last: Cell<Angle>,
     before: Cell<Angle>,
     /// Exponent and exponential.
@@ -86,7 +103,7 @@ impl Functions<f64> for Memory {
         if before.argument.to_bits() == angle.to_bits() {
             return (before.sine, before.cosine);
         }
-        let (sine, cosine) = angle.sine_and_cosine();
+        let (sine, cosine) = Direct.sine_and_cosine(angle);
         self.before.set(last);
         self.last.set(Angle { argument: angle, sine, cosine });
         (sine, cosine)
@@ -98,7 +115,7 @@ impl Functions<f64> for Memory {
         if known.to_bits() == exponent.to_bits() {
             return value;
         }
-        let value = exponent.exponential();
+        let value = Direct.exponential(exponent);
         self.exponential.set([exponent, value]);
         value
     }
@@ -139,7 +156,8 @@ mod tests {
     #[test]
     fn the_sine_alone_has_the_bits_of_the_sine_with_its_cosine() {
         for argument in arguments() {
-            assert_eq!(argument.sine().to_bits(), argument.sine_and_cosine().0.to_bits());
+            let (sine, _) = Direct.sine_and_cosine(argument);
+            assert_eq!(Direct.sine(argument).to_bits(), sine.to_bits());
         }
     }
 }

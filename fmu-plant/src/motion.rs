@@ -16,7 +16,7 @@ use segment::Segment;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use tolerance::Tolerance;
+pub(crate) use tolerance::Tolerance;
 
 pub(crate) mod exchange;
 mod segment;
@@ -44,7 +44,7 @@ const EVENT_LIMIT: u32 = 10_000;
 ///
 /// The state of the motion is then the one at [`Failure::time`].
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// Start or duration is not finite, or the duration is negative.
     #[error("interval from {start} s of {duration} s: must be finite and not negative")]
     Interval {
@@ -81,8 +81,7 @@ pub enum Failure {
 
 impl Failure {
     /// The time in s to which the motion was integrated.
-    #[must_use]
-    pub fn time(&self) -> f64 {
+    pub(crate) fn time(&self) -> f64 {
         match self {
             Self::Interval { start: time, .. }
             | Self::NotFinite { time }
@@ -95,7 +94,7 @@ impl Failure {
 
 /// The state of the plant between steps; a copy continues with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Motion {
+pub(crate) struct Motion {
     state: State,
     regime: Regime,
     suggested_step: f64,
@@ -155,11 +154,12 @@ impl Default for Motion {
 impl Motion {
     /// The motion from an initial state `[x_p, theta, v_p, omega]` under the force at that time.
     ///
-    /// The parameters must have passed their check.
-    ///
-    /// # Errors
-    /// The first initial value that is not finite.
-    pub fn start(parameters: &Parameters, initial: State, force: f64) -> Result<Self, Refusal> {
+    /// The parameters must have passed their check. An error for the first initial value that is not finite.
+    pub(crate) fn start(
+        parameters: &Parameters,
+        initial: State,
+        force: f64,
+    ) -> Result<Self, Refusal> {
         let names = ["x_p_0", "theta_0", "v_p_0", "omega_0"];
         for (name, value) in names.into_iter().zip(initial) {
             require(name, value, true, "finite")?;
@@ -171,25 +171,22 @@ impl Motion {
     }
 
     /// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s.
-    #[must_use]
-    pub fn state(&self) -> &State {
+    pub(crate) fn state(&self) -> &State {
         &self.state
     }
 
     /// The state, for an importer that integrates it.
-    pub fn state_mut(&mut self) -> &mut State {
+    pub(crate) fn state_mut(&mut self) -> &mut State {
         &mut self.state
     }
 
     /// The regime of the cart.
-    #[must_use]
-    pub fn regime(&self) -> Regime {
+    pub(crate) fn regime(&self) -> Regime {
         self.regime
     }
 
     /// Friction and derivative of the state under the force `u + f_a` in N at this time.
-    #[must_use]
-    pub fn response(&self, parameters: &Parameters, force: f64) -> Response {
+    pub(crate) fn response(&self, parameters: &Parameters, force: f64) -> Response {
         Response::new(&self.memory, parameters, self.regime, &self.state, force)
     }
 
@@ -204,9 +201,8 @@ impl Motion {
     /// interval shorter than the suggested step takes one step: seven evaluations of the dynamics, of
     /// which the first finds sine, cosine and exponential remembered; nothing is allocated.
     ///
-    /// # Errors
-    /// The reason and the time reached; the state is the one at that time.
-    pub fn advance(
+    /// After an error the state is the one at the time that it states.
+    pub(crate) fn advance(
         &mut self,
         parameters: &Parameters,
         force: &Force,
@@ -222,10 +218,7 @@ impl Motion {
     ///
     /// If the next interval is the rest of this one under the same constant force, the motion has the same
     /// bits as without the stop.
-    ///
-    /// # Errors
-    /// Same as [`Motion::advance`].
-    pub fn advance_to_event(
+    pub(crate) fn advance_to_event(
         &mut self,
         parameters: &Parameters,
         force: &Force,

@@ -1,34 +1,20 @@
 //! The number types of the plant's equations.
 //!
-//! Sine, exponential and power are functions of the crate `libm`, which have the same bits on every
+//! Power, sine and exponential are functions of the crate `libm`, which have the same bits on every
 //! platform; the functions of the standard library differ between platforms.
 
 use num_dual::{Dual64, DualNum};
 
 /// `f64`, or a dual number `x + x' e` with `e² = 0`, which carries the derivative `x'` in a
 /// direction through the same equations (forward differentiation).
-pub trait Number: DualNum<Primitive = f64> + Copy {
+pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
     /// The absolute value; at zero its derivative is the one from the right.
-    #[must_use]
     fn absolute(self) -> Self;
-
-    /// The sine.
-    #[must_use]
-    fn sine(self) -> Self;
-
-    /// Sine and cosine.
-    #[must_use]
-    fn sine_and_cosine(self) -> (Self, Self);
-
-    /// The exponential function.
-    #[must_use]
-    fn exponential(self) -> Self;
 
     /// `self^exponent` of a number `self >= 0` and an exponent above zero.
     ///
     /// The derivative at zero is the one from the right: infinite for exponents below one, unless
     /// the number does not change in the direction.
-    #[must_use]
     fn power(self, exponent: Self) -> Self;
 }
 
@@ -36,21 +22,6 @@ impl Number for f64 {
     #[inline]
     fn absolute(self) -> Self {
         self.abs()
-    }
-
-    #[inline]
-    fn sine(self) -> Self {
-        libm::sin(self)
-    }
-
-    #[inline]
-    fn sine_and_cosine(self) -> (Self, Self) {
-        libm::sincos(self)
-    }
-
-    #[inline]
-    fn exponential(self) -> Self {
-        libm::exp(self)
     }
 
     #[inline]
@@ -62,21 +33,6 @@ impl Number for f64 {
 impl Number for Dual64 {
     fn absolute(self) -> Self {
         if self.re < 0.0 { -self } else { self }
-    }
-
-    fn sine(self) -> Self {
-        self.sine_and_cosine().0
-    }
-
-    fn sine_and_cosine(self) -> (Self, Self) {
-        let (sine, cosine) = self.re.sine_and_cosine();
-        (Self::new(sine, cosine * self.eps), Self::new(cosine, -sine * self.eps))
-    }
-
-    fn exponential(self) -> Self {
-        let value = self.re.exponential();
-        // e^x tends to zero faster than any power of x, whose derivative may be infinite.
-        Self::new(value, if value == 0.0 { 0.0 } else { value * self.eps })
     }
 
     fn power(self, exponent: Self) -> Self {

@@ -13,7 +13,7 @@ pub(crate) struct Plant<'a> {
     /// The force as a polynomial of the time elapsed in the communication step.
     force: Force,
     /// Remembered values of functions at the start and the end of the last steps.
-    memory: &'a Memory,
+    pub(crate) memory: &'a Memory,
 }
 
 /// The first event inside an integration step, estimated by the continuous extension.
@@ -29,20 +29,9 @@ impl<'a> Plant<'a> {
         Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force, memory }
     }
 
-    /// The derivative of the state inside a step.
+    /// The derivative of the state: by [`Plant::memory`] at the start or the end of a step, by [`Direct`] inside.
     #[inline]
-    pub(crate) fn derivative(&self, regime: Regime, elapsed: f64, state: &State) -> State {
-        self.derivative_by(&Direct, regime, elapsed, state)
-    }
-
-    /// The derivative of the state at the start or the end of a step.
-    #[inline]
-    pub(crate) fn derivative_at_end(&self, regime: Regime, elapsed: f64, state: &State) -> State {
-        self.derivative_by(self.memory, regime, elapsed, state)
-    }
-
-    #[inline]
-    fn derivative_by(
+    pub(crate) fn derivative(
         &self,
         functions: &impl Functions<f64>,
         regime: Regime,

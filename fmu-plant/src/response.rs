@@ -8,11 +8,11 @@ use crate::parameters::Parameters;
 
 /// Friction and motion at one instant, as numbers `D`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Response<D = f64> {
+pub(crate) struct Response<D = f64> {
     /// The friction on the cart in N.
-    pub friction: D,
+    pub(crate) friction: D,
     /// The derivative of the state.
-    pub slope: State<D>,
+    pub(crate) slope: State<D>,
 }
 
 impl<D: Number> Response<D> {
@@ -22,8 +22,7 @@ impl<D: Number> Response<D> {
     /// A force that has just jumped can exceed the largest friction; the friction is then `F_s`.
     /// Where there is no static friction, nothing holds the cart: its derivatives with respect to
     /// state and force are those of a cart without friction.
-    #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         functions: &impl Functions<D>,
         parameters: &Parameters<D>,
         regime: Regime,

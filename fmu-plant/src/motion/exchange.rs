@@ -65,7 +65,7 @@ impl<'a> Instant<'a> {
     /// Velocity in m/s and acceleration in m/s² of a sliding cart in its direction.
     fn sliding(&self) -> [f64; 2] {
         let Motion { state, regime, .. } = self.motion;
-        let slope = self.plant.derivative_at_end(*regime, 0.0, state);
+        let slope = self.plant.derivative(self.plant.memory, *regime, 0.0, state);
         [state[2], slope[2]].map(|part| regime.sign() * part)
     }
 
@@ -103,8 +103,7 @@ impl Motion {
     /// to the static friction, and more by `EXCESS`.
     ///
     /// After [`Motion::settle`] under the same force all are positive.
-    #[must_use]
-    pub fn indicators(&self, parameters: &Parameters, force: f64) -> [f64; INDICATORS] {
+    pub(crate) fn indicators(&self, parameters: &Parameters, force: f64) -> [f64; INDICATORS] {
         let now = Instant::new(self, parameters, force);
         if self.regime == Regime::Stick {
             let left = |direction| (now.held(direction) + now.excess) / now.nominal;
@@ -125,7 +124,7 @@ impl Motion {
     ///
     /// A sliding cart that has stopped gets the velocity zero; the balancing force then decides whether it is held,
     /// continues or reverses. A held cart to which the importer has given a velocity slides in its direction.
-    pub fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
+    pub(crate) fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
         if self.advances {
             return false;
         }

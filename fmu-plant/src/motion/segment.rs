@@ -3,6 +3,7 @@
 use super::Motion;
 use crate::dynamics::State;
 use crate::friction::Regime;
+use crate::functions::Direct;
 use crate::plant::Plant;
 use fmu::solver::Step;
 
@@ -19,7 +20,7 @@ pub(super) struct Segment<'a> {
 impl<'a> Segment<'a> {
     pub(super) fn new(plant: &'a Plant<'a>, motion: &Motion, elapsed: f64) -> Self {
         let Motion { state: start, regime, .. } = *motion;
-        let slope = plant.derivative_at_end(regime, elapsed, &start);
+        let slope = plant.derivative(plant.memory, regime, elapsed, &start);
         Self { plant, regime, elapsed, start, slope }
     }
 
@@ -28,8 +29,8 @@ impl<'a> Segment<'a> {
         let Self { plant, regime, .. } = *self;
         let mut step = Step::new(self.start, &self.slope);
         step.take(
-            |time, state, slope| *slope = plant.derivative(regime, time, state),
-            |time, state, slope| *slope = plant.derivative_at_end(regime, time, state),
+            |time, state, slope| *slope = plant.derivative(&Direct, regime, time, state),
+            |time, state, slope| *slope = plant.derivative(plant.memory, regime, time, state),
             self.elapsed,
             length,
         );

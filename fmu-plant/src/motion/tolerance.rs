@@ -12,7 +12,7 @@ const SAFETY: f64 = 0.1;
 
 /// Bounds of the error of one integration step, per component of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Tolerance {
+pub(crate) struct Tolerance {
     relative: f64,
     absolute: f64,
 }
@@ -27,11 +27,9 @@ impl Default for Tolerance {
 impl Tolerance {
     /// The given relative tolerance and a thousandth of it as the absolute one.
     ///
-    /// A value outside of 1e-12 to 1e-3 is replaced by the nearest of these.
-    ///
-    /// # Errors
-    /// A tolerance that is not finite or not positive is refused.
-    pub fn new(relative: f64) -> Result<Self, Refusal> {
+    /// A value outside of 1e-12 to 1e-3 is replaced by the nearest of these; an error for one that is not finite or not
+    /// positive.
+    pub(crate) fn new(relative: f64) -> Result<Self, Refusal> {
         require("tolerance", relative, relative > 0.0, "finite and > 0")?;
         let relative = relative.clamp(1e-12, 1e-3);
         Ok(Self { relative, absolute: relative / 1e3 })

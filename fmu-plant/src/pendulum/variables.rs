@@ -64,26 +64,8 @@ pub(super) const FRICTION_INITIALLY: [&str; 15] = [
     "linearised",
 ];
 
-/// The dependencies of the initial accelerations: all except the position.
-pub(super) const ACCELERATION_INITIALLY: [&str; 17] = [
-    "u",
-    "f_a",
-    "M",
-    "m",
-    "J",
-    "l",
-    "F_x",
-    "F_theta",
-    "g",
-    "F_c",
-    "F_s",
-    "v_s",
-    "delta",
-    "theta_0",
-    "v_p_0",
-    "omega_0",
-    "linearised",
-];
+/// What the initial accelerations depend on besides: together all except the position.
+pub(super) const CART: [&str; 2] = ["M", "F_x"];
 
 /// All variables, in the order of the description.
 pub(super) fn all() -> Vec<Variable> {
@@ -145,7 +127,7 @@ fn derivatives() -> [Variable; 4] {
             .unit(unit)
             .derivative_of(state)
             .depends(DependencyKind::Dependent, DEPENDS)
-            .initially(ACCELERATION_INITIALLY)
+            .initially(FRICTION_INITIALLY.into_iter().chain(CART))
     };
     [
         rate("Derivative of x_p: v_p", "x_p", "v_p"),
