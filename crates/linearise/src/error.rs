@@ -3,8 +3,9 @@
 use fmu_import::FmuError;
 use slave::CallError;
 
-/// Why an FMU cannot be linearised.
+/// Why an FMU cannot be linearised; `model` is its `modelName`.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what its fields are")]
 #[non_exhaustive]
 pub enum LineariseError {
     /// The FMU cannot be read or instantiated.
@@ -13,80 +14,34 @@ pub enum LineariseError {
     /// The FMU has no variable of this name.
     #[error("{model} has no variable {name:?}{nearest}")]
     UnknownVariable {
-        /// `modelName` of the FMU.
         model: String,
-        /// The requested name.
         name: String,
         /// Variables of a similar name, as part of a sentence.
         nearest: String,
     },
-    /// The variable does not fit its role in the request: a state, an input, an output or a setting of the operating
-    /// point.
+    /// The variable does not fit its role: a state, an input, an output or a setting of the operating point.
     #[error("{name} is {actual}, expected {expected}")]
-    Role {
-        /// The variable.
-        name: String,
-        /// The property of the variable.
-        actual: String,
-        /// The property that the role requires.
-        expected: &'static str,
-    },
+    Role { name: String, actual: String, expected: &'static str },
     /// A list names a variable twice.
     #[error("{name} is named twice among the {list}")]
-    Twice {
-        /// The variable.
-        name: String,
-        /// The list.
-        list: &'static str,
-    },
+    Twice { name: String, list: &'static str },
     /// A list that needs at least one variable is empty.
     #[error(
         "the request names no {list}; linearisation by steps from an FMU state needs at least one"
     )]
-    Empty {
-        /// The list.
-        list: &'static str,
-    },
+    Empty { list: &'static str },
     /// A number of the request is invalid.
     #[error("{what} is {value}, expected {expected}")]
-    Number {
-        /// The quantity.
-        what: String,
-        /// Its value.
-        value: f64,
-        /// The valid range.
-        expected: &'static str,
-    },
+    Number { what: String, value: f64, expected: &'static str },
     /// The text is not a value of the variable's type.
     #[error("{name} = {text:?}: expected {expected}")]
-    Value {
-        /// The variable.
-        name: String,
-        /// The text.
-        text: String,
-        /// The expected value.
-        expected: String,
-    },
+    Value { name: String, text: String, expected: String },
     /// The FMU refuses a value.
     #[error("{name} = {value}: {source}")]
-    Refused {
-        /// The variable.
-        name: String,
-        /// The value.
-        value: String,
-        /// Function, status and messages.
-        source: CallError,
-    },
+    Refused { name: String, value: String, source: CallError },
     /// An event changes a state that the operating point prescribes.
     #[error("{name} cannot be held at {required}: an event of the FMU makes it {actual}")]
-    Moved {
-        /// The state.
-        name: String,
-        /// The value of the operating point.
-        required: f64,
-        /// The value after the event.
-        actual: f64,
-    },
+    Moved { name: String, required: f64, actual: f64 },
     /// A function of the FMU failed.
     #[error(transparent)]
     Call(#[from] CallError),
@@ -95,18 +50,10 @@ pub enum LineariseError {
     Ended,
     /// Events do not end.
     #[error("the events do not end: {iterations} times fmi2NewDiscreteStates")]
-    EndlessEvents {
-        /// Number of calls.
-        iterations: usize,
-    },
+    EndlessEvents { iterations: usize },
     /// A value of the FMU is NaN or infinite.
     #[error("{name} is {value}, expected a finite number")]
-    NotFinite {
-        /// The quantity.
-        name: String,
-        /// Its value.
-        value: f64,
-    },
+    NotFinite { name: String, value: f64 },
     /// The model description contradicts itself.
     #[error("ModelStructure: {text}")]
     Structure {
@@ -115,43 +62,26 @@ pub enum LineariseError {
     },
     /// The FMU cannot serve as the plant in an estimator.
     #[error("no estimator can carry {model}: it lacks {what}")]
-    Unsuited {
-        /// `modelName` of the FMU.
-        model: String,
-        /// What it lacks.
-        what: &'static str,
-    },
+    Unsuited { model: String, what: &'static str },
     /// The FMU has no continuous state.
     #[error("{model} has no continuous states: there is nothing to control")]
-    NoStates {
-        /// `modelName` of the FMU.
-        model: String,
-    },
+    NoStates { model: String },
     /// A state that is left out influences a remaining state or output.
     #[error("the state {left_out} may not be left out: {dependent} depends on it")]
-    Coupled {
-        /// The state.
-        left_out: String,
-        /// The state derivative or output that depends on it.
-        dependent: String,
-    },
+    Coupled { left_out: String, dependent: String },
     /// The FMU offers none of the three methods.
     #[error(
         "{model} can be linearised in none of the three ways: it offers neither directional \
          derivatives (providesDirectionalDerivative), nor model exchange, nor saved FMU states \
          (canGetAndSetFMUstate)"
     )]
-    NoWay {
-        /// `modelName` of the FMU.
-        model: String,
-    },
+    NoWay { model: String },
     /// The third method needs the names of the states, and the request has none.
     #[error(
         "{model} is linearised by steps from an FMU state, but its description does not list its \
          states: name the variables that are its states{candidates}"
     )]
     StatesNotNamed {
-        /// `modelName` of the FMU.
         model: String,
         /// Candidates: outputs and local variables that can be read, as part of a sentence.
         candidates: String,
@@ -162,58 +92,31 @@ pub enum LineariseError {
          result: give a communication step in s; with the first: {reason}",
         tried.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
     )]
-    NoStep {
-        /// `modelName` of the FMU.
-        model: String,
-        /// The steps tried, in s.
-        tried: Vec<f64>,
-        /// The error with the first of them.
-        reason: Box<LineariseError>,
-    },
+    NoStep { model: String, tried: Vec<f64>, reason: Box<LineariseError> },
     /// Pulses of the inputs do not excite all states.
     #[error(
         "pulses of the inputs excite {rank} of {expected} directions of states and inputs; constant \
          or linearly dependent: {}",
         names.join(", ")
     )]
-    Unreachable {
-        /// Number of directions excited.
-        rank: usize,
-        /// Number of states and inputs.
-        expected: usize,
-        /// Variables without an independent direction.
-        names: Vec<String>,
-    },
+    Unreachable { rank: usize, expected: usize, names: Vec<String> },
     /// The variables named as states do not determine the future of the FMU.
     #[error(
         "the variables named as states do not determine how the FMU continues: the relative prediction \
          error for a new input signal is {missed:e}, allowed is {allowed:e}; name all states, take a \
          shorter step, or a point nearer to an equilibrium"
     )]
-    NotStates {
-        /// Largest relative prediction error.
-        missed: f64,
-        /// Largest allowed relative error.
-        allowed: f64,
-    },
+    NotStates { missed: f64, allowed: f64 },
     /// The communication steps do not determine the matrices accurately enough.
     #[error(
         "the matrices from steps of an FMU state have a relative error of {relative:e}, allowed is \
          {allowed}; take a point nearer to an equilibrium, another step, or an FMU for model exchange"
     )]
-    Inaccurate {
-        /// The largest relative error.
-        relative: f64,
-        /// The largest allowed relative error.
-        allowed: f64,
-    },
+    Inaccurate { relative: f64, allowed: f64 },
     /// The step map has no real logarithm.
     #[error(
         "no continuous system corresponds to the FMU's steps of {step} s: the step map has no real \
          logarithm; take a shorter step; a sampled FMU cannot be linearised this way"
     )]
-    NoLogarithm {
-        /// The communication step in s.
-        step: f64,
-    },
+    NoLogarithm { step: f64 },
 }
