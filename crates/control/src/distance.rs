@@ -205,7 +205,6 @@ struct Square {
 }
 
 impl Square {
-    /// The centres of its quarters.
     fn quarters(&self) -> [Complex<f64>; 4] {
         let h = 0.5 * self.half;
         [(-h, -h), (-h, h), (h, -h), (h, h)].map(|(x, y)| self.centre + Complex::new(x, y))

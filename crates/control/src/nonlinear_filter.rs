@@ -101,13 +101,9 @@ pub struct NonlinearFilter {
     /// The innovation y - h(z) of the last correction, p numbers; 0 for measurements that were not due. The
     /// unscented filter has the mean of h over its points in place of h(z).
     pub innovation: DVector<f64>,
-    /// W, N x N.
     w: DMatrix<f64>,
-    /// V, p x p.
     v: DMatrix<f64>,
-    /// The Jacobian G.
     g: DMatrix<f64>,
-    /// The Jacobian H.
     h: DMatrix<f64>,
     /// Memory for products, N x N.
     square: DMatrix<f64>,

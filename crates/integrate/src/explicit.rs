@@ -81,7 +81,6 @@ impl Explicit {
         Ok(())
     }
 
-    /// The derivative at the end of the step.
     pub(crate) fn last_slope(&self) -> &[f64] {
         &self.slopes[6]
     }

@@ -14,13 +14,10 @@ pub(crate) struct Inputs {
     references: Vec<u32>,
     /// Their start values in the description, 0 if there is none.
     starts: Vec<f64>,
-    /// Their polynomials.
     pub(crate) tracks: Vec<Track>,
     /// The indices of the inputs with a derivative other than zero.
     moving: Vec<usize>,
-    /// The value references of `moving`.
     moving_references: Vec<u32>,
-    /// Memory for the values of `moving`.
     moving_values: Vec<f64>,
 }
 
@@ -33,7 +30,6 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// The value at `time`.
     fn at(&self, time: f64) -> f64 {
         let distance = time - self.origin;
         let (mut value, mut factor) = (self.value, 1.0);
@@ -92,7 +88,6 @@ impl Inputs {
         Ok(())
     }
 
-    /// The index of an input.
     fn find(&self, reference: u32) -> Option<usize> {
         self.references.binary_search(&reference).ok()
     }

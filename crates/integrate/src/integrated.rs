@@ -30,15 +30,12 @@ pub struct Options {
     pub method: Method,
 }
 
-/// The mode of the FMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Mode {
     /// Before the end of initialization mode.
     #[default]
     Setup,
-    /// Event mode.
     Event,
-    /// Continuous-time mode.
     Continuous,
 }
 
@@ -81,7 +78,6 @@ pub fn description_of(equations: &ModelDescription) -> ModelDescription {
     description
 }
 
-/// Returns the value references of the clocks.
 fn clocks_of(description: &ModelDescription) -> Vec<u32> {
     let clocks =
         description.variables.iter().filter(|variable| matches!(variable.kind, Kind::Clock(_)));
@@ -127,9 +123,7 @@ pub struct Integrated {
     saved: Vec<Saved>,
     /// Memory for the present values of Integers that the master sets.
     integers: Vec<i64>,
-    /// Memory for the present values of Booleans and clocks that the master sets.
     booleans: Vec<i32>,
-    /// Memory for the present values of Reals that the master sets.
     reals: Vec<f64>,
 }
 
@@ -242,7 +236,6 @@ impl Integrated {
     }
 }
 
-/// Returns an error of the integration.
 fn failed(what: String) -> CallError {
     let failure = Failure::InvalidAnswer(what);
     CallError { function: INTEGRATION, failure, messages: Vec::new() }

@@ -72,7 +72,6 @@ pub(crate) struct Rosenbrock {
     pub(crate) end: Vec<f64>,
     /// The increments of the six stages.
     increments: [Vec<f64>; 6],
-    /// The argument of a stage.
     argument: Vec<f64>,
     /// The right-hand side of a stage, then its increment.
     slope: Vec<f64>,

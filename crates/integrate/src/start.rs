@@ -5,7 +5,6 @@
 pub(crate) struct StepStart<'a> {
     /// The time in s.
     pub(crate) time: f64,
-    /// The states.
     pub(crate) states: &'a [f64],
     /// The derivative of the states.
     pub(crate) slope: &'a [f64],

@@ -13,7 +13,6 @@ use crate::start::StepStart;
 const SAFETY: f64 = 0.9;
 /// The smallest ratio of two consecutive steps.
 const SHRINK: f64 = 0.2;
-/// The largest ratio of two consecutive steps.
 const GROW: f64 = 5.0;
 /// The step after a trial step that cannot be evaluated, relative to it.
 const RETREAT: f64 = 0.25;
@@ -40,7 +39,6 @@ pub(crate) struct Memory {
     size: f64,
     /// The error of the last step; 0: none.
     error: f64,
-    /// Whether the stiff method is in use.
     is_stiff: bool,
     /// Number of steps of the explicit method beyond [`BORDER`] since the count was last reset.
     suspicious: u32,
@@ -91,7 +89,6 @@ pub(crate) struct Stepper {
     has_slope: bool,
     /// The size of the last step in s.
     size: f64,
-    /// Whether the last step is one of the stiff method.
     last_is_stiff: bool,
 }
 
@@ -113,12 +110,10 @@ impl Stepper {
         }
     }
 
-    /// Replaces the tolerances.
     pub(crate) fn set_scale(&mut self, scale: Scale) {
         self.scale = scale;
     }
 
-    /// Returns the nominal value of each state.
     pub(crate) fn nominals(&self) -> &[f64] {
         self.scale.nominals()
     }

@@ -44,7 +44,6 @@ pub(super) struct Bench<'p> {
     rest: DMatrix<f64>,
 }
 
-/// A pulse of an input.
 #[derive(Clone, Copy)]
 pub(super) struct Pulse {
     pub(super) side: Side,
@@ -241,13 +240,11 @@ pub(super) struct Record {
     pub(super) change: DMatrix<f64>,
     /// Outputs at the end of the step.
     pub(super) outputs: DMatrix<f64>,
-    /// The pulse of each input.
     pub(super) pulses: Vec<Pulse>,
     /// The error of each reading: rounding, and the remainder of the extrapolation.
     pub(super) noise: Vec<f64>,
     /// Number of steps after each pulse.
     count: usize,
-    /// Whether the operating point drifts during the record.
     pub(super) is_drifting: bool,
 }
 

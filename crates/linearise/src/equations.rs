@@ -48,7 +48,6 @@ pub struct PlantEquations {
     values: [Vec<f64>; 2],
     /// A column of the Jacobian.
     column: Vec<f64>,
-    /// The inputs after initialisation.
     start_inputs: Vec<f64>,
 }
 
@@ -354,7 +353,6 @@ fn ends(value: f64, step: f64, [min, max]: [f64; 2]) -> [f64; 2] {
     if low < high { [low, high] } else { [value - step, value + step] }
 }
 
-/// Checks that all values are finite.
 fn all_finite(names: &[String], values: &[f64]) -> Result<(), LineariseError> {
     for (name, &value) in names.iter().zip(values) {
         finite(name, value)?;

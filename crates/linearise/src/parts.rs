@@ -130,7 +130,6 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Checks that no name is in the list twice.
 fn check_distinct<'n>(
     names: impl IntoIterator<Item = &'n String>,
     list: &'static str,

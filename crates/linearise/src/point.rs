@@ -11,7 +11,6 @@ use slave::{CallError, ModelExchange, Slave, Value};
 /// Maximum number of calls of `fmi2NewDiscreteStates` per event.
 const EVENT_ITERATIONS: usize = 1000;
 
-/// Name of the instances.
 pub(super) const NAME: &str = "linearise";
 
 /// Initialises an instance with the values of the operating point, except states without a start value, which must be

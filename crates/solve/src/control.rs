@@ -95,7 +95,6 @@ pub struct ErrorControl {
     law: Law,
     /// The last size that the controller returned.
     requested: f64,
-    /// Whether the last step was rejected.
     rejected: bool,
 }
 

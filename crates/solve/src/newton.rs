@@ -79,7 +79,6 @@ impl Newton {
         }
     }
 
-    /// Requests the matrix at the present u.
     fn request_matrix(&mut self) -> Progress {
         self.stage = Stage::MatrixRequested;
         Progress::Matrix

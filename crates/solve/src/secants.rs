@@ -14,7 +14,6 @@ const ROUNDING: f64 = 1e-11;
 /// performance of the partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Secants {
-    /// The number of unknowns.
     n: usize,
     /// The number of slots, each of which holds a pair.
     capacity: usize,
@@ -36,7 +35,6 @@ pub(super) struct Secants {
     coefficients: Vec<f64>,
 }
 
-/// An evaluation of G.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Evaluation {
     /// G(u) - u.
@@ -76,7 +74,6 @@ impl Secants {
         }
     }
 
-    /// Drops all pairs.
     pub(super) fn clear(&mut self) {
         self.free.append(&mut self.order);
         self.free.sort_unstable_by(|a, b| b.cmp(a));

@@ -108,7 +108,6 @@ pub(super) fn normal_below(x: f64) -> f64 {
     0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// The density of the standard normal distribution.
 pub(super) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() * 0.5 * std::f64::consts::FRAC_2_SQRT_PI * std::f64::consts::FRAC_1_SQRT_2
 }

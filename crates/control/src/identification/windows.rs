@@ -65,7 +65,6 @@ pub struct Windows {
     pub(super) inputs: usize,
     /// p.
     pub(super) outputs: usize,
-    /// The number of windows.
     pub(super) count: usize,
     /// R.
     pub(super) factor: DMatrix<f64>,

@@ -10,16 +10,13 @@ use nalgebra::{DMatrix, DVector};
 /// z' = A z + `B_u` u + K y + `B_f` f, `y_h` = H y - `D_u` u = C z + `D_f` f, for all values of the unknown
 /// inputs; (A, C) observable.
 pub(super) struct DecoupledPart {
-    /// A, observable with C.
     pub(super) a: DMatrix<f64>,
     pub(super) b_u: DMatrix<f64>,
     pub(super) b_f: DMatrix<f64>,
-    /// K.
     pub(super) k: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,
     pub(super) d_u: DMatrix<f64>,
     pub(super) d_f: DMatrix<f64>,
-    /// H.
     pub(super) h: DMatrix<f64>,
     /// For each fault the length of its column of [`B_f`; `D_f`], relative to its column of the plant.
     pub(super) effects: Vec<f64>,

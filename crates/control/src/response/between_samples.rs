@@ -66,9 +66,7 @@ struct Lifted<'a> {
     gains: &'a Gains,
     /// Number of states of the plant without filter.
     states: usize,
-    /// T in s.
     period: f64,
-    /// h in s.
     part: f64,
     /// e^(A i h), i from 0 to N.
     phi: Vec<DMatrix<f64>>,
@@ -202,7 +200,6 @@ impl<'a> Lifted<'a> {
         with_integrals(self.gains, &stacked(states_after, &errors), factor)
     }
 
-    /// See [`gains_between_samples`].
     fn gains(&self, rows: &[usize], width: f64) -> Result<[DMatrix<f64>; 3], Error> {
         let (n, q) = self.plant.f_a.shape();
         let inputs = [self.faults(), self.rates(), self.uncancelled()];

@@ -151,7 +151,6 @@ impl Trajectory {
     }
 }
 
-/// The start of an interval.
 #[derive(Clone)]
 struct Start {
     /// Time in shortest intervals.
@@ -159,7 +158,6 @@ struct Start {
     state: Rc<DVector<f64>>,
 }
 
-/// An interval with the bounds over it.
 struct Piece {
     start: Start,
     bounds: Bounds,
@@ -220,7 +218,6 @@ fn from_starts(length: &Length, starts: Vec<Start>) -> Vec<Piece> {
     starts.into_iter().zip(bounds).map(|(start, bounds)| Piece { start, bounds }).collect()
 }
 
-/// The matrix of these columns.
 fn columns(states: &[&Rc<DVector<f64>>]) -> DMatrix<f64> {
     let order = states.first().map_or(0, |state| state.len());
     let mut matrix = DMatrix::zeros(order, states.len());

@@ -263,7 +263,6 @@ fn as_count(samples: f64) -> u64 {
     samples as u64
 }
 
-/// The simulation of a system along the grid.
 struct GridSimulation<'a> {
     system: &'a StateSpace,
     state: DVector<f64>,
@@ -332,7 +331,6 @@ impl<'a> GridSimulation<'a> {
         Ok(())
     }
 
-    /// The outputs at all points of the grid.
     fn into_response(self) -> Result<TimeResponse, Error> {
         let StateSpace { a, b, c, d, domain } = self.system;
         let (points, (n, m)) = (self.time.len(), b.shape());

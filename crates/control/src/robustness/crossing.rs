@@ -4,7 +4,6 @@
 const WIDTH: f64 = 1e-14;
 const STEPS: usize = 160;
 
-/// A number and the value of a function there.
 #[derive(Clone, Copy)]
 pub(super) struct Evaluation {
     pub(super) at: f64,

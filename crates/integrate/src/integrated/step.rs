@@ -16,7 +16,6 @@ const MOST: f64 = 1e-6;
 /// Width to which a state event is located, relative to the step of the integrator.
 const WIDTH: f64 = 1e-12;
 
-/// The event indicators at a time.
 #[derive(Default)]
 struct Sample {
     time: f64,

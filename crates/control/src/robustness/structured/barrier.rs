@@ -36,7 +36,6 @@ pub(super) struct Point {
 struct Inequality {
     /// K = N F^-1 N*.
     k: ComplexMatrix,
-    /// Whether K is block diagonal.
     diagonal: bool,
     /// The entries of W for each direction.
     weights: Vec<Vec<SparseEntry>>,

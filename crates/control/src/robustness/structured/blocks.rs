@@ -13,7 +13,6 @@ pub enum Block {
 }
 
 impl Block {
-    /// The number of channels.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Real(size) | Self::Full(size) => size,
@@ -36,7 +35,6 @@ pub(super) type SparseEntry = (usize, usize, Complex<f64>);
 
 /// A direction in which the scales D and G change.
 pub(super) struct Direction {
-    /// The index of the block.
     pub(super) block: usize,
     /// Whether it changes G; otherwise D.
     pub(super) of_g: bool,

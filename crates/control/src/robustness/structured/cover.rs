@@ -134,7 +134,6 @@ impl<'a> Cover<'a> {
         Err(Error::Overflow { what: "the structured singular value" })
     }
 
-    /// Removes an interval from the gaps.
     fn remove(&mut self, covered: Interval) {
         let rest = |gap: &Interval| {
             if covered.to <= gap.from || covered.from >= gap.to {
