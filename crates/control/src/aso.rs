@@ -61,8 +61,7 @@ pub struct AsoDesign {
 pub(crate) type Place =
     fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Alternatives, Error>;
 
-/// Computes `K_x` for the first `states` states, on which the other states do not act; the columns
-/// of the other states are zero.
+/// Computes `K_x` for the first `states` states, on which the others do not act; its other columns are zero.
 pub(crate) fn place_controller(
     plant: &FaultyPlant,
     states: usize,
@@ -151,8 +150,7 @@ pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2
 ///
 /// # Example
 ///
-/// A mass with a commanded force and an unknown constant force against it; the position is
-/// measured:
+/// A mass with a commanded force and an unknown constant force against it; the position is measured:
 ///
 /// ```
 /// use control::aso::{FaultyPlant, design};
@@ -227,8 +225,7 @@ impl ExtendedPlant {
     }
 }
 
-/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; the norm itself if
-/// no fault acts there.
+/// Norm of B `K_f` + `F_a` in the rows of the plant, relative to that of `F_a` unless no fault acts there.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
     let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();

@@ -10,8 +10,7 @@ const WORTHWHILE: f64 = 0.95;
 /// this multiple of the largest diagonal entry.
 const LARGE: f64 = 1024.0;
 
-/// The balanced matrix S^-1 A S, S diagonal and positive such that row i and column i have about
-/// the same norm.
+/// S^-1 A S, S diagonal and positive such that row i and column i have about the same norm.
 ///
 /// Osborne (1960), Parlett and Reinsch (1969), in the 1-norm without the diagonal. The scale of a
 /// state whose row or column has no other entries is not changed.
@@ -132,8 +131,7 @@ impl Balance {
     }
 }
 
-/// The power of two nearest to x > 0 on the logarithmic scale; a number that is not normal is
-/// returned unchanged.
+/// The power of two nearest to x > 0 on the logarithmic scale; returns a number that is not normal unchanged.
 pub(crate) fn power_of_two(x: f64) -> f64 {
     if !x.is_normal() {
         return x;

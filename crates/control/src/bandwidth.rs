@@ -27,8 +27,7 @@ const FLOOR: f64 = 1e-12;
 /// A bandwidth without a response, at the frequency of an undamped mode, is raised by this factor.
 const DETUNING: f64 = 1.01;
 
-/// Units of inputs and outputs: each output is measured by the strongest effect of an input on it, then each input by its
-/// strongest effect on an output.
+/// Units: each output is measured by the strongest effect of an input on it, then each input by that on an output.
 ///
 /// ```text
 /// h[j, i] = integral of e^(-2 s t) g[j, i](t)^2 over t,    s = rate + max(0, largest real part)       continuous
@@ -38,8 +37,7 @@ const DETUNING: f64 = 1.01;
 ///
 /// g is the impulse response, without D: C e^(A t) B or C A^k B. Entries of h below 1e-12 of the largest are raised
 /// to it; if all are zero, all units are 1. The physical sizes of the units do not depend on the units of states and
-/// outputs; nor on those of inputs, up to a common factor, if the same input has the strongest effect on every
-/// output.
+/// outputs; nor on those of inputs, up to a common factor, if one input has the strongest effect on every output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalUnits {
     /// Size of a unit of each input.
@@ -107,8 +105,7 @@ pub struct ByBandwidth<T> {
 ///
 /// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin
 /// of 1/2 to infinity and a phase margin of 60 degrees in continuous time, for all weights (M. G. Safonov, M. Athans,
-/// IEEE Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale, some 10 equations of
-/// [`lqr`].
+/// IEEE Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale by some 10 [`lqr`].
 ///
 /// # Errors
 ///

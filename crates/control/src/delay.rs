@@ -79,8 +79,7 @@ pub struct ExactLoop {
     pub radius: f64,
     /// The frequency of `radius` in rad/s.
     pub frequency: f64,
-    /// The largest singular value of S over the frequencies, with the delays themselves: at the commands, at the
-    /// measurements.
+    /// The largest singular value of S over the frequencies, with the delays themselves: at commands, at measurements.
     pub peaks: [f64; 2],
 }
 
@@ -105,8 +104,7 @@ impl Delays {
         order * delayed.count()
     }
 
-    /// For each command, and for each measurement, the first state of its delay, counted from the first state of all
-    /// delays; None without a delay.
+    /// The first state of the delay of each command and measurement, from that of all delays; None without a delay.
     fn first_states(&self, order: usize) -> [Vec<Option<usize>>; 2] {
         let mut next = 0;
         let mut first = |delay: &f64| {
@@ -208,8 +206,7 @@ impl Delays {
         }
     }
 
-    /// Extracts the entries of the plant without its delays, with n states, from matrices A, B, C, D of the form of
-    /// [`Delays::approximated`].
+    /// Extracts the entries of the plant without its delays, with n states, from the form of [`Delays::approximated`].
     #[must_use]
     pub fn of_plant(&self, n: usize, order: usize, all: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
         let (p, m) = (self.outputs.len(), self.inputs.len());
@@ -300,8 +297,7 @@ impl Delays {
     }
 }
 
-/// Discretises the path from one command to one measurement; returns it without its lag, and its lag in s, a whole
-/// number of samples.
+/// Discretises a path; returns it without its lag, and the lag in s, a whole number of samples.
 fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpace, f64), Error> {
     check::positive("the sample time", period)?;
     let samples = (delay / period + WHOLE).floor();

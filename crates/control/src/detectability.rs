@@ -26,13 +26,11 @@ pub struct Detectability {
     /// The combinations of faults that the measurements cannot tell from motions of the states. If
     /// there are none and (A, C) is observable, the augmented observer exists.
     pub hidden: Vec<HiddenFault>,
-    /// Rank of (`A_0`, `C_0`): full if and only if the eigenvalues of the observer can be assigned
-    /// arbitrarily.
+    /// Rank of (`A_0`, `C_0`): full if and only if the observer's eigenvalues can be assigned arbitrarily.
     pub augmented: Rank,
     /// Distance of (`A_0`, `C_0`) from the nearest unobservable pair.
     pub distance: Distance,
-    /// Invariant zeros of (A, `F_a`, C). A fault that develops as e^(s t), or s^k when sampled, is
-    /// blocked at a zero s.
+    /// Invariant zeros of (A, `F_a`, C): each blocks a fault that develops as e^(s t), or s^k when sampled.
     pub zeros: Zeros,
     /// The effect of each column of `F_a` (inner index) on each measurement (outer index).
     pub visibility: Vec<Vec<Visibility>>,
@@ -68,8 +66,7 @@ impl Detectability {
 ///
 /// # Example
 ///
-/// x' = v + f, v' = u with x measured: a constant error f of the rate has the same effect as a
-/// change of the velocity v.
+/// x' = v + f, v' = u with x measured: a constant error f of the rate acts as a change of the velocity v.
 ///
 /// ```
 /// use control::{Domain, aso::FaultyPlant, detectability::detectability};
@@ -113,16 +110,14 @@ pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectabilit
 }
 
 impl FaultyPlant {
-    /// Checks that an augmented observer with arbitrary eigenvalues exists: (`A_0`, `C_0`) is
-    /// observable.
+    /// Checks that (`A_0`, `C_0`) is observable: an augmented observer with arbitrary eigenvalues exists.
     ///
     /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with
     /// eigenvectors in the columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank.
     /// The measurements then distinguish a fault that develops as e^(s t) from every motion of the
     /// states. For constant and ramp faults s = 0, or 1 in sampled time. There must be at least as
     /// many measurements as N has columns. Singular values below 1e-12 of the largest count as
-    /// zero, rows and columns of the matrix scaled to length one. [`detectability`] returns the
-    /// hidden faults.
+    /// zero, rows and columns scaled to length one. [`detectability`] returns the hidden faults.
     ///
     /// # Errors
     ///
@@ -138,8 +133,7 @@ impl FaultyPlant {
     /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
     /// Returns the unobservable modes of (`A_0`, `C_0`), whose eigenvalues no observer moves.
     ///
-    /// The conditions are those of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place
-    /// of observable.
+    /// The conditions are those of [`FaultyPlant::check_observer_exists`], but (A, C) need only be detectable.
     ///
     /// # Errors
     ///

@@ -89,13 +89,11 @@ pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distanc
 
 /// Bounds the distance of (A, C) from the nearest unobservable pair.
 ///
-/// `a`: n x n; `c`: p x n. It equals the distance of (A', C') from the nearest uncontrollable pair,
-/// see [`from_uncontrollable`].
+/// `a`: n x n; `c`: p x n. It is the distance of (A', C') from uncontrollability: [`from_uncontrollable`].
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix;
-/// [`Error::NotConverged`] when an inner iteration does not end.
+/// Same as [`from_uncontrollable`].
 pub fn from_unobservable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Distance, Error> {
     check::with_outputs(a, c)?;
     Pencil::new(&a.transpose(), &c.transpose())?.search()
@@ -210,8 +208,7 @@ impl Square {
         [(-h, -h), (-h, h), (h, -h), (h, h)].map(|(x, y)| self.centre + Complex::new(x, y))
     }
 
-    /// Orders squares by their bound, the lowest first, then by their centre, the one farthest to the
-    /// right first, then the highest one.
+    /// Orders squares by their bound, the lowest first, then by their centre, from right to left and from the top down.
     fn order(&self, other: &Self) -> Ordering {
         let (here, there) = (self.centre, other.centre);
         let by_centre = there.re.total_cmp(&here.re).then(there.im.total_cmp(&here.im));

@@ -8,8 +8,7 @@
 //! | actuator and sensor | in both places | [`F_a`; W `F_s`] | by its kind |
 //! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
 //!
-//! A fault of the measurements passes their filter, which is part of the controller and becomes part
-//! of the plant in the observer:
+//! A fault of the measurements passes their filter, a part of the controller and, in the observer, of the plant:
 //!
 //! ```text
 //! y_f' = W (y - y_f)
@@ -17,8 +16,7 @@
 //! ```
 //!
 //! A plant with y = C x + D u is one without D for a controller that filters y - D u, as it knows u:
-//! [`crate::controller::with_feedthrough`]. A fault of input i of such a plant has the columns i of B and D,
-//! [`FaultEntry::Both`].
+//! [`crate::controller::with_feedthrough`]. A fault of its input i has the columns i of B and D, [`FaultEntry::Both`].
 
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
@@ -138,8 +136,7 @@ impl ExtendedPlant {
     /// # Errors
     ///
     /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix, a column of the
-    /// wrong length or a missing filter W; [`Error::OutOfRange`] for an input that does not exist
-    /// or a rate that is not positive.
+    /// wrong length or no filter W; [`Error::OutOfRange`] for an unknown input or a rate not above zero.
     pub fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,

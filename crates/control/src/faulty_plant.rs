@@ -28,8 +28,7 @@ pub struct FaultyPlant {
 impl FaultyPlant {
     /// Creates the plant of the paper, with constant faults: `A_f` = 0.
     ///
-    /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q. The functions that use the plant check the
-    /// shapes.
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q, checked by the functions that use the plant.
     #[must_use]
     pub fn with_constant_faults(
         a: DMatrix<f64>,
@@ -53,8 +52,7 @@ impl FaultyPlant {
         check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))
     }
 
-    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); equal to (10) if B `K_f` = -`F_a` and
-    /// `A_f` = 0.
+    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); equal to (10) if B `K_f` = -`F_a`, `A_f` = 0.
     #[must_use]
     pub fn augmented_dynamics(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
@@ -75,8 +73,7 @@ impl FaultyPlant {
         (-&self.f_a).resize_vertically(n + q, 0.0)
     }
 
-    /// The `K_f`, m x q, that minimises the norm of B `K_f` + `F_a`; if there are several, the one
-    /// of least norm.
+    /// The `K_f`, m x q, of least norm among those that minimise the norm of B `K_f` + `F_a`.
     ///
     /// It always exists. The compensation is complete if the columns of `F_a` are in the range of
     /// B; [`crate::aso::AsoDesign::cancellation_residual`] measures the part that is not cancelled.

@@ -97,8 +97,7 @@ impl Gains {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], with the name of the matrix of
-    /// plant or gains.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix of plant or gains.
     pub fn check(&self, plant: &FaultyPlant) -> Result<(), Error> {
         plant.check()?;
         let ((n, m), p, q) = (plant.b.shape(), plant.c.nrows(), plant.f_a.ncols());

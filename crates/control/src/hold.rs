@@ -1,5 +1,4 @@
-//! Exact discretisation of a linear system with an input that is constant or linear over the step,
-//! and its inverse.
+//! Exact discretisation of a linear system with an input that is constant or linear over the step, and back.
 
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
@@ -10,8 +9,7 @@ use crate::logarithm::logarithm_of_one_plus;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The exact solution of x' = A x + B (w0 + w1 t) after a step h: x(h) = Phi x0 + `Gamma_0` w0 +
-/// `Gamma_1` w1.
+/// The exact solution of x' = A x + B (w0 + w1 t) after a step h: Phi x0 + `Gamma_0` w0 + `Gamma_1` w1.
 ///
 /// Phi = e^(A h), `Gamma_0` = integral of e^(A s) B, `Gamma_1` = integral of e^(A s) (h - s) B,
 /// both over s from 0 to h. With w1 = 0 the input is held constant; [`zero_order_hold`] computes
@@ -33,8 +31,7 @@ impl FirstOrderHold {
     /// balanced, inputs scaled, then one exponential of the block matrix [A h, B h, 0; 0, 0, I; 0,
     /// 0, 0] of order n + 2 m, whose first row of blocks is [Phi, `Gamma_0`, `Gamma_1` / h]; about
     /// (7 + s) (n + 2 m)^3 multiplications, s = log2(norm of the block matrix / 5.4), at least 0. The
-    /// error is the error of the exponential, relative to the norm of each column in balanced
-    /// coordinates.
+    /// error is that of the exponential, relative to the norm of each column in balanced coordinates.
     ///
     /// Source: C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
     /// Autom. Control 23 (1978), theorem 1.
@@ -64,8 +61,7 @@ impl FirstOrderHold {
 
     /// Computes out = Phi x + `Gamma_0` w0 + `Gamma_1` w1, without allocation.
     ///
-    /// `x`, `out`: n; `w0`, `w1`: m, the input at the start of the step and its slope. NaN and
-    /// infinities propagate.
+    /// `x`, `out`: n; `w0`, `w1`: m, the input at the start and its slope. NaN and infinities propagate.
     ///
     /// # Errors
     ///
@@ -94,10 +90,8 @@ impl FirstOrderHold {
 ///
 /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Returns (Phi,
 /// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. This
-/// is the plant as a sampled controller sees it that holds its output between samples. Method, cost
-/// and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
-///
-/// Source: C. F. Van Loan (1978), see [`FirstOrderHold::new`].
+/// is the plant as a sampled controller sees it that holds its output between samples. Method, source,
+/// cost and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
 ///
 /// # Example
 ///
@@ -123,13 +117,11 @@ pub fn zero_order_hold(
     Ok((phi, gamma))
 }
 
-/// Computes A and B of the continuous plant x' = A x + B u whose samples have Phi and Gamma: the inverse of
-/// [`zero_order_hold`].
+/// Computes A and B of the plant x' = A x + B u whose samples have Phi and Gamma: inverts [`zero_order_hold`].
 ///
 /// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants it is the one whose eigenvalues
 /// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: states
-/// balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I], see
-/// [`logarithm_of_one_plus`].
+/// balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I], [`logarithm_of_one_plus`].
 ///
 /// # Example
 ///
@@ -196,8 +188,7 @@ fn integrals(
     ])
 }
 
-/// The power of two nearest to the norm of an input's column; one for an input without effect, and for a norm that is
-/// infinite.
+/// The power of two nearest to the norm of an input's column; 1 for no effect, and for an infinite norm.
 fn unit(norm: f64) -> f64 {
     let power = power_of_two(norm);
     if power.is_normal() { power } else { 1.0 }

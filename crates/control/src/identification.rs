@@ -5,8 +5,7 @@
 //! ```
 //!
 //! is the innovation form: e is white, K the gain of the Kalman predictor. The method is predictor-based subspace
-//! identification, which needs no iteration, estimates K as well, and holds for unstable plants and for samples of a
-//! closed loop:
+//! identification; it needs no iteration, estimates K too, and holds for unstable plants and in closed loop:
 //!
 //! 1. A long autoregressive model predicts `y[k]` from s earlier samples `z = [u; y]`, and `u[k]` if there is D: least squares.
 //! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their block Toeplitz matrix times the s

@@ -1,5 +1,4 @@
-//! Fault detection and isolation: residual generators that are decoupled from commands,
-//! disturbances and chosen faults.
+//! Residual generators, decoupled from commands, disturbances and chosen faults, to detect and isolate faults.
 //!
 //! The plant is a [`DisturbedPlant`]. A residual has a pattern: one entry per fault, true if the
 //! residual responds to the fault, false if it is decoupled from it. The patterns of several

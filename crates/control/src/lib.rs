@@ -35,8 +35,7 @@
 //! Feedback is u = K x, so that the closed loop is A + B K; an observer has the error dynamics A - L C. ' is the
 //! transpose in formulas, [A, B; C, D] a matrix of blocks, eps the machine epsilon. Systems are [`StateSpace`];
 //! [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Functions return an [`Error`]
-//! for bad arguments and unsolvable problems. Those without a `Result`, such as those of [`blocks`], panic for shapes
-//! that do not fit.
+//! for bad arguments and unsolvable problems; those without a `Result`, such as [`blocks`], panic for bad shapes.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(feature = "design"),

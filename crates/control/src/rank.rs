@@ -1,5 +1,4 @@
-//! Controllability and observability: the rank decision, and the modes that are uncontrollable or
-//! unobservable.
+//! Controllability and observability: the rank decision, the uncontrollable and the unobservable modes.
 //!
 //! [`crate::distance`] measures the distance of a pair from the nearest one without the property.
 
@@ -15,8 +14,7 @@ use crate::svd::ComplexSvd;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A state is dominant in a mode when its entry in the vector is above this fraction of the
-/// largest.
+/// A state is dominant in a mode when its entry in the vector is above this part of the largest.
 const DOMINANT: f64 = 0.5;
 
 /// The result of a rank decision.
@@ -42,8 +40,7 @@ pub struct Mode {
     pub eigenvalue: Complex<f64>,
     /// An eigenvector of length one in the given coordinates, its largest entry real and positive:
     /// v with A v = s v, C v = 0 for an unobservable mode: the motion that the measurements do not
-    /// show; w with w' A = s w', w' B = 0 for an uncontrollable mode: the combination w' x that the
-    /// inputs do not move.
+    /// show; w with w' A = s w', w' B = 0 for an uncontrollable one: no input moves w' x.
     pub vector: DVector<Complex<f64>>,
     /// Indices, from zero, of the states whose entries of the vector, in balanced coordinates, are
     /// at least half of the largest one; largest first.
@@ -90,13 +87,11 @@ pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error
 
 /// Rank of the observability matrix [C; C A; ...; C A^(n-1)] of x' = A x, y = C x.
 ///
-/// `a`: n x n; `c`: p x n. Computed as the controllability of (A', C'), with its method and
-/// tolerance.
+/// `a`: n x n; `c`: p x n. Method, tolerance: [`controllability`] of (A', C').
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
-/// [`Error::NotConverged`] when a singular value iteration does not end.
+/// Same as [`controllability`].
 pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
     check::with_outputs(a, c)?;
     Ok(Staircase::new(&a.transpose(), &c.transpose())?.decision)
@@ -137,8 +132,7 @@ pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mo
 
 /// The unobservable modes of x' = A x, y = C x: as many as the rank is below n.
 ///
-/// `a`: n x n; `c`: p x n. Computed as the uncontrollable modes of (A', C'), see
-/// [`uncontrollable_modes`].
+/// `a`: n x n; `c`: p x n. Method: [`uncontrollable_modes`] of (A', C').
 ///
 /// # Example
 ///
@@ -184,8 +178,7 @@ fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
     values.iter().enumerate().map(mode).collect()
 }
 
-/// The mode whose left eigenvector has the given coordinates in the basis of the uncontrollable
-/// states, in the coordinates of A.
+/// The mode with these coordinates of its left eigenvector in the basis of the uncontrollable states.
 fn mode_in_given_coordinates(
     eigenvalue: Complex<f64>,
     staircase: &Staircase,

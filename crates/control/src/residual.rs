@@ -12,8 +12,7 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// Without faults, disturbances and noise r converges to 0 for all commands, so that r differs from 0 only
-/// if one of them acts on the plant. The fields are public and unchecked; functions that return a `Result`
-/// check them.
+/// if one of them acts on the plant. The fields are public; functions that return a `Result` check them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualGenerator {
     /// A, n x n.
@@ -33,8 +32,7 @@ pub struct ResidualGenerator {
 }
 
 impl ResidualGenerator {
-    /// Checks shapes and finiteness of the matrices, and the period. n may be 0, for a static generator, and m
-    /// may be 0.
+    /// Checks shapes and finiteness of the matrices, and the period. n (a static generator) and m may be 0.
     ///
     /// # Errors
     ///

@@ -75,8 +75,7 @@ pub enum Point {
 /// The `plant` under a zero-order hold of its inputs, in samples of `period` seconds.
 ///
 /// A continuous plant is discretised; a sampled plant keeps A and B. With y = C x + D u a sample contains the
-/// command that was held until then: `y[k] = C x[k] + D v[k]`, `v[k+1] = u[k]`; the state is [x; v], and D of
-/// the result is zero.
+/// command that was held until then: `y[k] = C x[k] + D v[k]`, `v[k+1] = u[k]`; the state is [x; v], D becomes zero.
 ///
 /// # Errors
 ///
@@ -179,8 +178,7 @@ impl Loop {
         ]
     }
 
-    /// The loop as a system: from signals that are added to commands and measurements to the commands and
-    /// measurements before the addition.
+    /// The loop as a system: from signals added to commands and measurements to both before the addition.
     #[must_use]
     pub fn system(&self) -> StateSpace {
         let (plant, controller) = (&self.plant, &self.controller);

@@ -30,16 +30,13 @@ pub struct SampledDesign {
     pub period: f64,
     /// The sampled plant.
     pub plant: FaultyPlant,
-    /// The gain 1 - e^(-w period) of each measurement filter, `y_f` := `y_f` + gain (y - `y_f`); None without
-    /// filters.
+    /// The gain 1 - e^(-w period) of each measurement filter, `y_f` := `y_f` + gain (y - `y_f`), if any.
     pub filter: Option<Vec<f64>>,
-    /// The gains. `L_x`, `L_f` correct the next estimate with a prediction estimator, the present
-    /// estimate with a current estimator.
+    /// The gains. `L_x`, `L_f` correct the next estimate (prediction estimator) or the present one (current).
     pub gains: Gains,
     /// Quality of the assignment for A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the assignment for the error dynamics of the observer, in the coordinates of
-    /// [`place_estimator`].
+    /// Quality of the assignment for the error dynamics, in the coordinates of [`place_estimator`].
     pub observer: Quality,
     /// Largest modulus of the eigenvalues of the closed loop; below one it is stable.
     pub radius: f64,
@@ -56,8 +53,7 @@ pub struct SampledDesign {
 /// reduces an error to 1.8 % in one sample; faster poles crowd at zero, where the eigenvectors of
 /// an observer with fewer measurements than states become parallel: for the pendulum of the paper
 /// at 10 ms the condition number would be 1e14, and the residual motion only 8 % smaller. The rule
-/// preserves the order of the poles, does not change those with q <= 1, and maps the fastest to q =
-/// 4.
+/// preserves the order of the poles, and those with q <= 1; it maps the fastest to q = 4.
 ///
 /// # Example
 ///
@@ -237,8 +233,7 @@ pub fn design(
     })
 }
 
-/// Computes the gain L of a sampled observer such that `a_0` - L `output` has the eigenvalues
-/// `poles`.
+/// Computes the gain L of a sampled observer: `a_0` - L `output` has the eigenvalues `poles`.
 ///
 /// `a_0`: n x n; `output`: p x n, [`Estimator::output_matrix`]; `poles`: n, in the z plane. The
 /// states are first scaled such that each of them alone, over n samples, gives an output with a sum
@@ -256,8 +251,7 @@ pub fn place_estimator(
     Ok((placed.gain, placed.quality))
 }
 
-/// Computes the gain of [`place_estimator`] and alternatives to it, see
-/// [`crate::placement::alternatives`]; the gains are L.
+/// Computes the gain L of [`place_estimator`] and its [`crate::placement::alternatives`].
 ///
 /// # Errors
 ///
@@ -270,8 +264,7 @@ pub fn estimator_alternatives(
     place_dual(a_0, output, poles, Extent::Alternatives)
 }
 
-/// Computes the gain of [`place_estimator`], and the alternatives of [`estimator_alternatives`] if `extent`
-/// says so.
+/// Computes the gain of [`place_estimator`], or those of [`estimator_alternatives`].
 fn place_dual(
     a_0: &DMatrix<f64>,
     output: &DMatrix<f64>,

@@ -36,11 +36,9 @@ pub fn instability(a: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
     Ok(largest_excess(&eigenvalues(a)?, domain))
 }
 
-/// Whether an eigenvalue of A is stable by more than its rounding error: 1e-12 of the largest
-/// modulus of the eigenvalues of A.
+/// Whether an eigenvalue of A is stable by more than its rounding error, 1e-12 of the largest modulus.
 ///
-/// `a`: n x n. Use it for a mode that no gain moves: one on the stability limit, computed a little
-/// inside, is not stable.
+/// `a`: n x n. For a mode that no gain moves: one on the limit, computed a little inside, is not stable.
 ///
 /// # Errors
 ///
@@ -60,12 +58,7 @@ pub(crate) fn largest_excess(eigenvalues: &[Complex<f64>], domain: Domain) -> f6
     eigenvalues.iter().map(|&value| domain.excess(value)).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Checks that A is stable; returns its eigenvalues.
-///
-/// # Errors
-///
-/// [`Error::NotHurwitz`] or [`Error::NotSchur`] with `name` for a matrix that is not stable; otherwise
-/// the same as [`instability`].
+/// Returns the eigenvalues of a stable A; [`Error::NotHurwitz`] or [`Error::NotSchur`] with `name` if A is not stable.
 pub(crate) fn require_stable(
     name: &'static str,
     a: &DMatrix<f64>,

@@ -1,5 +1,4 @@
-//! Weights over frequency: constants, and stable transfer functions of first and second order without
-//! zeros in the right half plane.
+//! Weights over frequency: constants, stable transfer functions of order 1 and 2 without zeros in the right half plane.
 
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
@@ -44,8 +43,7 @@ impl Weight {
     /// order 2: the square of the W of order 1 for sqrt(low), sqrt(high)
     /// ```
     ///
-    /// `frequency`, in rad/s: where the magnitude is sqrt(low high); in sampled time the
-    /// [`bilinear_frequency`] of it.
+    /// `frequency`, in rad/s: where the magnitude is sqrt(low high); sampled: its [`bilinear_frequency`].
     ///
     /// # Example
     ///
@@ -132,8 +130,7 @@ impl Weight {
         })
     }
 
-    /// Numerator and denominator in s, in sampled time in z, the highest power first; the denominator
-    /// begins with 1.
+    /// Numerator and monic denominator in s, in sampled time in z, the highest power first.
     #[must_use]
     pub fn polynomials(&self, domain: Domain) -> (Vec<f64>, Vec<f64>) {
         let convert = |coefficients: &[f64]| match domain {

@@ -115,10 +115,6 @@ fn scale_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSp
 ///    become outputs of the free states.
 ///
 /// The passes end when C2 fixes no further state.
-///
-/// # Errors
-///
-/// [`Error::NotConverged`].
 fn reduce(
     mut system: StateSpace,
     mut output: DMatrix<f64>,

@@ -107,11 +107,7 @@ impl Inputs {
     }
 
     /// Records derivatives at `time`. If the polynomial has another origin, it moves to `time` and the other
-    /// derivatives become zero.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::InvalidAnswer`] for a variable that is no continuous input, or an order that is not 1 to 3.
+    /// derivatives become zero. It is an error if a variable is no continuous input, or an order not 1 to 3.
     pub(crate) fn derive(
         &mut self,
         time: f64,

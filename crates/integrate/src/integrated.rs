@@ -57,8 +57,7 @@ struct Point {
     memory: Memory,
 }
 
-/// Returns the description of a model-exchange FMU with an element `CoSimulation` that states what
-/// [`Integrated`] offers.
+/// Returns the description of a model-exchange FMU with an element `CoSimulation` for [`Integrated`].
 #[must_use]
 pub fn description_of(equations: &ModelDescription) -> ModelDescription {
     let mut description = equations.clone();
@@ -121,7 +120,7 @@ pub struct Integrated {
     search: step::Search,
     /// The saved states of the integration, by slot.
     saved: Vec<Saved>,
-    /// Memory for the present values of Integers that the master sets.
+    /// Memory for the present values of variables that the master sets; clocks count as Booleans.
     integers: Vec<i64>,
     booleans: Vec<i32>,
     reals: Vec<f64>,

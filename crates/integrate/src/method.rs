@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// The explicit method; the stiff one while the steps of the explicit one are limited by its
-    /// stability.
+    /// The explicit method; the stiff one while stability limits the steps of the explicit one.
     #[default]
     Automatic,
     /// Dormand and Prince, order 5(4).

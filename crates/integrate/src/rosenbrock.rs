@@ -1,9 +1,7 @@
-//! The Rosenbrock method RODAS of order 4(3), L-stable and stiffly accurate, with its continuous
-//! extension of order 3.
+//! RODAS: a Rosenbrock method of order 4(3), L-stable, stiffly accurate, with a continuous extension of order 3.
 //!
 //! Source of method and coefficients: E. Hairer and G. Wanner, "Solving Ordinary Differential Equations
-//! II" (2nd ed.), section IV.7 and IV.10. The Jacobian and the derivative with respect to time are
-//! difference quotients.
+//! II" (2nd ed.), sections IV.7 and IV.10. Jacobian and derivative with respect to time are difference quotients.
 
 use solve::Factors;
 
@@ -132,8 +130,7 @@ impl Rosenbrock {
         Ok(())
     }
 
-    /// The largest sum of magnitudes in a row of the Jacobian, with components divided by `weight`: a bound of
-    /// its eigenvalues.
+    /// The largest sum of magnitudes in a row of the Jacobian, weighted: a bound of its eigenvalues.
     pub(crate) fn bound_of_eigenvalues(&self, weight: impl Fn(usize) -> f64) -> f64 {
         let n = self.end.len();
         let row = |i: usize| -> f64 {
@@ -143,8 +140,7 @@ impl Rosenbrock {
         (0..n).map(row).fold(0.0, f64::max)
     }
 
-    /// Attempts the step from `start` over `size` after [`Rosenbrock::linearise`]. Returns false if its
-    /// matrix is singular.
+    /// Attempts the step from `start` over `size` after [`Rosenbrock::linearise`]; false for a singular matrix.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,

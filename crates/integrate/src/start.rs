@@ -1,4 +1,4 @@
-//! The start of a step.
+//! The start of a step, and sums of its slopes.
 
 /// The point from which a method steps.
 #[derive(Clone, Copy)]

@@ -11,7 +11,7 @@ use crate::start::StepStart;
 
 /// Ratio of the chosen step to the largest step that meets the tolerance.
 const SAFETY: f64 = 0.9;
-/// The smallest ratio of two consecutive steps.
+/// The smallest and the largest ratio of two consecutive steps.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 /// The step after a trial step that cannot be evaluated, relative to it.
@@ -320,8 +320,7 @@ impl Stepper {
         Ok(size.min(100.0 * guess))
     }
 
-    /// The first state of the last step without a finite error, otherwise the one with the largest error;
-    /// and whether its error is finite.
+    /// The first state of the last step without a finite error, else that of the largest; whether it is finite.
     fn worst(&self) -> (usize, bool) {
         let error = match &self.stiff {
             Some(method) if self.last_is_stiff => method.error(),
@@ -337,8 +336,7 @@ impl Stepper {
     }
 }
 
-/// The root mean square of `values`, relative to the tolerances of the states from `a` to `b`; NaN if `b` is not
-/// finite.
+/// The root mean square of `values`, relative to the tolerances from `a` to `b`; NaN if `b` is not finite.
 fn norm(scale: &Scale, values: &[f64], a: &[f64], b: &[f64]) -> f64 {
     let part = |(i, value): (usize, &f64)| (value / scale.weight(i, a[i], b[i])).powi(2);
     let sum: f64 = values.iter().enumerate().map(part).sum();

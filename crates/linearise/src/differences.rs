@@ -29,11 +29,7 @@ impl Side {
 }
 
 /// Returns on which side of `value` and by how much, at most `size`, `part` can be changed within `min` and `max`.
-/// If one side has less room than `size`, only the side with more room is used.
-///
-/// # Errors
-///
-/// [`LineariseError::Role`] if `min` and `max` leave no room for a change.
+/// If one side has less room than `size`, only the side with more room is used; without room it is an error.
 pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), LineariseError> {
     let (below, above) = (value - part.min, part.max - value);
     if below.max(above) <= 0.0 {
@@ -130,8 +126,7 @@ impl Samples {
         Ok(samples)
     }
 
-    /// Returns the slope of a component. `magnitude`, the size of its largest term, determines the
-    /// rounding error.
+    /// Returns the slope of a component; `magnitude`, the size of its largest term, determines the rounding error.
     ///
     /// With two sides, half of the difference between the right and the left slope is added to the error if it is
     /// larger than four times its own error, because there is no derivative at a kink.
@@ -148,16 +143,14 @@ impl Samples {
     }
 }
 
-/// The Jacobian of state derivatives and outputs with respect to states and inputs, its errors, and
-/// the first step of each column.
+/// The Jacobian of state derivatives and outputs by states and inputs, its errors, the first step of each column.
 pub(super) struct Differences {
     pub(super) jacobian: DMatrix<f64>,
     pub(super) errors: DMatrix<f64>,
     pub(super) steps: Vec<f64>,
 }
 
-/// Differentiates `fmi2GetDerivatives` and the outputs numerically; `scales` are the typical sizes
-/// of the columns.
+/// Differentiates `fmi2GetDerivatives` and the outputs; `scales`: the typical sizes of the columns.
 pub(super) fn of_equations(
     equations: &mut Equations,
     scales: &[f64],

@@ -46,8 +46,7 @@ pub(super) fn references(parts: &Parts, states: &[State]) -> (Vec<u32>, Vec<u32>
     (rows, columns.map(|part| part.reference).collect())
 }
 
-/// Checks that `Outputs` or `Derivatives` list the variables of `unknown_rows`: only those have directional
-/// derivatives.
+/// Checks that `ModelStructure` lists the variables of `unknown_rows`, as directional derivatives require.
 fn check_listed(
     parts: &Parts,
     states: &[State],

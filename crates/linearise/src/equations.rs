@@ -58,8 +58,7 @@ struct Names {
 }
 
 impl PlantEquations {
-    /// Creates the equations of `fmu` with the parameters of `request`. Its `states` do not matter: x has all states of
-    /// the FMU.
+    /// Creates the equations of `fmu` with the parameters of `request`, whose `states` do not matter: x has all.
     ///
     /// # Errors
     ///
@@ -167,8 +166,7 @@ impl PlantEquations {
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU asks for the end of the
-    /// simulation.
+    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU ends the simulation.
     pub fn begin(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         if self.can_restore {
             self.component.restore_state(0)?;
@@ -179,8 +177,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Whether an event indicator has another sign at `time` in s, with the states `x` and the inputs `u`, than at the
-    /// end of the last step.
+    /// Whether an event indicator has another sign at `time` in s, `x` and `u` than at the end of the last step.
     ///
     /// # Errors
     ///
@@ -192,13 +189,11 @@ impl PlantEquations {
         Ok(before.iter().zip(&*now).any(|(before, now)| (*before > 0.0) != (*now > 0.0)))
     }
 
-    /// Ends an integration step at `time` in s with the states `x` and the inputs `u`. An event during the step takes
-    /// place here, and may change `x`.
+    /// Ends an integration step at `time` in s, `x` and `u`. An event during the step happens here, and may change `x`.
     ///
     /// # Errors
     ///
-    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU asks for the end of the
-    /// simulation.
+    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU ends the simulation.
     pub fn complete(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         let mut is_event = self.crosses(time, x, u)?;
         is_event |= self.next_event.is_some_and(|next| next <= time);
@@ -293,8 +288,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `column` to the directional derivatives by the known at `at`. A row that is a known itself is 1 or 0 and
-    /// needs no call.
+    /// Sets `column` to the directional derivatives by the known at `at`. A row that is itself a known needs no call.
     fn derivatives_by(&mut self, at: usize) -> Result<(), LineariseError> {
         let Self { component, knowns, unknowns, derivatives, column, .. } = self;
         if !unknowns.is_empty() {
@@ -329,8 +323,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets the known at `at` to `value` in the FMU; if it is one of the `n` states, the other states are `x`. Uses
-    /// `column` as a buffer.
+    /// Sets the known at `at` to `value` in the FMU, with `x` as the other states; `column` is a buffer.
     fn change(&mut self, at: usize, n: usize, value: f64, x: &[f64]) -> Result<(), LineariseError> {
         if at >= n {
             self.component.set_real(&[self.inputs[at - n]], &[value])?;

@@ -60,8 +60,7 @@ pub struct Linearise {
     /// exchange the continuous states. All other variables have their start values.
     pub at: Vec<(String, String)>,
     /// Typical sizes of changes by name, in the unit of the variable. The default is `nominal`, otherwise
-    /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are
-    /// relative to the typical size.
+    /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are relative to it.
     pub typical: Vec<(String, f64)>,
     /// Time of the operating point in s.
     pub start_time: f64,
@@ -88,8 +87,7 @@ pub struct Linearise {
 ///   Away from an equilibrium the FMU drifts during the record. The map is then a polynomial of time,
 ///   and its value at the start is used. This works for states on which the inputs act directly; for
 ///   other states it is too inaccurate and returns an error. The FMU's integration error appears in the
-///   error estimates if its internal steps follow the communication step; otherwise it is part of the
-///   plant.
+///   error estimates if its internal steps follow the communication step, otherwise in the plant.
 ///
 /// # Example
 ///
@@ -111,8 +109,7 @@ pub struct Linearise {
 /// # Errors
 ///
 /// [`LineariseError`] if a name or value is invalid, if a function of the FMU fails, if the FMU offers
-/// none of the three methods, if a state that is left out influences the others, or if the result of the third method
-/// is not accurate enough.
+/// none of the three methods, if a state that is left out influences the others, or if the third method is inaccurate.
 pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, LineariseError> {
     let description = &fmu.elements()?;
     let parts = Parts::of(description, request)?;
@@ -136,8 +133,7 @@ pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, Linear
     Err(LineariseError::NoWay { model: description.model_name.clone() })
 }
 
-/// Linearises in model exchange: by differences, and by directional derivatives if the FMU has
-/// them.
+/// Linearises in model exchange: by differences, and by directional derivatives if there are any.
 fn by_equations(
     fmu: &Fmu,
     parts: &Parts,

@@ -26,8 +26,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Returns the typical size of a change about `value`: `typical`, otherwise |value|, or 1 if
-    /// that is zero.
+    /// Returns the typical size of a change about `value`: `typical`, otherwise |value|, or 1 for zero.
     pub(super) fn scale(&self, value: f64) -> f64 {
         let magnitude = if value == 0.0 { 1.0 } else { value.abs() };
         self.typical.unwrap_or(magnitude)

@@ -13,8 +13,7 @@ const EVENT_ITERATIONS: usize = 1000;
 
 pub(super) const NAME: &str = "linearise";
 
-/// Initialises an instance with the values of the operating point, except states without a start value, which must be
-/// set later.
+/// Initialises an instance with the operating point, except states without a start value: these are set later.
 pub(super) fn initialise(
     component: &mut (impl Slave + ?Sized),
     parts: &Parts,
@@ -153,8 +152,7 @@ impl<'p> Equations<'p> {
         }
     }
 
-    /// Evaluates derivatives and outputs at the operating point; `change` is a column of the Jacobian whose variable
-    /// has another value, and this value.
+    /// Evaluates derivatives and outputs; `change`: a column of the Jacobian and another value of its variable.
     pub(super) fn evaluate(
         &mut self,
         change: Option<(usize, f64)>,

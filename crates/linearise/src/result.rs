@@ -112,8 +112,7 @@ pub struct Disagreement {
     pub derivative: f64,
     /// The difference quotient, extrapolated.
     pub difference: f64,
-    /// The disagreement minus ten times the estimated error, relative to the largest entry of the row in
-    /// units of the typical sizes.
+    /// The disagreement minus ten times the error, relative to the row's largest entry in units of typical sizes.
     pub relative: f64,
 }
 
@@ -133,8 +132,7 @@ pub struct Linearisation {
     /// x' at the operating point, in the states' units per s; zero at an equilibrium.
     pub rates: Vec<f64>,
     /// The largest of `rates`, each relative to the sum of |`A_ij`|, |`B_ij`| and |`F_ij`| times
-    /// the typical sizes. A value far below one means that the operating point is practically an
-    /// equilibrium.
+    /// the typical sizes. Far below one the operating point is practically an equilibrium.
     pub residual: f64,
     /// The method that gave the matrices.
     pub method: Method,
@@ -213,8 +211,7 @@ fn row_size(jacobian: &DMatrix<f64>, row: usize, scales: &[f64]) -> f64 {
     scales.iter().enumerate().map(|(j, scale)| jacobian[(row, j)].abs() * scale).fold(0.0, f64::max)
 }
 
-/// Returns the largest error relative to the largest entry of its row, in units of the typical
-/// sizes.
+/// Returns the largest error relative to the largest entry of its row, in units of typical sizes.
 pub(super) fn relative_error(errors: &DMatrix<f64>, values: &DMatrix<f64>, scales: &[f64]) -> f64 {
     let relative = |row| ratio(row_size(errors, row, scales), row_size(values, row, scales));
     (0..values.nrows()).map(relative).fold(0.0, f64::max)

@@ -56,8 +56,7 @@ struct Discrete {
 }
 
 impl Discrete {
-    /// Returns `change` (0) or `outputs` (1) times [x; u] at the elapsed fraction `part` of the
-    /// record.
+    /// Returns `change` (0) or `outputs` (1) times [x; u] at the fraction `part` of the record.
     fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = [&self.change, &self.outputs][which] * known;
         let (powers, width) = (&self.powers[which], known.nrows());
@@ -240,8 +239,7 @@ fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option
 }
 
 /// Returns the continuous system whose exact step is the map: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
-/// the drift over one step; `None` if there is no real logarithm. The logarithm is taken in units of the typical sizes
-/// and of the pulse heights.
+/// the drift over one step; `None` without a real logarithm. The logarithm is in units of typical sizes and pulses.
 fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
     let (n, width) = discrete.change.shape();
     let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();

@@ -25,8 +25,7 @@ pub struct Anderson {
 }
 
 impl Anderson {
-    /// Creates a solver with at most `limit` evaluations of G that keeps `depth` differences (at least 1,
-    /// at most the number of unknowns).
+    /// Creates a solver: at most `limit` evaluations of G, `depth` differences (1 to the number of unknowns).
     #[must_use]
     pub fn new(scale: Scale, limit: u32, depth: usize) -> Self {
         let n = scale.len();

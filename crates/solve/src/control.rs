@@ -87,8 +87,7 @@ pub enum Verdict {
 
 /// Step size control by an error estimate; a step with too large an error is repeated.
 ///
-/// The error e is relative to the tolerance: a step with `e <= 1` is accepted
-/// ([`super::Scale::distance`]).
+/// A step with `e <= 1`, e being relative to the tolerance, is accepted ([`super::Scale::distance`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorControl {
     bounds: SizeBounds,
@@ -163,8 +162,7 @@ impl ForwardControl {
         Self { bounds, law: Law::new(exponent.max(1.0)), requested: bounds.smallest }
     }
 
-    /// Returns the size of the next step in s after a step of `size` s with this measure, whose target is
-    /// at most 1; NaN counts as infinite.
+    /// Returns the size of the next step in s after one of `size` s with this measure (target: 1; NaN: infinite).
     ///
     /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {
@@ -197,8 +195,7 @@ pub struct Bond {
 
 impl Bond {
     /// Returns the power residual `first_extrapolated second_computed - first_computed
-    /// second_extrapolated`: power that one FMU sent and the other did not receive. It is zero if both
-    /// extrapolations are exact.
+    /// second_extrapolated`: power that one FMU sent and the other did not receive; zero for exact extrapolations.
     #[must_use]
     pub fn residual(&self) -> f64 {
         self.first.0 * self.second.1 - self.first.1 * self.second.0
@@ -249,8 +246,7 @@ impl EnergyControl {
         }
     }
 
-    /// Returns the measure e of a step from the bonds at its end, as many as nominals; 0 without bonds. Updates the
-    /// largest powers.
+    /// Returns the measure e of a step with these bonds at its end, 0 without any; updates the largest powers.
     pub fn measure(&mut self, bonds: &[Bond]) -> f64 {
         if bonds.is_empty() {
             return 0.0;

@@ -22,8 +22,7 @@ impl Factors {
         Self { n, entries: vec![0.0; n * n], pivots: vec![0; n], unit: vec![0.0; n] }
     }
 
-    /// Factorises `matrix` (column by column) and returns `|M^-1|_1`, infinite if a pivot is zero or not
-    /// finite.
+    /// Factorises `matrix` (column by column) and returns `|M^-1|_1`, infinite without a finite inverse.
     pub(super) fn factor(&mut self, matrix: &[f64]) -> f64 {
         if !self.decompose(matrix) {
             return f64::INFINITY;

@@ -130,8 +130,7 @@ impl Scale {
 pub enum Progress {
     /// Evaluate G at `u_next`, then call `next` with both.
     Evaluate,
-    /// Set the matrix `dG/du` at this u, column by column ([`Solver::set_column`]), then call `next`
-    /// again with the same u and G(u).
+    /// Set the matrix `dG/du` at this u ([`Solver::set_column`]), then call `next` again with the same u and G(u).
     Matrix,
     /// The iteration has converged, `|G_i(u) - u_i| <= w_i`. `u_next` is not set.
     Converged {
@@ -175,8 +174,7 @@ pub trait Solver: Send {
 
     /// Returns the perturbation of component `column` of `u` for a difference quotient of G.
     ///
-    /// It is large compared with the integration errors of slaves, because the iteration needs only a
-    /// few digits of the matrix.
+    /// It is large beside the integration errors of slaves, as the iteration needs few digits of the matrix.
     fn perturbation(&self, column: usize, u: &[f64]) -> f64 {
         1e-4 * u[column].abs().max(self.scale().nominals()[column])
     }
@@ -184,8 +182,7 @@ pub trait Solver: Send {
     /// Returns the scale of the unknowns.
     fn scale(&self) -> &Scale;
 
-    /// Drops information from earlier solutions, because G has changed, for example after an event or with
-    /// another step size.
+    /// Drops information from earlier solutions, because G has changed: after an event, for another step size.
     fn forget(&mut self);
 }
 

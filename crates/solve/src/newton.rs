@@ -9,8 +9,7 @@ use super::{Convergence, Progress, Scale, Solver};
 const SLOW_DECREASE: f64 = 0.3;
 /// The smallest damping factor, after which the solver requests a new matrix.
 const SHORTEST: f64 = 1.0 / 64.0;
-/// Required decrease of the residual relative to the decrease that a linear model predicts (Armijo
-/// condition).
+/// Required decrease of the residual relative to that of a linear model (Armijo condition).
 const DESCENT: f64 = 1e-4;
 /// Condition number above which a difference quotient has no significant digits left.
 const SINGULAR: f64 = 1e10;
@@ -44,8 +43,7 @@ pub struct Newton {
     /// `I - dG/du`, column by column, for unknowns divided by their nominals.
     matrix: Vec<f64>,
     factors: Factors,
-    /// Whether `factors` are usable: not before the first matrix, after a singular one or after
-    /// [`Solver::forget`].
+    /// Whether `factors` are usable: not before the first matrix, after a singular one or [`Solver::forget`].
     known: bool,
     /// The start u of the last step.
     base: Vec<f64>,
@@ -84,11 +82,7 @@ impl Newton {
         Progress::Matrix
     }
 
-    /// Factorises the requested matrix.
-    ///
-    /// # Errors
-    ///
-    /// [`Progress::Singular`] if the matrix is numerically singular.
+    /// Factorises the requested matrix; [`Progress::Singular`] if it is numerically singular.
     fn factorise_matrix(&mut self) -> Result<(), Progress> {
         let norm = norm_1(&self.matrix, self.base.len());
         let condition = self.factors.factor(&self.matrix) * (1.0 + norm);

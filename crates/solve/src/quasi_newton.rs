@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::secants::{Evaluation, Filters, Secants};
 use super::{Convergence, Progress, Scale, Solver};
 
-/// Relative norms, after orthogonalisation, below which differences of this and of earlier solutions are
-/// dropped as linearly dependent.
+/// Relative norms below which orthogonalised differences of this and of earlier solutions are dropped.
 const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-3 };
 /// Relaxation factor of a step without differences.
 const RELAXATION: f64 = 0.1;
@@ -34,8 +33,7 @@ pub struct QuasiNewton {
 }
 
 impl QuasiNewton {
-    /// Creates a solver with at most `limit` evaluations of G that reuses the differences of the last
-    /// `reuse` solutions.
+    /// Creates a solver with at most `limit` evaluations of G that reuses differences of `reuse` solutions.
     #[must_use]
     pub fn new(scale: Scale, limit: u32, reuse: u32) -> Self {
         let n = scale.len();

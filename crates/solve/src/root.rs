@@ -53,8 +53,7 @@ impl Bracket {
         Some(Self { left, right, width, truncation: 0.2 / whole, radius, gap: None })
     }
 
-    /// Returns the time of the next evaluation; `None` if the bracket is as narrow as required, or as a
-    /// gap of NaN allows.
+    /// Returns the time of the next evaluation; `None` if the bracket is narrow enough, or a gap of NaN remains.
     #[must_use]
     pub fn ask(&self) -> Option<f64> {
         let ((a, fa), (b, fb)) = (self.left, self.right);
@@ -102,8 +101,7 @@ impl Bracket {
         self.left.0
     }
 
-    /// Returns the right end of the bracket, after the change of sign: a step that handles the event must
-    /// end here.
+    /// Returns the right end of the bracket, after the change of sign: the end of a step that handles the event.
     #[must_use]
     pub fn after(&self) -> f64 {
         self.right.0

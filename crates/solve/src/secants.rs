@@ -98,8 +98,7 @@ impl Secants {
         });
     }
 
-    /// Adds the differences of `residual` and `g` from those of the `last` evaluation; drops the oldest pair if no
-    /// slot is free.
+    /// Adds the differences of `residual` and `g` from the `last` ones; drops the oldest pair if no slot is free.
     fn push(&mut self, residual: &[f64], g: &[f64], last: &Evaluation) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
         let entries = slot * self.n..(slot + 1) * self.n;
@@ -109,8 +108,7 @@ impl Secants {
         self.order.insert(0, slot);
     }
 
-    /// Adds the difference between an evaluation, `residual` and `g`, and the `last` one, unless it is the
-    /// `first`, and copies it to `last`.
+    /// Adds the differences between this evaluation and the `last` one, unless it is the `first`; replaces `last`.
     pub(super) fn learn(
         &mut self,
         last: &mut Evaluation,

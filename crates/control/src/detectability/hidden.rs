@@ -27,8 +27,7 @@ use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A singular value below this counts as zero, relative to the largest one, or to |`A_f`| + |s| for
-/// `A_f` - s I.
+/// A singular value below this counts as zero, relative to the largest, or for `A_f` - s I to |`A_f`| + |s|.
 const RANK_TOLERANCE: f64 = 1e-12;
 /// Eigenvalues of the fault model nearer than this, relative to its norm, count as one.
 const CLUSTER_TOLERANCE: f64 = 1e-6;
@@ -140,8 +139,7 @@ fn rosenbrock_matrix(
 /// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to
 /// length one, so that units do not decide the rank.
 ///
-/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in the null
-/// space of M.
+/// For z in the null space of the scaled matrix, D^-1 z, D the lengths of the columns, is in that of M.
 fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();

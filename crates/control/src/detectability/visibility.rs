@@ -15,8 +15,7 @@ const TOLERANCE: f64 = 1e-12;
 #[non_exhaustive]
 pub struct Visibility {
     /// Whether a fault that develops by its model changes the measurement at some time. For a
-    /// constant fault: whether the transfer function from its column of `F_a` to the measurement is
-    /// not identically zero.
+    /// constant fault: whether the transfer function from its column of `F_a` is not identically zero.
     pub visible: bool,
     /// The transfer function from the column of `F_a` to the measurement at s = 0, or z = 1 in sampled
     /// time. None if it has a pole there: the measurement then grows without bound. Zero for the rate
@@ -56,8 +55,7 @@ struct Reach {
     column: DMatrix<f64>,
 }
 
-/// The part of the output c, n x 1, that the reached states have, one row for each; None if it is zero up
-/// to rounding.
+/// The part of the output c, n x 1, of the reached states, one row each; None if it is zero up to rounding.
 fn reached_output(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (c, norm) = reached.reached_output(c);
     (c.norm() > TOLERANCE * norm).then_some(c)

@@ -15,8 +15,7 @@ const FAR: f64 = 40.0;
 /// Q(x) = erfc((x/2)^(1/2)) + e^(-x/2) sum (x/2)^(j-1/2) / Gamma(j+1/2), 1 <= j <= (k-1)/2     k odd
 /// ```
 ///
-/// All terms are positive, so the result has full relative precision, also for large x. 1 for x <= 0; 0 for
-/// x > 0 without degrees of freedom.
+/// All terms are positive: full relative precision, also for large x. 1 for x <= 0; 0 for x > 0 without degrees.
 ///
 /// Source: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions (1964), 26.4.4, 26.4.5.
 ///
@@ -38,8 +37,7 @@ pub fn survival(degrees: u32, x: f64) -> f64 {
 /// normal vector with `degrees` entries, unit covariance and a mean of squared length `noncentrality`.
 ///
 /// A `noncentrality` below 0 counts as 0; 1 for x <= 0. Method: the Poisson mixture of the central
-/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the normal
-/// distribution of the length.
+/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the length is normal.
 ///
 /// Source: Abramowitz and Stegun (1964), 26.4.25.
 #[must_use]
@@ -73,8 +71,7 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// The x that a chi-square variable with `degrees` degrees of freedom exceeds with the probability
-/// `probability`.
+/// The x that a chi-square variable exceeds with the probability `probability`.
 ///
 /// `probability`: in 0 to 1, both excluded. Method: bisection of [`survival`] to the resolution of double
 /// precision. NaN for a probability outside of its range, and for no degrees of freedom.
@@ -133,8 +130,7 @@ impl Terms {
         terms
     }
 
-    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, a half of the degrees
-    /// before.
+    /// Adds two degrees: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, a half of the degrees before.
     fn raise(&mut self) {
         let exponent = self.shape * self.half.ln() - self.half - libm::lgamma(self.shape + 1.0);
         self.survival += exponent.exp();

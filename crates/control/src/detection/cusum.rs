@@ -108,8 +108,7 @@ impl Cusum {
         1.0 / (1.0 / self.run_length(bias) + 1.0 / self.run_length(-bias))
     }
 
-    /// The mean number of samples until S+, from 0, is above the threshold when the residual has the
-    /// constant mean `mean`.
+    /// The mean number of samples until S+, from 0, is above the threshold, if the residual has this mean.
     ///
     /// ```text
     /// L(s) = 1 + L(0) Phi(kappa - mean - s) + integral of L(y) phi(y - s + kappa - mean), y from 0 to h
@@ -217,8 +216,7 @@ fn mean_steps(mut transitions: DMatrix<f64>, mut alarms: DVector<f64>) -> f64 {
     steps[0] / alarms[0]
 }
 
-/// The distribution of one cumulative sum that has not been above its threshold: the probability of 0,
-/// and the density at the nodes.
+/// The distribution of one sum that has not been above its threshold: the probability of 0, the density at nodes.
 struct Sums {
     drift: f64,
     nodes: Vec<f64>,
@@ -269,8 +267,7 @@ impl Sums {
     }
 }
 
-/// Nodes and weights of the Gauss-Legendre quadrature on -1 to 1: roots of the Legendre polynomial by
-/// Newton's method.
+/// Nodes and weights of the Gauss-Legendre quadrature on -1 to 1, by Newton's method.
 fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
     let legendre = |x: f64| {
         let (mut before, mut value) = (1.0, x);

@@ -9,8 +9,7 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// The probability that the fault is detected within `samples` samples, at most as many as are computed;
-    /// 0 if `missed` is empty.
+    /// The probability of a detection within `samples`, at most as many as are computed; 0 without any.
     #[must_use]
     pub fn detected_within(&self, samples: usize) -> f64 {
         1.0 - self.missed.get(samples).or(self.missed.last()).copied().unwrap_or(1.0)
@@ -24,8 +23,7 @@ impl Delay {
         (*last <= 1e-3).then(|| self.missed.iter().sum())
     }
 
-    /// The number of samples within which the part `probability` of the faults is detected; None if no
-    /// computed number is enough.
+    /// The samples within which the part `probability` of the faults is detected; None if the computed are too few.
     #[must_use]
     pub fn quantile(&self, probability: f64) -> Option<usize> {
         self.missed.iter().position(|missed| 1.0 - missed >= probability)

@@ -102,12 +102,10 @@ impl UnknownInput {
     }
 }
 
-/// Designs the filter whose residuals do not depend on the inputs `unknown`, or returns None if there is
-/// none by this method.
+/// Designs the filter whose residuals do not depend on the inputs `unknown`; None if this method has none.
 ///
 /// Measurements in which an input appears directly are left out: y becomes `N_s` y with `N_s` `E_s` = 0.
-/// The inputs that act on the states are removed by an unknown-input observer (Chen and Patton 1999,
-/// section 3.2). With C for `N_s` C,
+/// An unknown-input observer (Chen and Patton 1999, section 3.2) removes those on the states. With C for `N_s` C,
 ///
 /// ```text
 /// H = E (C E)^+,  T = I - H C,  s = T x                               rank C E = rank E
@@ -271,12 +269,10 @@ impl DetectionFilter {
     }
 }
 
-/// Gain of the Kalman filter for correlated noise, and covariance of its innovation (in continuous time its
-/// intensity V).
+/// Gain of the Kalman filter for correlated noise, and covariance (continuous: intensity V) of its innovation.
 ///
 /// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v, in continuous
-/// time intensities. Method: the plant with A - S V^-1 C and W - S V^-1 S' has uncorrelated noise; S V^-1 is
-/// added to the gain of its filter.
+/// time intensities. Method: A - S V^-1 C, W - S V^-1 S' has uncorrelated noise; S V^-1 is added to the gain.
 fn correlated_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

@@ -20,8 +20,7 @@ const WIDTH: f64 = 1e-2;
 /// entry by entry. The errors dA, dB, dC may vary with time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UncertainPlant {
-    /// A, B, C, D; for a deviation from the operating point that is there from the start on, a column of B
-    /// and D with an input bounded by 1.
+    /// A, B, C, D; a deviation from the operating point from the start on is a column of B, D with an input up to 1.
     pub nominal: StateSpace,
     /// The largest errors of the entries of A, B and C, not below 0.
     pub sizes: [DMatrix<f64>; 3],
@@ -53,8 +52,7 @@ impl UncertainPlant {
     /// # Errors
     ///
     /// [`Error::Shape`] for matrices or bounds that do not fit; [`Error::Empty`] without `rows`; the errors of
-    /// [`peak_gain`], among them [`Error::NotHurwitz`] and [`Error::NotSchur`] for a plant or filter that is not
-    /// stable.
+    /// [`peak_gain`], among them [`Error::NotHurwitz`] and [`Error::NotSchur`] for an unstable plant or filter.
     pub fn largest_mean(
         &self,
         filter: &ResidualGenerator,
@@ -83,8 +81,7 @@ impl UncertainPlant {
                 (phi, gamma, integral * w)
             }
         };
-        // Rows of plant and filter in series: of its A and B for the states of the filter, of its C and D for
-        // the residuals.
+        // Plant and filter in series: rows of A and B for the states of the filter, of C and D for the residuals.
         let rows_of = |[dynamics, from_u, from_y]: [&DMatrix<f64>; 3]| {
             let from_inputs = (from_u + from_y * d).resize_horizontally(b.ncols() + n, 0.0);
             (beside(&(from_y * c), dynamics), beside(&from_inputs, from_y))

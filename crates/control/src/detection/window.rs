@@ -8,8 +8,7 @@ use crate::{Error, check};
 /// The largest number of starts of a fault within a window that are averaged for a delay.
 const PHASES: usize = 32;
 
-/// The chi-square test of the mean of white residuals r, m of them with covariance I, over windows of N
-/// samples, one after the other.
+/// The chi-square test of the mean of m white residuals r with covariance I, over successive windows of N samples.
 ///
 /// ```text
 /// s = N |mean of r over the window|^2,  alarm at the end of the window: s > h
@@ -72,8 +71,7 @@ impl WindowTest {
     /// entries, in its k-th sample, k from 0 on; at most `most` samples are followed.
     ///
     /// The fault starts in each sample of a window with the same probability; of a window with more than 32
-    /// samples, in 32 of them. The result has fewer samples where less than 1e-6 of the faults are missed
-    /// before.
+    /// samples, in 32 of them. The result ends where less than 1e-6 of the faults are missed.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> Vec<f64>, most: usize) -> Delay {
         let dimension = self.residuals as usize;

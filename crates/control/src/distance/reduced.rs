@@ -103,8 +103,7 @@ fn limit(u: &mut DVector<Complex<f64>>, at: usize) {
     }
 }
 
-/// The triangular T, n x n, of a matrix M = [0, T] Z with a unitary Z; M: n x (m + n), zero below its
-/// diagonal.
+/// The triangular T of M = [0, T] Z, n x (m + n), zero below its diagonal, with a unitary Z.
 fn triangular(mut pencil: ComplexMatrix, inputs: usize) -> ComplexMatrix {
     let n = pencil.nrows();
     for row in (0..n).rev() {

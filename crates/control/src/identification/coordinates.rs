@@ -16,8 +16,7 @@ pub struct MeasuredStates {
     pub change: DMatrix<f64>,
     /// T^-1.
     pub inverse: DMatrix<f64>,
-    /// The measurements, from 0, whose rates without the part of the commands, `C[i] A x`, are the states after the p
-    /// measurements.
+    /// The measurements, from 0, whose rates without the commands, `C[i] A x`, are the further states.
     pub rates: Vec<usize>,
 }
 

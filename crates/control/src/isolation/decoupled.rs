@@ -56,8 +56,7 @@ impl Gap {
 }
 
 impl DecoupledPart {
-    /// Decouples the disturbances and the faults with `decoupled[fault]`; None if no combination of
-    /// measurements is left.
+    /// Decouples the disturbances and the faults with `decoupled[fault]`; None if no measurements are left.
     ///
     /// `plant`: in balanced coordinates. Outputs are scaled to rows of C of length one, unknown inputs
     /// to columns of length one, A to its norm; a singular value below `tolerance` counts as zero.
@@ -103,8 +102,7 @@ impl DecoupledPart {
     }
 }
 
-/// A, E, C, D of a plant with the outputs R y and time in units of 1 / (norm of A); the diagonal of R; the
-/// norm of A.
+/// A, E, C, D for the outputs R y and time in units of 1 / |A|; the diagonal of R; |A|, the norm.
 fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVector<f64>, f64) {
     let (e, d) = plant.unknown_inputs(decoupled);
     let (n, norm) = (plant.a.nrows(), plant.a.norm());
@@ -143,8 +141,7 @@ fn conditioned_invariant(
     }
 }
 
-/// An orthonormal basis of the vectors that are orthogonal to the columns of M; narrows `gap` by the rank
-/// decision.
+/// An orthonormal basis of the vectors that are orthogonal to the columns of M; narrows `gap`.
 pub(super) fn complement(
     m: &DMatrix<f64>,
     tolerance: f64,
@@ -160,8 +157,7 @@ pub(super) fn complement(
 
 /// An orthonormal basis of the observable states of (A, C), and how many of them y, y', ... each add.
 ///
-/// Method: the staircase algorithm without further scaling, which would enlarge rounding errors; narrows
-/// `gap` by its rank decisions.
+/// Method: the staircase algorithm without further scaling, which enlarges rounding errors; narrows `gap`.
 pub(super) fn observable_states(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

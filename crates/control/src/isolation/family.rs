@@ -6,8 +6,7 @@ use crate::svd::Svd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// Frequencies at which the effect of measurement noise is averaged, and the decades that they span in
-/// continuous time.
+/// Frequencies at which the effect of noise is averaged, and the decades that they span (continuous time).
 const NOISE_POINTS: u32 = 40;
 const NOISE_DECADES: f64 = 4.0;
 
@@ -110,8 +109,7 @@ impl Family {
         (0..part.b_f.ncols()).map(size).collect()
     }
 
-    /// W: the combination v of the members has the variance v W v' per frequency when measurement i has noise
-    /// of the intensity `noise[i]`^2.
+    /// W: the combination v has the variance v W v' per frequency for noise of the intensity `noise[i]`^2.
     ///
     /// The mean over 40 frequencies: in continuous time over four decades up to ten times `fastest`, the
     /// rate of the fastest pole; in sampled time evenly from 0 to pi / period.

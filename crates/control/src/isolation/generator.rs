@@ -14,8 +14,7 @@ const ACCURACIES: f64 = 10.0;
 /// A decoupling error up to this comes from rounding of the data; a larger one comes from a coupling that
 /// counted as zero, so that smaller tolerances are tried.
 const DECOUPLED: f64 = 1e-6;
-/// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100; so the last one is above
-/// 1e-14.
+/// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100: all are above 1e-14.
 const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// The largest decoupling error that is accepted.
 const ALLOWED: f64 = 1e-3;
@@ -31,8 +30,7 @@ pub struct Requirements {
     /// The frequency, in rad per unit of time, from 0, at which the residual must respond to each fault
     /// of its pattern: 0 for constant faults.
     pub frequency: f64,
-    /// The smallest accepted gain of a fault, relative to the largest that the fault can have for the same
-    /// effect of noise, in (0, 1).
+    /// The smallest accepted gain of a fault, relative to its largest for the same effect of noise, in (0, 1).
     pub quality: f64,
     /// Relative singular values below this count as zero. If the residual then is not decoupled up to
     /// 1e-6 (see [`Residual::decoupling_error`]), smaller values are tried.

@@ -59,8 +59,7 @@ impl DisturbedPlant {
         self.domain.check()
     }
 
-    /// The columns of the disturbances and of the faults with `decoupled[fault]`: of `B_d` and `B_f`, and of
-    /// `D_d` and `D_f`.
+    /// `B_d` and `D_d` beside the columns of `B_f` and `D_f` with `decoupled[fault]`.
     pub(super) fn unknown_inputs(&self, decoupled: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
         let faults: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
         let with_faults =
@@ -68,19 +67,16 @@ impl DisturbedPlant {
         (with_faults(&self.b_d, &self.b_f), with_faults(&self.d_d, &self.d_f))
     }
 
-    /// The plant without the modes that no input moves, in balanced coordinates, and the number of these
-    /// modes.
+    /// The plant in balanced coordinates without the modes that no input moves, and the number of these modes.
     ///
     /// Such a mode, for example the norm of a quaternion, depends on the initial state alone.
     /// [`super::residual_generator`] leaves it out, so that its initial value counts as zero. Method: A is
     /// balanced; then the staircase form of (A, [`B_u`, `B_d`, `B_f`]) by orthogonal transformations,
-    /// where singular values below `tolerance` count as zero, relative to the norm of A and to
-    /// columns of length one.
+    /// where singular values below `tolerance` count as zero, relative to |A| and to columns of length one.
     ///
     /// # Errors
     ///
-    /// Same as [`DisturbedPlant::check`]; [`Error::NotConverged`] when a singular value iteration does
-    /// not end.
+    /// Same as [`DisturbedPlant::check`]; [`Error::NotConverged`] for singular values.
     pub fn reachable_part(&self, tolerance: f64) -> Result<(Self, usize), Error> {
         self.check()?;
         let n = self.a.nrows();

@@ -11,8 +11,7 @@ use nalgebra::Complex;
 const CONTINUOUS: [f64; 5] = [0.03, 0.3, 1.0, 3.0, 30.0];
 const SAMPLED: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 0.9];
 
-/// The largest response of the residual to an input that it is decoupled from, relative to the terms
-/// that cancel in it.
+/// The largest response to an input from which the residual is decoupled, relative to the terms that cancel.
 ///
 /// ```text
 /// |q_y g + q_u| / (|q_y| |g| + |q_u| + max_i |q_y,i| c_i (|b| / |A| + max_i |d_i| / c_i))

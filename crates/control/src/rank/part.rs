@@ -56,8 +56,7 @@ impl ControllablePart {
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
-/// [`Error::NotConverged`] when an inner iteration does not end.
+/// Same as [`super::controllability`].
 pub fn controllable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<ControllablePart, Error> {
     check::with_inputs(a, b)?;
     let staircase = Staircase::new(a, b)?;

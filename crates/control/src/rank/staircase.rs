@@ -7,8 +7,7 @@ use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
-/// A singular value counts as zero below this times the number of states, relative to the norm of
-/// the scaled matrix.
+/// A singular value counts as zero below this times the number of states and the norm of the scaled matrix.
 const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 
 /// The controllable and the uncontrollable states of a pair (A, B).
@@ -31,10 +30,6 @@ pub(crate) struct Staircase {
 impl Staircase {
     /// Computes the form in balanced coordinates, or without balancing if the rank is larger then: balancing scales
     /// states that do not act on each other without end.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`].
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
         let balanced = Self::in_coordinates(Balance::new(a), b)?;
         if balanced.decision.is_full() {

@@ -24,8 +24,7 @@ pub struct SampledLoop<'a> {
 }
 
 /// Computes upper bounds of the peak gains of a sampled loop over all times, not over the samples only: from
-/// arbitrary faults, from f' of faults without jumps, and from the part of such faults that the compensation
-/// leaves.
+/// arbitrary faults, from f' of faults without jumps, and from what the compensation leaves of such faults.
 ///
 /// ```text
 /// x(kT + t) = Phi(t) x[k] + Gamma(t) u[k] + integral of e^(A (t - s)) F_a f(kT + s) ds over s from 0 to t
@@ -46,8 +45,7 @@ pub struct SampledLoop<'a> {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`], [`zero_order_hold`] and [`peak_gain`]; [`Error::OutOfRange`] for `parts`, and
-/// for a row beyond [x; e; eps].
+/// Same as [`Gains::check`], [`zero_order_hold`] and [`peak_gain`]; [`Error::OutOfRange`] for `parts` and `rows`.
 pub fn gains_between_samples(
     sampled: &SampledLoop<'_>,
     parts: u32,
@@ -76,8 +74,7 @@ struct Lifted<'a> {
     entry: DMatrix<f64>,
 }
 
-/// The effects of an input on the loop over one interval: on x at its end and at the start of each part, and on
-/// eps.
+/// The effects of an input over one interval: on x at its end and at the start of each part, and on eps.
 struct Effects {
     /// For each part of the input: its effect on x[k+1], n + filters rows.
     states_after: Vec<DMatrix<f64>>,

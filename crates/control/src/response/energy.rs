@@ -29,8 +29,7 @@ pub struct Energy {
 /// ```
 ///
 /// The energy of w is the integral of w'w, in sampled time the sum over the samples without the
-/// period. The norms are finite when A is stable, and in continuous time D = 0. Method, cost and
-/// tolerance: see [`lyapunov`].
+/// period. The norms are finite for a stable A, in continuous time with D = 0. Method, cost, tolerance: [`lyapunov`].
 ///
 /// Source: D. A. Wilson, Convolution and Hankel operator norms for linear systems, IEEE Trans.
 /// Autom. Control 34 (1989).

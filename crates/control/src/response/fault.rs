@@ -8,8 +8,7 @@ use crate::{Domain, Error, check};
 /// Relative width of the brackets of the peak gains; [`FaultBounds`] uses their upper ends.
 const WIDTH: f64 = 1e-3;
 
-/// Bounds of states and errors at all times, for faults that start from rest; each in the unit of
-/// its quantity.
+/// Bounds at all times, for faults that start from rest; each in the unit of its quantity.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FaultBounds {
@@ -46,8 +45,7 @@ pub struct FaultBounds {
 /// # Errors
 ///
 /// Same as [`Gains::check`] and [`super::peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
-/// `magnitudes` and `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] when the loop is not
-/// stable.
+/// `magnitudes` and `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable loop.
 pub fn fault_bounds(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -100,8 +98,7 @@ pub struct Reversal {
     pub trace: TimeResponse,
 }
 
-/// Computes the response of the loop, from rest, to a change of one fault, such as a reversal of
-/// friction.
+/// Computes the response of the loop, from rest, to a change of one fault, such as reversed friction.
 ///
 /// `fault`: the index of the fault, from 0; `change`: the size of the change in the unit of the
 /// fault, above zero, 2 `F_s` for friction that reverses from -`F_s` to `F_s`; `rate`: the rate of the change,
@@ -124,8 +121,7 @@ pub struct Reversal {
 /// compensation the friction does not jump. The cart stops, and while it sticks the friction swings
 /// from -30 N to 30 N in 0.26 s, at up to 521 N/s, as fast as the observer moves the command. That
 /// rate is a property of the loop with friction; it must be known from a simulation or a
-/// measurement, or assumed. The root mean square of eps (0.28 N) is not predicted either; |eps|
-/// only bounds it.
+/// measurement, or assumed. The root mean square of eps (0.28 N) is not predicted either, only bounded.
 ///
 /// # Example
 ///
@@ -144,8 +140,7 @@ pub struct Reversal {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`,
-/// `rate` and `fraction`.
+/// Same as [`Gains::check`], [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`, `rate`, `fraction`.
 pub fn reversal(
     plant: &FaultyPlant,
     gains: &Gains,

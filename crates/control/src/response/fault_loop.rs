@@ -105,8 +105,7 @@ pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
 ///
 /// The first are the gains of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
 /// positions in [x; e; eps] of the outputs, at least one; each result has a row for each output and q columns.
-/// `width`: see [`peak_gain`]. Both systems have the same dynamics, so that one call of [`peak_gain`] serves
-/// both.
+/// `width`: see [`peak_gain`]. Both systems have the same dynamics; one call of [`peak_gain`] serves both.
 ///
 /// # Errors
 ///
@@ -140,8 +139,7 @@ pub(super) fn require_rows(plant: &FaultyPlant, rows: &[usize]) -> Result<(), Er
     Err(Error::OutOfRange { name: "rows", value: check::as_number(*row), rule })
 }
 
-/// C of both systems, from the state to [x; e; `f_hat`] or [x; e; eps]: the identity without a direct term and
-/// integrals.
+/// C of both systems, from the state to [x; e; `f_hat` or eps]: I without a direct term and integrals.
 pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut c = DMatrix::identity(2 * n + q, 2 * n + q + gains.integrals());
@@ -152,8 +150,7 @@ pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
 }
 
 /// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`]; with a direct
-/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action the rows and columns of `x_i`
-/// follow.
+/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action, then those of `x_i`.
 pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let (first, t) = (2 * n + q, gains.integrals());

@@ -15,8 +15,7 @@ use std::ops::Range;
 pub struct FrequencyPoint {
     /// w in rad per unit of time.
     pub frequency: f64,
-    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time with the period h, s is replaced by
-    /// z = e^(j w h).
+    /// G = C (s I - A)^-1 B + D, p x m, s = j w; with the period h in sampled time z = e^(j w h) for s.
     pub gain: DMatrix<Complex<f64>>,
     /// The singular values of G, descending; their number is the smaller one of p and m.
     pub singular_values: Vec<f64>,
@@ -68,8 +67,7 @@ pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, 
     Ok(svd?.values())
 }
 
-/// Frequencies for a figure, ascending: at least `per_decade` points in each decade, evenly on the logarithmic
-/// scale.
+/// Frequencies for a figure, ascending, evenly on the logarithmic scale: at least `per_decade` per decade.
 ///
 /// They range from a tenth of the slowest eigenvalue of A to ten times the fastest, eigenvalues at the origin
 /// left out; without any other eigenvalue from 0.1 to 10. In sampled time they end at the Nyquist frequency
@@ -77,8 +75,7 @@ pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, 
 ///
 /// # Errors
 ///
-/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade` of zero;
-/// [`Error::NotConverged`].
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade`; [`Error::NotConverged`].
 pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, Error> {
     system.check()?;
     check::positive("per_decade", f64::from(per_decade))?;
@@ -111,8 +108,7 @@ pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32
     (0..=steps).map(|k| point(k).min(to)).collect()
 }
 
-/// A system in coordinates in which A is balanced and in Hessenberg form, so that each frequency needs
-/// n^2 multiplications only.
+/// A system with A balanced and in Hessenberg form, so that a frequency needs n^2 multiplications only.
 ///
 /// Source: A. J. Laub, Efficient multivariable frequency response computations, IEEE Trans. Autom.
 /// Control 26 (1981).
@@ -177,8 +173,7 @@ impl Transfer {
         Ok(gain)
     }
 
-    /// (s I - A)^-1 B by elimination with an exchange of adjacent rows; not finite if s is an
-    /// eigenvalue.
+    /// (s I - A)^-1 B by elimination, exchanging adjacent rows; not finite if s is an eigenvalue.
     fn states(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
         let n = self.transposed.nrows();
         // Column k is row k of s I - A.

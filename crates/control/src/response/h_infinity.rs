@@ -27,8 +27,7 @@ pub struct HInfinity {
     pub lower: f64,
     /// Upper bound: the largest singular value is below it at every frequency, up to rounding.
     pub upper: f64,
-    /// The frequency of `lower` in rad per unit of time; infinite when it is the D of a continuous
-    /// system.
+    /// The frequency of `lower` in rad per unit of time; infinite for the D of a continuous system.
     pub frequency: f64,
 }
 

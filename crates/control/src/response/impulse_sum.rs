@@ -21,8 +21,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Bounds of |D| + the sum over k of |C A^k B|, entry by entry.
 ///
 /// The lower bound is the sum of finitely many samples; the upper bound adds a bound of all later ones, from the
-/// contraction of A. `eigenvalues`: of A. None if A contracts so slowly that intervals of many samples need
-/// fewer operations.
+/// contraction of A. `eigenvalues`: of A. None if A contracts so slowly that intervals of many samples are cheaper.
 pub(super) fn impulse_sums(
     system: &StateSpace,
     eigenvalues: &[Complex<f64>],
@@ -79,8 +78,7 @@ pub(super) fn impulse_sums(
     }
 }
 
-/// The largest number of samples for one contraction by half with which adding all samples needs fewer
-/// operations than intervals do.
+/// The most samples for one contraction by half with which adding all of them is cheaper than intervals.
 fn largest_block(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
     let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(as_number);
     let oscillations = |value: &Complex<f64>| {

@@ -14,8 +14,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Largest number of doublings of the length.
 const LENGTHS: usize = 120;
 
-/// Intervals of one length, for one output row c: matrices that act on the state x at the start of an interval,
-/// h(t) = c x(t).
+/// Intervals of one length for one output row c, as matrices that act on the state x at the start; h(t) = c x(t).
 pub(super) struct Length {
     /// Time, or number of samples.
     pub(super) time: f64,
@@ -76,8 +75,7 @@ impl Length {
         states.column_iter().zip(products.column_iter()).map(one).collect()
     }
 
-    /// A bound of the integral of |h| over all time from `state` on; infinite unless an interval of this length at
-    /// least halves every state.
+    /// A bound of the integral of |h| from `state` on; infinite unless an interval at least halves every state.
     pub(super) fn tail(&self, state: &DVector<f64>) -> f64 {
         let contraction = self.phi.norm();
         if contraction > 0.5 {
@@ -87,8 +85,7 @@ impl Length {
     }
 }
 
-/// A system in balanced coordinates, with its shortest interval and the intervals of twice, four times, ... its
-/// length.
+/// A system in balanced coordinates, its shortest interval and those of twice, four times, ... its length.
 pub(super) struct Intervals {
     /// Columns of B in balanced coordinates: the states after an impulse.
     pub(super) starts: DMatrix<f64>,
@@ -183,16 +180,14 @@ struct Node {
     weight: f64,
 }
 
-/// The rule of three nodes, exact for polynomials of fifth degree; over 1 / 4096 of a time constant its error is below
-/// the rounding.
+/// Three nodes, exact for the fifth degree; over 1 / 4096 of a time constant the error is below the rounding.
 const NODES: [Node; 3] = [
     Node { part: 0.112_701_665_379_258_31, weight: 5.0 / 18.0 },
     Node { part: 0.5, weight: 8.0 / 18.0 },
     Node { part: 0.887_298_334_620_741_7, weight: 5.0 / 18.0 },
 ];
 
-/// `row` times e^(A t), t being `part` of the shortest interval; `a`: A times its length. The terms after the sixth are
-/// below the rounding.
+/// `row` times e^(A t), t = `part` of the shortest interval; `a`: A times its length. Later terms are rounding.
 fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     let (mut term, mut sum) = (row.clone(), row.clone());
     for degree in 1..=5 {
@@ -202,8 +197,7 @@ fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     sum
 }
 
-/// A matrix R with |R x| = |M x| for every x, up to the rounding of its columns, and as many rows as the rank of M, at
-/// least one.
+/// R with |R x| = |M x| for every x, up to rounding, and as many rows as the rank of M, at least one.
 ///
 /// R is the triangle of a QR decomposition with pivots, of columns of length about one, because the effects of two
 /// states on an output may differ by many orders of magnitude.

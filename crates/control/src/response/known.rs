@@ -34,8 +34,7 @@ pub(crate) fn resonances(modes: &[Complex<f64>], domain: Domain) -> Vec<f64> {
 
 /// A stable system with its eigenvalues, its Hessenberg form, and its response at frequencies of a sweep.
 ///
-/// Systems that differ in B, C and D by a choice of channels, by their sign or by units share all of
-/// them.
+/// Systems that differ by a choice of channels, by the sign of C or by units share all of them.
 #[derive(Clone)]
 pub(crate) struct KnownResponse {
     pub(crate) system: StateSpace,
@@ -47,11 +46,7 @@ pub(crate) struct KnownResponse {
 }
 
 impl KnownResponse {
-    /// A system without known responses.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`StateSpace::check`]; [`Error::NotHurwitz`], [`Error::NotSchur`]; [`Error::NotConverged`].
+    /// A system without known responses; [`Error::NotHurwitz`] or [`Error::NotSchur`] if it is not stable.
     pub(crate) fn new(system: StateSpace) -> Result<Self, Error> {
         let modes = system.stable_eigenvalues()?;
         let transfer = Transfer::new(&system);

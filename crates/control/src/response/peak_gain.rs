@@ -126,8 +126,7 @@ impl Trajectory {
         Self { start: Rc::new(start), states: HashMap::new() }
     }
 
-    /// The starts of the second halves of intervals that start at `firsts`; `half`: the length of the halves, 2^`level`
-    /// times the shortest.
+    /// The starts of the second halves of intervals from `firsts`; `half`: 2^`level` times the shortest interval.
     fn middles(&mut self, half: &Length, level: usize, firsts: &[Start]) -> Vec<Start> {
         let time = |first: &Start| first.time + (1_u128 << level);
         let is_missing = |first: &&Start| !self.states.contains_key(&time(first));

@@ -22,13 +22,11 @@ const LARGE: usize = 48;
 pub struct TimeResponse {
     /// Times, ascending from 0, in the unit of time of A or of the period.
     pub time: Vec<f64>,
-    /// z at these times, p x length of `time`. The value at 0 is the one after the jump of the
-    /// input.
+    /// z at these times, p x length of `time`, at 0 after the jump of the input.
     pub output: DMatrix<f64>,
     /// The limit of z for large times, p.
     pub final_value: DVector<f64>,
-    /// The derivative of z, p x length of `time`; without columns in sampled time, and where the points
-    /// do not follow every oscillation.
+    /// z' at these times; without columns in sampled time, and where the points do not follow every oscillation.
     pub(super) slope: DMatrix<f64>,
 }
 
@@ -63,8 +61,7 @@ pub fn step_response(system: &StateSpace, input: usize) -> Result<TimeResponse, 
     response(system, input, None)
 }
 
-/// Computes the response to an input that rises linearly from 0 to 1 over `duration` and then stays
-/// at 1.
+/// Computes the response to an input that rises linearly from 0 to 1 over `duration`, then stays at 1.
 ///
 /// Same as [`step_response`], with a new grid at the end of the ramp. In sampled time the input has the
 /// values of the ramp at the samples; the end of the ramp may lie between two of them.
@@ -81,13 +78,11 @@ pub fn ramp_response(
     response(system, input, Some(duration))
 }
 
-/// Computes the limit of z for large times after a unit step of one input, p: the final value of
-/// [`step_response`].
+/// Computes the final value of [`step_response`], p: the limit of z for large times.
 ///
 /// # Errors
 ///
-/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
-/// [`Error::NotSchur`]; [`Error::Overflow`].
+/// Same as [`step_response`].
 pub fn settled_output(system: &StateSpace, input: usize) -> Result<DVector<f64>, Error> {
     system.stable_eigenvalues()?;
     check_input(system, input)?;
@@ -219,8 +214,7 @@ impl Modes {
             let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
             if self.period == 0.0 && until + spacing < end {
-                // Powers of two, so that neighbouring segments share a step and its propagator; the last one may end
-                // after `until`.
+                // Powers of two: neighbours share a step and its propagator. The last one may end after `until`.
                 let step = power_of_two(spacing / SQRT_2);
                 let count = ((until - from) / step).ceil();
                 left -= count;

@@ -52,8 +52,7 @@ impl TimeResponse {
         Transient { peak, peak_time, settling_time, final_value }
     }
 
-    /// Time and value of an extremum of z between points k and k + 1; None if the slope does not change its sign
-    /// or is not known.
+    /// Time and value of an extremum between points k and k + 1; None without a known change of sign of the slope.
     fn extremum(&self, output: usize, k: usize) -> Option<(f64, f64)> {
         let slopes: &DMatrix<f64> = &self.slope;
         if k + 1 >= slopes.ncols() {

@@ -10,15 +10,13 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
 
-/// The largest gain up to which a limit is searched, as down to its reciprocal, and the number of gains at which
-/// stability is tested on each side.
+/// Gains are searched up to this one and down to its reciprocal; stability is tested at so many on each side.
 const LARGEST_GAIN: f64 = 1e6;
 const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.
 const TESTED_GAINS_IF_LARGE: u32 = 8;
 const LARGE: usize = 100;
-/// A change of the sign of Im T is a crossing of the real axis by L, not a pole of L, if the angle to the
-/// axis is below this.
+/// Where the sign of Im T changes, L crosses the real axis if its angle to it is below this; else it has a pole.
 const ON_AXIS: f64 = 1e-6;
 
 /// The margins of one channel while the other channels are closed and exact.

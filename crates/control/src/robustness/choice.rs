@@ -17,8 +17,7 @@ const ACCEPTABLE: f64 = 1.02;
 ///
 /// The measure is `p_u^2 p_y` with the largest singular values `p_u` at the input and `p_y` at the output:
 /// relative changes of both count, those at the commands twice, because errors of actuators and
-/// delays of the computation act there. The first loop is preferred unless another one is lower by more
-/// than 10 %.
+/// delays of the computation act there. The first loop is preferred unless another is lower by over 10 %.
 ///
 /// `loops`: a first and a second list; an index counts through both. `references`: loops that other methods
 /// have for these eigenvalues. A loop is acceptable if each of its peaks is at most 2 % above the lowest one of
@@ -31,8 +30,7 @@ const ACCEPTABLE: f64 = 1.02;
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
 /// first loop. A resonance of S between two of them is possible only near an eigenvalue, and all loops have the
 /// same eigenvalues. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
-/// p) for each frequency. A loop whose response cannot be computed, or that is not stable, is left
-/// out. The result is deterministic.
+/// p) for each frequency. A loop that is not stable or has no response is left out. The result is deterministic.
 #[must_use]
 pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
     let [first, second] = loops;

@@ -10,8 +10,7 @@ pub(super) struct Evaluation {
     pub(super) value: f64,
 }
 
-/// Narrows an interval in which a function changes its sign; returns its ends, in the order of the
-/// arguments.
+/// Narrows an interval in which a function changes its sign; returns its ends in the given order.
 ///
 /// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function
 /// need not be continuous. Method: regula falsi in the variant of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois);

@@ -106,8 +106,7 @@ pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error>
     })
 }
 
-/// Computes the largest value over frequency of the structured singular value of a square system,
-/// for a diagonal of complex numbers.
+/// Computes the peak over frequency of the structured singular value for a diagonal of complex numbers.
 ///
 /// For [`Loop::sensitivity`] it is the peak of S in the units of the channels that make it least.
 /// Method and gap: see [`disk_margin`].

@@ -8,8 +8,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
-/// The largest singular value of S at a frequency, and its derivatives with respect to the entries
-/// of A, B, C and D of the plant.
+/// The largest singular value of S at a frequency, and its derivatives by the entries of the plant.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PeakDerivatives {
@@ -32,13 +31,11 @@ pub struct SensitivityPeak {
     pub point: Point,
     /// The frequency of the peak, in rad/s.
     pub frequency: f64,
-    /// Whether the peak is that of D S D^-1 with the diagonal D for which it is least, see
-    /// [`super::scaled_peak`].
+    /// Whether it is the peak of D S D^-1 with the best diagonal D, see [`super::scaled_peak`].
     pub scaled: bool,
 }
 
-/// Derivatives of the peak of S with respect to each entry of the plant, while the controller does
-/// not change.
+/// Derivatives of the peak of S by each entry of the plant; the controller does not change.
 ///
 /// ```text
 /// d sigma / d theta = Re(u* dS/d theta v),   S v = sigma u
@@ -161,8 +158,7 @@ fn through_hold(
     let square = |a: &DMatrix<f64>, b: &DMatrix<f64>| beside(a, b).resize_vertically(order, 0.0);
     let (both, gradient) = (square(&plant.a, &plant.b), square(&sampled.a, &sampled.b));
     let adjoint = both.transpose() * period;
-    // The derivative is linear in the gradient: with one of the size of the matrix the exponential
-    // needs no further squarings.
+    // Linear in the gradient: with one of the size of the matrix the exponential needs no further squarings.
     let size = gradient.amax();
     let unit = if size > 0.0 { adjoint.amax().max(f64::MIN_POSITIVE) / size } else { 1.0 };
     let zero = DMatrix::zeros(order, order);

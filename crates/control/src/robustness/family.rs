@@ -21,8 +21,7 @@ pub trait PlantFamily {
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples
-    /// of the controller.
+    /// The plant with these parts of the tolerances, in continuous time or in the samples of the controller.
     ///
     /// # Errors
     ///
@@ -78,8 +77,7 @@ impl<F: PlantFamily> Loops<'_, F> {
         }
     }
 
-    /// The multiple of the deviations below which the loop is stable, if it is unstable at one of
-    /// [`PlantFamily::multiples`].
+    /// The multiple of the deviations below which the loop is stable, None if at all [`PlantFamily::multiples`].
     pub(super) fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
         stability_limit(0.0, self.family.multiples(), |multiple| {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();

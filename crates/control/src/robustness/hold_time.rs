@@ -11,8 +11,7 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// The search starts at this part of the shortest time constant of the loop and ends at `LONGEST`
-/// times the longest one.
+/// The search starts at this part of the shortest time constant and ends at `LONGEST` times the longest one.
 const SHORTEST: f64 = 1e-9;
 const LONGEST: f64 = 100.0;
 /// Ratios of the times at which stability is tested: up to `SHORT` of the shortest time constant, where
@@ -21,8 +20,7 @@ const FACTORS: [f64; 2] = [8.0, 1.25];
 const SHORT: f64 = 1e-2;
 
 /// Computes the longest hold time of a continuous loop: plant and controller exchange their signals
-/// every h and hold them in between, as in co-simulation or with a sampled controller that is the
-/// discretised continuous one.
+/// every h and hold them in between, as in co-simulation or with a discretised controller.
 ///
 /// Returns the h below which the loop is stable: zero if it diverges with a hold of 1e-9 of its
 /// shortest time constant already, infinite if it is stable at all tested h up to 100 times its longest one.
@@ -48,8 +46,7 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
             [&(&b_k * &plant.c), &a_k],
         );
         if plant.d.amax() > 0.0 {
-            // The previous commands are further states v: a measurement C x + D v contains the command that was held
-            // until then.
+            // The previous commands are further states v: C x + D v contains the command that was held until then.
             let (n, m) = plant.b.shape();
             let of_held = stacked(&DMatrix::zeros(n, m), &(b_k * &plant.d));
             let of_states = beside(&DMatrix::zeros(m, n), &(&controller.c / h));
@@ -75,8 +72,7 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
 ///
 /// # Errors
 ///
-/// Same as [`held_plant`] and [`Loop::new`]; [`Error::OutOfRange`] if the controller is continuous or the plant is
-/// sampled.
+/// Same as [`held_plant`], [`Loop::new`]; [`Error::OutOfRange`] for a continuous controller or a sampled plant.
 pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let period = period_of(controller)?;
     check::that(

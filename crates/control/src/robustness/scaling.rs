@@ -89,8 +89,7 @@ pub(super) fn balanced_norm(m: &DMatrix<Complex<f64>>) -> Result<f64, Error> {
     Ok(Scaled::new(m, &balancing_exponents(m))?.norm)
 }
 
-/// The logarithms of the D, the last one 0, for which rows and columns of D M D^-1 have about equal norms (Osborne
-/// 1960).
+/// ln D, the last one 0, for about equal norms of rows and columns of D M D^-1 (Osborne 1960).
 fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
     let k = m.nrows();
     let mut exponents = DVector::<f64>::zeros(k);

@@ -31,7 +31,7 @@ const ROUNDING: f64 = 1e-4;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct StructuredBound {
-    /// The bound: the system in feedback with Delta is stable for every constant Delta of the structure with a
+    /// The bound: fed back by Delta, the system is stable for every constant Delta of the structure with a
     /// size below 1 / `upper`.
     pub upper: f64,
     /// The frequency that determines the bound, in rad per unit of time.
@@ -40,8 +40,7 @@ pub struct StructuredBound {
     pub intervals: usize,
 }
 
-/// Bounds the structured singular value of a stable square system M(s) = C (s I - A)^-1 B + D over all frequencies,
-/// not only on a grid.
+/// Bounds the structured singular value of a stable square M(s) = C (s I - A)^-1 B + D over all frequencies.
 ///
 /// For each frequency the bound is the least beta with Hermitian D > 0 and G that commute with the structure and
 ///

@@ -116,13 +116,11 @@ pub struct ToleranceTest {
 /// cases are uniform in -1 to 1 and independent, drawn by the generator `SplitMix64` from `seed`. The
 /// worst case is searched among the vertices of the tolerances: from the nominal plant and from the
 /// worst random cases, in the directions that the derivatives of the eigenvalues state. It is a lower
-/// bound of what the tolerances can do: a loop that is found stable may be unstable in a case that was
-/// not tried.
+/// bound of what the tolerances can do: a stable loop may be unstable in a case that was not tried.
 ///
 /// # Errors
 ///
-/// The errors of the family; same as [`super::Loop::new`], [`super::held_plant`] and
-/// [`crate::stability::instability`].
+/// The errors of the family, of [`super::Loop::new`], [`super::held_plant`], [`crate::stability::instability`].
 pub fn tolerance_test<F: PlantFamily>(
     family: &F,
     controller: &StateSpace,
@@ -216,8 +214,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     }
 }
 
-/// `cases` points of a box of `count` deviations from -1 to 1, uniform and independent, drawn by the generator
-/// `SplitMix64` from `seed`.
+/// `cases` independent points, uniform in -1 to 1 in each of `count` deviations, by `SplitMix64` from `seed`.
 #[must_use]
 pub fn random_deviations(count: usize, cases: u32, seed: u64) -> Vec<Vec<f64>> {
     let mut random = seed;
@@ -256,8 +253,7 @@ impl<'a> EntryFamily<'a> {
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad tolerances; [`Error::OutOfRange`] for a
-    /// negative one.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`]; [`Error::OutOfRange`] for a negative tolerance.
     pub fn new(plant: &'a StateSpace, tolerances: &Tolerances) -> Result<Self, Error> {
         let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c), ("D", &plant.d)];
         for ((name, values), of) in named.into_iter().zip(&tolerances.of) {

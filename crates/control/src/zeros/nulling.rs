@@ -24,10 +24,6 @@ pub(crate) struct Nulling {
 /// `system`: A to D; `output`: E, r x n; `direct`: G, r x k. None if w is not determined by y: D of the reduced
 /// system is not square then, and some w has no effect on y. Method: [`super::zeros()`], with D; states are
 /// balanced, columns of [B; D] and rows of [C, D] scaled to the norm of A.
-///
-/// # Errors
-///
-/// [`Error::NotConverged`]; [`Error::Overflow`].
 pub(crate) fn output_nulling(
     system: &StateSpace,
     output: &DMatrix<f64>,

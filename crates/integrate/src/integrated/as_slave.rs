@@ -11,8 +11,7 @@ use super::{Integrated, Mode, TOLERANCE, failed};
 const GAP: f64 = 1e-6;
 
 impl Integrated {
-    /// Whether a variable that is no continuous input would get a new value; true if the FMU does not return the
-    /// present values.
+    /// Whether a variable that is no continuous input would get a new value; true if the present one is unknown.
     fn changes_discrete(&mut self, references: &[u32], values: &[f64]) -> bool {
         self.reals.resize(references.len(), 0.0);
         if self.instance.get_real(references, &mut self.reals).is_err() {

@@ -58,8 +58,7 @@ fn changed(before: &[f64], after: &[f64]) -> Option<usize> {
 }
 
 impl Integrated {
-    /// Integrates to `end`, to an event that the master handles, or to the time at which the FMU requests the end of
-    /// the simulation.
+    /// Integrates to `end`, to an event for the master, or to the end of the simulation that the FMU requests.
     pub(super) fn integrate(
         &mut self,
         end: f64,

@@ -7,8 +7,7 @@ use crate::blocks::ComplexMatrix;
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 use std::iter::successors;
 
-/// The largest G, relative to D and the size of M: a number with a smaller angle to the real axis than about the
-/// inverse counts as real.
+/// The largest G, relative to D and M: a number whose angle to the real axis is below the inverse counts as real.
 const LARGEST_G: f64 = 1e3;
 const NEWTON_STEPS: usize = 40;
 /// The Newton decrement below which a point is near enough to the centre.
@@ -69,8 +68,7 @@ impl<'a> Barrier<'a> {
         point
     }
 
-    /// The factors of the four inequalities, with c the largest G: [`form`] > 0, c D + G > 0, c D - G > 0, I - D > 0;
-    /// None if one does not hold.
+    /// The factors of [`form`], c D + G, c D - G and I - D, c the largest G; None unless all are above 0.
     fn factors(&self, at: &Point, bound: f64) -> Option<[ComplexMatrix; 4]> {
         let Point { d, g, .. } = at;
         if d.diagonal().iter().any(|x| x.re <= 0.0) {

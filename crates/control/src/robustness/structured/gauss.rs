@@ -3,8 +3,7 @@
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 
-/// The Gauss method with 1, 2 or 3 stages, of order 2, 4 or 6: its step is the diagonal Padé approximation of the
-/// matrix exponential.
+/// The Gauss method with 1, 2 or 3 stages, of order 2, 4 or 6: a diagonal Padé approximation of the exponential.
 ///
 /// Source: E. Hairer and G. Wanner, Solving ordinary differential equations II (1996), table IV.5.1 and theorem IV.3.9.
 pub(super) struct Gauss {
@@ -72,8 +71,7 @@ impl Gauss {
     }
 }
 
-/// A step of the Gauss method: z of all stages is C xi + D w, with xi at the start of the step, and w adds B w to xi at
-/// its end.
+/// A step of the Gauss method from xi: z of all stages is C xi + D w, and w adds B w to the end.
 pub(super) struct Step {
     pub(super) b: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,

@@ -7,8 +7,7 @@ use nalgebra::DMatrix;
 /// Rounding error of an entry, relative to the sum of the sizes of the numbers that were subtracted.
 const ROUNDING: f64 = 1e-14;
 
-/// The plant x' = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u, with the channels w and z of
-/// the perturbation.
+/// The plant x' = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u, perturbed from z to w.
 pub(super) struct GeneralisedPlant {
     pub(super) a: DMatrix<f64>,
     pub(super) b: [DMatrix<f64>; 2],
@@ -37,8 +36,7 @@ impl GeneralisedPlant {
     }
 }
 
-/// The channels of all deviations: deviation i changes a matrix by `L_i R_i'`; the `L_i` are side by side, as are the
-/// `R_i`.
+/// The channels of all deviations: deviation i changes a matrix by `L_i R_i'`; all `L_i`, and `R_i`, side by side.
 pub(super) struct Channels {
     pub(super) left: DMatrix<f64>,
     pub(super) right: DMatrix<f64>,

@@ -8,8 +8,7 @@ use nalgebra::{Complex, SymmetricEigen};
 const POSITIVE: f64 = 1e-13;
 const EIGEN_ITERATIONS: usize = 1000;
 
-/// The lower triangular factor of H = L L*; None unless every pivot is above the rounding errors of a matrix whose
-/// diagonal has the size `scale`.
+/// L of H = L L*; None unless every pivot is above the rounding errors of a diagonal of the size `scale`.
 ///
 /// The Cholesky decomposition of nalgebra takes complex roots of negative pivots.
 pub(super) fn factor(h: &ComplexMatrix, scale: &[f64]) -> Option<ComplexMatrix> {

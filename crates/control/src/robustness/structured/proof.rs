@@ -11,8 +11,7 @@ use nalgebra::DMatrix;
 
 /// The largest number of channels of the perturbation, and of states of the loop.
 const LARGEST: usize = 100;
-/// The search ends if the proven fraction is at least this part of the one for which the error of the Gauss method was
-/// bounded.
+/// The search ends at this part of the fraction for which the error of the Gauss method was bounded.
 const NEAR: f64 = 0.97;
 /// Otherwise the error is bounded again for the proven fraction times this.
 const FURTHER: f64 = 1.02;
@@ -66,8 +65,7 @@ pub enum Unproven {
 /// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that
 /// of the nominal plant plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
 /// channels for each, plus the change of the error of that method. This error is bounded entry by entry by its
-/// power series and is one more block, a full one. It is small if the sample time is short compared with the time
-/// constants of the plant.
+/// power series and is one more block, a full one; small for a sample time that is short beside the time constants.
 ///
 /// # Errors
 ///

@@ -9,8 +9,7 @@ const NEGLIGIBLE: f64 = 1e-16;
 /// The relative increase of the bound that allows for rounding errors of the series.
 const ROUNDING: f64 = 1e-6;
 
-/// Entrywise bound of |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, with E(Z) = e^Z - (its diagonal Padé
-/// approximation of degree `stages`).
+/// Bounds |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, E(Z) = e^Z - (its Padé approximation [k/k], k = `stages`).
 ///
 /// With E(x) = sum of c x^k from k = 2 `stages` + 1 on and X = |Z| it is the sum of |c| ((X + Y)^k - X^k). None if the
 /// series does not converge: the poles of the approximations have moduli of 2, 3.46 and 4.64.
