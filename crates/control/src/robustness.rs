@@ -123,14 +123,11 @@ impl Loop {
         controller.check()?;
         check::shape("the controller's D", &controller.d, (plant.b.ncols(), plant.c.nrows()))?;
         let direct = plant.d.amax();
-        if direct > 0.0 && controller.d.amax() > 0.0 {
-            let rule = "zero, as that of the controller is not";
-            return Err(Error::OutOfRange { name: "the plant's D", value: direct, rule });
-        }
-        if plant.domain != controller.domain {
-            let rule = "the same for plant and controller";
-            return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
-        }
+        let is_proper = direct <= 0.0 || controller.d.amax() <= 0.0;
+        let rule = "zero, as that of the controller is not";
+        check::that(is_proper, "the plant's D", direct, rule)?;
+        let is_same = plant.domain == controller.domain;
+        check::that(is_same, "the domain", f64::NAN, "the same for plant and controller")?;
         Ok(Self { plant, controller })
     }
 

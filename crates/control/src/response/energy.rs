@@ -75,10 +75,7 @@ fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
     let covariance = match domain {
         Domain::Continuous => {
             let value = d.amax();
-            if value > 0.0 {
-                let rule = "zero: the norm is infinite otherwise";
-                return Err(Error::OutOfRange { name: "D", value, rule });
-            }
+            check::that(value <= 0.0, "D", value, "zero: the norm is infinite otherwise")?;
             c * lyapunov(&a.transpose(), &noise)?.p * c.transpose()
         }
         Domain::Sampled { .. } => {

@@ -154,10 +154,8 @@ impl Transfer {
 
     /// C (s I - A)^-1 B at one frequency; not finite if s is an eigenvalue.
     pub(super) fn without_direct(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
-        if !(frequency.is_finite() && frequency >= 0.0) {
-            let rule = "a finite number, not negative";
-            return Err(Error::OutOfRange { name: "frequency", value: frequency, rule });
-        }
+        let holds = frequency.is_finite() && frequency >= 0.0;
+        check::that(holds, "frequency", frequency, "a finite number, not negative")?;
         Ok(&self.c * self.states(self.domain.point(frequency)))
     }
 
@@ -167,10 +165,8 @@ impl Transfer {
         response: DMatrix<Complex<f64>>,
     ) -> Result<DMatrix<Complex<f64>>, Error> {
         let gain = response + to_complex(&self.d);
-        if gain.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
-            return Err(Error::Overflow { what: "the frequency response" });
-        }
-        Ok(gain)
+        let is_finite = gain.iter().all(|entry| entry.is_finite());
+        is_finite.then_some(gain).ok_or(Error::Overflow { what: "the frequency response" })
     }
 
     /// (s I - A)^-1 B by elimination, exchanging adjacent rows; not finite if s is an eigenvalue.

@@ -99,11 +99,8 @@ fn settled(system: &StateSpace, input: &DVector<f64>) -> Result<DVector<f64>, Er
 }
 
 fn check_input(system: &StateSpace, input: usize) -> Result<(), Error> {
-    if input < system.b.ncols() {
-        return Ok(());
-    }
     let rule = "an index below the number of columns of B";
-    Err(Error::OutOfRange { name: "input", value: as_number(input), rule })
+    check::that(input < system.b.ncols(), "input", as_number(input), rule)
 }
 
 /// The response to a unit step, or to a ramp that lasts `rise`.

@@ -258,10 +258,9 @@ impl<'a> EntryFamily<'a> {
         let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c), ("D", &plant.d)];
         for ((name, values), of) in named.into_iter().zip(&tolerances.of) {
             check::shape(name, of, values.shape())?;
-            if let Some(&value) = of.iter().find(|relative| **relative < 0.0) {
-                let rule = "not negative";
-                return Err(Error::OutOfRange { name: "the tolerance", value, rule });
-            }
+            let not_negative =
+                |&value: &f64| check::that(value >= 0.0, "the tolerance", value, "not negative");
+            of.iter().try_for_each(not_negative)?;
         }
         let mut groups: Vec<Vec<Entry>> = tolerances.common.iter().map(|_| Vec::new()).collect();
         for place in tolerances.entries() {
