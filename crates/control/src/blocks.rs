@@ -30,7 +30,10 @@ pub fn beside<T: ComplexField>(left: &DMatrix<T>, right: &DMatrix<T>) -> DMatrix
 }
 
 /// [a, b; c, d], whose blocks may have any fitting shapes.
-pub(crate) fn block_2x2([a, b]: [&DMatrix<f64>; 2], [c, d]: [&DMatrix<f64>; 2]) -> DMatrix<f64> {
+pub(crate) fn block_2x2<T: ComplexField>(
+    [a, b]: [&DMatrix<T>; 2],
+    [c, d]: [&DMatrix<T>; 2],
+) -> DMatrix<T> {
     let ((rows, cols), (below, right)) = (a.shape(), d.shape());
     let mut whole = DMatrix::zeros(rows + below, cols + right);
     whole.view_mut((0, 0), (rows, cols)).copy_from(a);

@@ -136,11 +136,7 @@ impl Weight {
         let convert = |coefficients: &[f64]| match domain {
             Domain::Continuous => {
                 let powers = successors(Some(1.0), |power| Some(power * self.unit));
-                coefficients
-                    .iter()
-                    .zip(powers)
-                    .map(|(coefficient, power)| coefficient * power)
-                    .collect()
+                coefficients.iter().zip(powers).map(|(one, power)| one * power).collect()
             }
             Domain::Sampled { period } => powers_of_z(coefficients, 2.0 / (period * self.unit)),
         };

@@ -64,8 +64,7 @@ pub struct Zeros {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix;
 /// [`Error::NotConverged`] when an inner iteration does not end; [`Error::Overflow`].
 pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zeros, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    let n = check::with_inputs(a, b)?;
     check::shape("C", c, (c.nrows(), n))?;
     let system = scale_system(a, b, c);
     let size = system.a.norm().hypot(system.b.norm()).hypot(system.c.norm());

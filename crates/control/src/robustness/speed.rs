@@ -43,8 +43,7 @@ pub fn regulator_of_same_speed(
     gain: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Option<DMatrix<f64>>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    let n = check::with_inputs(a, b)?;
     check::shape("K", gain, (b.ncols(), n))?;
     let required = speed(&(a + b * gain), domain)?;
     let scale = Balance::new(a).scale;

@@ -310,13 +310,8 @@ impl PlantFamily for EntryFamily<'_> {
         let mut plant = self.plant.clone();
         for (entries, deviation) in self.deviations.iter().zip(deviations) {
             for Entry { place: PlantEntry { matrix, row, column }, size } in entries {
-                let matrix = match matrix {
-                    0 => &mut plant.a,
-                    1 => &mut plant.b,
-                    2 => &mut plant.c,
-                    _ => &mut plant.d,
-                };
-                matrix[(*row, *column)] += size * deviation;
+                let StateSpace { a, b, c, d, .. } = &mut plant;
+                [a, b, c, d][*matrix][(*row, *column)] += size * deviation;
             }
         }
         Ok(plant)

@@ -2,7 +2,7 @@
 
 use super::family::{Loops, PlantFamily, ToleranceCase};
 use crate::Domain;
-use crate::blocks::to_complex;
+use crate::blocks::{beside, to_complex};
 use crate::eigen::eigenvalues;
 use crate::exponential::exponential;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -77,9 +77,7 @@ fn gradients<F: PlantFamily>(
     let half = match (plant.domain, domain) {
         (Domain::Sampled { .. }, _) | (_, Domain::Continuous) => None,
         (Domain::Continuous, Domain::Sampled { period }) => {
-            let mut block = DMatrix::zeros(n + m, n + m);
-            block.view_mut((0, 0), (n, n)).copy_from(&(&plant.a * (0.5 * period)));
-            block.view_mut((0, n), (n, m)).copy_from(&(&plant.b * (0.5 * period)));
+            let block = beside(&plant.a, &plant.b).resize_vertically(n + m, 0.0) * (0.5 * period);
             Some((to_complex(&exponential(&block)?), period))
         }
     };
