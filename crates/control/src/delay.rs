@@ -280,9 +280,7 @@ impl Delays {
         let mut all = vec![DMatrix::zeros(p, m); frequencies.len()];
         for (row, column) in (0..p).flat_map(|row| (0..m).map(move |column| (row, column))) {
             let delay = self.outputs[row] + self.inputs[column];
-            let (b, c) = (plant.b.columns(column, 1).into(), plant.c.rows(row, 1).into());
-            let d = plant.d.view((row, column), (1, 1)).into();
-            let path = StateSpace { a: plant.a.clone(), b, c, d, domain: plant.domain };
+            let path = plant.path(row, column);
             let (path, lag) = match domain {
                 Domain::Continuous => (path, delay),
                 Domain::Sampled { period } => sampled_path(&path, delay, period)?,

@@ -38,7 +38,7 @@ pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub(crate) use frequency::{Transfer, grid, singular_values};
 pub use h_infinity::{HInfinity, h_infinity};
 pub(crate) use h_infinity::{continuous_equivalent, norm_of, original_frequency};
-pub(crate) use known::{KnownResponse, of_channel, resonances};
+pub(crate) use known::{KnownResponse, resonances};
 pub use peak_gain::{Bracket, peak_gain};
 pub use trace::{TimeResponse, ramp_response, settled_output, step_response};
 pub use transient::Transient;

@@ -1,5 +1,6 @@
 //! The linear system {A, B, C, D}.
 
+use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::{Domain, Error, check, stability};
 use nalgebra::{Complex, DMatrix};
 
@@ -59,6 +60,24 @@ impl StateSpace {
     pub(crate) fn stable_eigenvalues(&self) -> Result<Vec<Complex<f64>>, Error> {
         self.check()?;
         stability::require_stable("A", &self.a, self.domain)
+    }
+
+    /// The system in coordinates in which A is balanced as a part of [A, B; C, 0].
+    pub(crate) fn balanced(&self) -> Self {
+        let Balance { matrix, scale } = Balance::of_system(&self.a, &self.b, &self.c);
+        let (b, c) = (divide_rows(&self.b, &scale), multiply_columns(&self.c, &scale));
+        Self { a: matrix, b, c, d: self.d.clone(), domain: self.domain }
+    }
+
+    /// The system from one input to one output.
+    pub(crate) fn path(&self, output: usize, input: usize) -> Self {
+        Self {
+            a: self.a.clone(),
+            b: self.b.columns(input, 1).into(),
+            c: self.c.rows(output, 1).into(),
+            d: self.d.view((output, input), (1, 1)).into(),
+            domain: self.domain,
+        }
     }
 
     /// The dual system {A', C', B', D'}.

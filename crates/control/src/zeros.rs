@@ -6,7 +6,7 @@ mod nulling;
 #[cfg(feature = "lmi")]
 pub(crate) use nulling::{Nulling, output_nulling};
 
-use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
+use crate::balance::unit_columns;
 use crate::blocks::stacked;
 use crate::eigen::eigenvalues;
 use crate::svd::Svd;
@@ -89,15 +89,13 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
 /// The system {A, B, C, 0} with balanced states, and columns of B and rows of C scaled to the norm of A
 /// (1 for A = 0). It has the same zeros.
 fn scale_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
-    let Balance { matrix, scale } = Balance::of_system(a, b, c);
-    let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
-    let c = multiply_columns(c, &scale).transpose();
+    let (d, domain) = (DMatrix::zeros(c.nrows(), b.ncols()), Domain::Continuous);
+    let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d, domain }.balanced();
+    let size = if system.a.norm().is_normal() { system.a.norm() } else { 1.0 };
     StateSpace {
-        b: unit_columns(&divide_rows(b, &scale)) * size,
-        c: unit_columns(&c).transpose() * size,
-        d: DMatrix::zeros(c.ncols(), b.ncols()),
-        a: matrix,
-        domain: Domain::Continuous,
+        b: unit_columns(&system.b) * size,
+        c: unit_columns(&system.c.transpose()).transpose() * size,
+        ..system
     }
 }
 

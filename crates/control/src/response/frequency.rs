@@ -1,6 +1,6 @@
 //! The frequency response.
 
-use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::balance::Balance;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::svd::ComplexSvd;
@@ -124,16 +124,10 @@ pub(crate) struct Transfer {
 
 impl Transfer {
     pub(crate) fn new(system: &StateSpace) -> Self {
-        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
-        let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
-        let (q, h) = matrix.hessenberg().unpack();
-        Self {
-            transposed: h.transpose(),
-            b: to_complex(&q.tr_mul(&b)),
-            c: to_complex(&(c * q)),
-            d: system.d.clone(),
-            domain: system.domain,
-        }
+        let StateSpace { a, b, c, d, domain } = system.balanced();
+        let (q, h) = a.hessenberg().unpack();
+        let (b, c) = (to_complex(&q.tr_mul(&b)), to_complex(&(c * q)));
+        Self { transposed: h.transpose(), b, c, d, domain }
     }
 
     /// The transfer function from one input to the output of the same number.

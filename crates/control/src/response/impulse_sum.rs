@@ -1,7 +1,6 @@
 //! Peak gains of a sampled system by adding every sample of its impulse responses.
 
 use super::Bracket;
-use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::check::as_number;
 use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -27,8 +26,7 @@ pub(super) fn impulse_sums(
     eigenvalues: &[Complex<f64>],
     width: f64,
 ) -> Result<Option<Bracket>, Error> {
-    let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
-    let (mut states, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
+    let StateSpace { a, b: mut states, c, .. } = system.balanced();
     // After `block` samples the state has at most half of its norm: the root of the product of the largest sums of
     // rows and of columns is not below the norm of the power.
     let (mut block, mut power) = (1_u32, a.clone());

@@ -1,6 +1,6 @@
 //! Bounds of the integral of |h| over intervals of dyadic length, for an impulse response h.
 
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, power_of_two};
+use crate::balance::{divide_columns, multiply_columns, power_of_two};
 use crate::blocks::stacked;
 use crate::exponential::exponential;
 use crate::{Domain, Error, StateSpace, check};
@@ -97,10 +97,8 @@ pub(super) struct Intervals {
 
 impl Intervals {
     pub(super) fn new(system: &StateSpace) -> Result<Self, Error> {
-        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
-        let starts = divide_rows(&system.b, &scale);
-        let outputs = multiply_columns(&system.c, &scale);
-        let (phi, shortest) = Shortest::new(matrix, system.domain)?;
+        let StateSpace { a, b: starts, c: outputs, domain, .. } = system.balanced();
+        let (phi, shortest) = Shortest::new(a, domain)?;
         Ok(Self { starts, outputs, shortest, powers: vec![Rc::new(phi)] })
     }
 

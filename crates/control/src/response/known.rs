@@ -11,17 +11,6 @@ const PER_DECADE: u32 = 60;
 /// From this order on a scaled system keeps the known responses; below, it has the same bits as a new system.
 const LARGE: usize = 48;
 
-/// The system from one input to the output of the same number.
-pub(crate) fn of_channel(system: &StateSpace, channel: usize) -> StateSpace {
-    StateSpace {
-        a: system.a.clone(),
-        b: system.b.columns(channel, 1).into(),
-        c: system.c.rows(channel, 1).into(),
-        d: system.d.view((channel, channel), (1, 1)).into(),
-        domain: system.domain,
-    }
-}
-
 /// The frequencies of modes, where a response may have peaks: in continuous time imaginary part and modulus.
 pub(crate) fn resonances(modes: &[Complex<f64>], domain: Domain) -> Vec<f64> {
     let modes = modes.iter().filter(|mode| mode.im >= 0.0);
@@ -110,7 +99,7 @@ impl KnownResponse {
             (*at, gain.view((channel, channel), (1, 1)).into())
         };
         Self {
-            system: of_channel(&self.system, channel),
+            system: self.system.path(channel, channel),
             modes: self.modes.clone(),
             transfer: self.transfer.channel(channel),
             known: self.known.iter().map(entry).collect(),

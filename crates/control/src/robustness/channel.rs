@@ -4,7 +4,7 @@ use super::crossing::stability_limit;
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::eigen::RankOne;
-use crate::response::{KnownResponse, of_channel};
+use crate::response::KnownResponse;
 use crate::stability::largest_excess;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -53,7 +53,7 @@ pub struct ChannelMargins {
 ///
 /// If there is no such channel.
 pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<ChannelMargins, Error> {
-    margins_of(&KnownResponse::new(of_channel(&closed.complementary(at), channel))?)
+    margins_of(&KnownResponse::new(closed.complementary(at).path(channel, channel))?)
 }
 
 /// The margins of the channel with this T.

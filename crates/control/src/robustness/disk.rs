@@ -4,7 +4,7 @@ use super::scaling::{ScaledPeak, balanced_norm, scaled_norm_above};
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::to_complex;
-use crate::response::{HInfinity, KnownResponse, norm_of, of_channel};
+use crate::response::{HInfinity, KnownResponse, norm_of};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -90,7 +90,7 @@ impl DiskMargin {
 pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<DiskMargin, Error> {
     let mut system = closed.sensitivity(at);
     if let Some(channel) = channel {
-        system = of_channel(&system, channel);
+        system = system.path(channel, channel);
     }
     margin_of(KnownResponse::new(system)?)
 }

@@ -2,13 +2,11 @@
 
 use super::hermitian::times;
 use super::scales::Scales;
-use crate::balance::{Balance, divide_rows, multiply_columns};
-use crate::blocks::ComplexMatrix;
-use crate::blocks::to_complex;
+use crate::blocks::{ComplexMatrix, block_2x2, to_complex};
 use crate::eigen::complex_eigenvalues;
 use crate::response::Transfer;
 use crate::{Error, StateSpace};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 
 /// M(s) = C (s I - A)^-1 B + D in continuous time, square, with A balanced.
 pub(super) struct Response {
@@ -26,10 +24,7 @@ pub(super) struct Interval {
 impl Response {
     pub(super) fn new(system: &StateSpace) -> Self {
         let transfer = Transfer::new(system);
-        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
-        let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
-        let system = StateSpace { a: matrix, b, c, ..system.clone() };
-        Self { system, transfer }
+        Self { system: system.balanced(), transfer }
     }
 
     /// M at j w; D at an infinite frequency.
@@ -96,7 +91,6 @@ impl Response {
     fn hamiltonian(&self, scales: &Scales) -> Option<ComplexMatrix> {
         let [a, b, c, direct] =
             [&self.system.a, &self.system.b, &self.system.c, &self.system.d].map(to_complex);
-        let n = a.nrows();
         let Scales { d, g, bound } = scales;
         // The size of the scales is free: with one of about 1 / bound the blocks are of similar size.
         let size = d.diagonal().iter().map(|x| x.re).fold(0.0, f64::max) * bound;
@@ -114,12 +108,7 @@ impl Response {
             upper.scale_mut(ratio);
             lower.unscale_mut(ratio);
         }
-        let mut whole: ComplexMatrix = DMatrix::zeros(2 * n, 2 * n);
-        whole.view_mut((0, 0), (n, n)).copy_from(&dynamics);
-        whole.view_mut((0, n), (n, n)).copy_from(&upper);
-        whole.view_mut((n, 0), (n, n)).copy_from(&lower);
-        whole.view_mut((n, n), (n, n)).copy_from(&-dynamics.adjoint());
-        let finite = whole.iter().all(|x| x.re.is_finite() && x.im.is_finite());
-        finite.then_some(whole)
+        let whole = block_2x2([&dynamics, &upper], [&lower, &-dynamics.adjoint()]);
+        whole.iter().all(|x| x.is_finite()).then_some(whole)
     }
 }
