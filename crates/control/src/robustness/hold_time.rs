@@ -1,6 +1,6 @@
 //! The longest time over which the signals between plant and controller may be held.
 
-use super::crossing::{Evaluation, narrow};
+use super::crossing::stability_limit;
 use super::delay::period_of;
 use super::held::mean;
 use super::{Loop, beside, held_plant};
@@ -10,6 +10,7 @@ use crate::eigen::eigenvalues;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
+use std::iter::successors;
 
 /// The search starts at this part of the shortest time constant and ends at `LONGEST` times the longest one.
 const SHORTEST: f64 = 1e-9;
@@ -95,21 +96,14 @@ fn search(
     value: impl Fn(f64) -> Result<f64, Error>,
     [from, short, to]: [f64; 3],
 ) -> Result<f64, Error> {
-    let (mut good, mut h) = (Evaluation { at: 0.0, value: f64::NAN }, from);
-    while h <= to.min(f64::MAX) {
-        let tested = Evaluation { at: h, value: value(h)? };
-        if tested.value < 0.0 {
-            good = tested;
-            h *= FACTORS[usize::from(h >= short)];
-            continue;
-        }
-        if good.at <= 0.0 {
-            return Ok(0.0);
-        }
-        let bad = Evaluation { value: tested.value.max(f64::MIN_POSITIVE), ..tested };
-        return Ok(narrow(good, bad, value)?.0);
+    let end = to.min(f64::MAX);
+    let is_stable_at_start = from > end || value(from)? < 0.0;
+    if !is_stable_at_start {
+        return Ok(0.0);
     }
-    Ok(f64::INFINITY)
+    let next = |h: &f64| Some(h * FACTORS[usize::from(*h >= short)]);
+    let times = successors(Some(from), next).take_while(|h| *h <= end);
+    Ok(stability_limit(0.0, times, value)?.unwrap_or(f64::INFINITY))
 }
 
 #[cfg(test)]
