@@ -179,19 +179,20 @@ impl UnknownInputObserver {
         let sizes = unaffected.abs() * plant.c.abs() * e.abs();
         let effect = |sum: f64, size: f64| if sum.abs() > ROUNDING * size { sum } else { 0.0 };
         let visible = (&unaffected * &plant.c * &e).zip_map(&sizes, effect);
-        if e.ncols() > 0 && rank(&unit_columns(&visible))? < rank(&e)? {
-            return Ok(None);
-        }
-        let Some(left) = left_null_space(&visible)? else { return Ok(None) };
         let mut h = DMatrix::zeros(n, p);
         if e.ncols() > 0 {
+            let svd = Svd::new(&unit_columns(&visible))?;
+            let rank = svd.rank(TOLERANCE);
+            if rank < Svd::new(&e)?.rank(TOLERANCE) {
+                return Ok(None);
+            }
             // In units of the inputs in which all have effects of length one.
             let lengths = visible.column_iter().map(|column| column.norm());
             let e = divide_columns(&e, &DVector::from_iterator(e.ncols(), lengths));
-            let svd = Svd::new(&unit_columns(&visible))?;
             let unit = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
-            h = e * svd.least_squares(&unit, svd.rank(TOLERANCE)) * &unaffected;
+            h = e * svd.least_squares(&unit, rank) * &unaffected;
         }
+        let Some(left) = left_null_space(&visible)? else { return Ok(None) };
         let t = DMatrix::identity(n, n) - &h * &plant.c;
         let range = Svd::new(&t)?;
         let basis = range.left.columns(0, range.rank(TOLERANCE)).into_owned();
@@ -303,10 +304,6 @@ fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
         return Ok(None);
     }
     Ok(Some(dual.right.columns(rank, rows - rank).transpose()))
-}
-
-fn rank(m: &DMatrix<f64>) -> Result<usize, Error> {
-    Ok(Svd::new(m)?.rank(TOLERANCE))
 }
 
 #[cfg(test)]
