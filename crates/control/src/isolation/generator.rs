@@ -165,7 +165,12 @@ pub fn residual_generator(
     pattern: &[bool],
     requirements: &Requirements,
 ) -> Result<Residual, Error> {
-    check_arguments(plant, pattern, requirements)?;
+    plant.check()?;
+    requirements.check(plant.c.nrows(), plant.domain)?;
+    check::length("pattern", pattern, plant.b_f.ncols())?;
+    if !pattern.contains(&true) {
+        return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
+    }
     // All modes, in balanced coordinates.
     let (balanced, _) = plant.reachable_part(0.0)?;
     let verified = |tolerance: f64| {
@@ -210,20 +215,6 @@ fn with_tolerance(
     residual.unreachable = unreachable;
     normalise(&mut residual, pattern);
     Ok(residual)
-}
-
-fn check_arguments(
-    plant: &DisturbedPlant,
-    pattern: &[bool],
-    requirements: &Requirements,
-) -> Result<(), Error> {
-    plant.check()?;
-    requirements.check(plant.c.nrows(), plant.domain)?;
-    check::length("pattern", pattern, plant.b_f.ncols())?;
-    if !pattern.contains(&true) {
-        return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
-    }
-    Ok(())
 }
 
 fn not_isolable(pattern: &[bool], fault: usize) -> Error {
