@@ -44,7 +44,7 @@ pub use choice::least_sensitive;
 pub use delay::{delay_margin, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
 pub use entries::{PeakDerivatives, SensitivityPeak, peak_derivatives};
-pub use family::{PlantFamily, ToleranceCase};
+pub use family::{PlantFamily, ToleranceCase, ToleranceSearch};
 pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
 pub use opened::OpenedLoop;
@@ -55,8 +55,7 @@ pub use structured::{
 };
 pub(crate) use tolerance::uniform;
 pub use tolerance::{
-    EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
-    tolerance_test,
+    EntryFamily, PlantEntry, ToleranceTest, Tolerances, random_deviations, tolerance_test,
 };
 
 use crate::blocks::{beside, block_2x2, stacked};

@@ -50,13 +50,15 @@ pub struct ToleranceCase {
     pub deviations: Vec<f64>,
 }
 
-/// The loops of a controller and all plants of a family.
-pub(super) struct Loops<'a, F> {
-    pub(super) family: &'a F,
-    pub(super) controller: &'a StateSpace,
+/// The parts of [`super::tolerance_test`], for a caller that runs cases and climbs at the same time.
+pub struct ToleranceSearch<'a, F> {
+    /// The plants.
+    pub family: &'a F,
+    /// The controller, which does not vary.
+    pub controller: &'a StateSpace,
 }
 
-impl<F: PlantFamily> Loops<'_, F> {
+impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
     pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
         if let Domain::Sampled { period } = self.controller.domain {

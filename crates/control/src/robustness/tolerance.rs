@@ -1,6 +1,6 @@
 //! Errors of the plant's parameters: random cases and a search for the worst one.
 
-use super::family::{Loops, PlantFamily, ToleranceCase};
+use super::family::{PlantFamily, ToleranceCase, ToleranceSearch};
 use super::worst_case::climb;
 use crate::{Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -135,14 +135,6 @@ pub fn tolerance_test<F: PlantFamily>(
     search.result(&cases, climbed)
 }
 
-/// The parts of [`tolerance_test`], for a caller that runs cases and climbs at the same time.
-pub struct ToleranceSearch<'a, F> {
-    /// The plants.
-    pub family: &'a F,
-    /// The controller, which does not vary.
-    pub controller: &'a StateSpace,
-}
-
 impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// The deviations of the random cases.
     #[must_use]
@@ -156,7 +148,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     ///
     /// Same as [`tolerance_test`].
     pub fn evaluate(&self, deviations: Vec<f64>) -> Result<ToleranceCase, F::Error> {
-        let instability = self.loops().instability(&deviations)?;
+        let instability = self.instability(&deviations)?;
         Ok(ToleranceCase { instability, deviations })
     }
 
@@ -179,7 +171,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     ///
     /// Same as [`tolerance_test`].
     pub fn climb(&self, start: ToleranceCase) -> Result<ToleranceCase, F::Error> {
-        climb(&self.loops(), start)
+        climb(self, start)
     }
 
     /// The result from all cases and the end of each climb.
@@ -204,13 +196,9 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
             stable: count(cases.iter().filter(|case| case.instability < 0.0).count()),
             worst_instability: instability,
             worst: self.family.plant(&deviations)?,
-            first_unstable: self.loops().first_unstable(&deviations)?,
+            first_unstable: self.first_unstable(&deviations)?,
             deviations,
         })
-    }
-
-    fn loops(&self) -> Loops<'_, F> {
-        Loops { family: self.family, controller: self.controller }
     }
 }
 
@@ -243,8 +231,7 @@ struct Entry {
 /// All plants within the tolerances of single entries: each is multiplied by 1 + t d, t its tolerance,
 /// d its deviation. Entries that change together have one deviation.
 pub struct EntryFamily<'a> {
-    plant: &'a StateSpace,
-    /// The entries of each deviation.
+    pub(super) plant: &'a StateSpace,
     deviations: Vec<Vec<Entry>>,
 }
 
@@ -276,11 +263,6 @@ impl<'a> EntryFamily<'a> {
         }
         groups.retain(|group| !group.is_empty());
         Ok(Self { plant, deviations: groups })
-    }
-
-    /// The plant without deviations.
-    pub(super) fn nominal(&self) -> &StateSpace {
-        self.plant
     }
 
     /// The change of [A, B; C, D] by each deviation of 1.

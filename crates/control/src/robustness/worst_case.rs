@@ -1,6 +1,6 @@
 //! The search for the worst plant within tolerances.
 
-use super::family::{Loops, PlantFamily, ToleranceCase};
+use super::family::{PlantFamily, ToleranceCase, ToleranceSearch};
 use crate::Domain;
 use crate::blocks::{beside, to_complex};
 use crate::eigen::eigenvalues;
@@ -22,7 +22,7 @@ const SHIFT: f64 = 1e-9;
 
 /// Returns the worst case that the search reaches from `start`.
 pub(super) fn climb<F: PlantFamily>(
-    loops: &Loops<'_, F>,
+    loops: &ToleranceSearch<'_, F>,
     start: ToleranceCase,
 ) -> Result<ToleranceCase, F::Error> {
     let mut worst = start;
@@ -63,7 +63,7 @@ pub(super) fn climb<F: PlantFamily>(
 /// The derivatives, with respect to the deviations, of [`Domain::excess`] of the `count` eigenvalues nearest to
 /// instability; eigenvalues for which [`eigenvectors`] returns None are left out.
 fn gradients<F: PlantFamily>(
-    loops: &Loops<'_, F>,
+    loops: &ToleranceSearch<'_, F>,
     deviations: &[f64],
     count: usize,
 ) -> Result<Vec<Vec<f64>>, F::Error> {

@@ -79,7 +79,7 @@ pub fn proven_tolerance(
 ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
     check::positive("most", most)?;
     let changes = family.changes();
-    let perturbed = PerturbedLoop { plant: family.nominal(), changes, controller };
+    let perturbed = PerturbedLoop { plant: family.plant, changes, controller };
     match (controller.domain, perturbed.plant.domain) {
         (Domain::Sampled { period }, Domain::Continuous) => {
             perturbed.sampled_fraction(period, most, ending)
