@@ -16,6 +16,12 @@ fn plant() -> StateSpace {
     }
 }
 
+/// A system with one state, one input and one output, in continuous time.
+fn scalar(a: f64, b: f64, c: f64, d: f64) -> StateSpace {
+    let [a, b, c, d] = [a, b, c, d].map(|entry| DMatrix::from_element(1, 1, entry));
+    StateSpace { a, b, c, d, domain: Domain::Continuous }
+}
+
 fn response(system: &StateSpace, frequency: f64) -> DMatrix<Complex<f64>> {
     frequency_response(system, &[frequency]).unwrap()[0].gain.clone()
 }
@@ -74,13 +80,8 @@ fn an_approximated_plant_is_the_plant_between_the_approximants() {
                 assert!(error.norm() < 1e-12, "{inputs:?} {outputs:?} {frequency}: {error}");
             }
         }
-        let StateSpace { a, b, c, d, .. } = &extended;
-        let [of_a, of_b, of_c, of_d] =
-            delays.of_plant(2, 3, &[a.clone(), b.clone(), c.clone(), d.clone()]);
-        assert_eq!(
-            [of_a, of_b, of_c, of_d],
-            [plant.a.clone(), plant.b.clone(), plant.c.clone(), plant.d.clone()]
-        );
+        let matrices = |StateSpace { a, b, c, d, .. }: StateSpace| [a, b, c, d];
+        assert_eq!(delays.of_plant(2, 3, &matrices(extended)), matrices(plant.clone()));
     }
 }
 
@@ -127,26 +128,13 @@ fn samples_of_a_delayed_plant_are_those_of_a_simulation() {
 /// x' = u(t - d), u = -k x, is stable for k d < pi / 2 (Hayes 1950).
 #[test]
 fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
-    let one = |value| DMatrix::from_element(1, 1, value);
-    let plant = StateSpace {
-        a: one(0.0),
-        b: one(1.0),
-        c: one(1.0),
-        d: one(0.0),
-        domain: Domain::Continuous,
-    };
+    let plant = scalar(0.0, 1.0, 1.0, 0.0);
     let delays = Delays { inputs: vec![0.6], outputs: vec![0.4] };
     let frequencies: Vec<_> =
         (0..4000_u16).map(|k| 10.0_f64.powf(f64::from(k) / 1000.0 - 2.0)).collect();
     let exact = |gain: f64, order: usize| {
         // A state that nothing enters, as a system has at least one.
-        let controller = StateSpace {
-            a: one(-1.0),
-            b: one(0.0),
-            c: one(0.0),
-            d: one(-gain),
-            domain: Domain::Continuous,
-        };
+        let controller = scalar(-1.0, 0.0, 0.0, -gain);
         let closed = Loop::new(delays.approximated(&plant, order).unwrap(), controller).unwrap();
         delays.exact(&plant, &closed, &frequencies).unwrap()
     };
@@ -175,14 +163,7 @@ fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
 /// without end, and the responses were wrong by 1e3.
 #[test]
 fn a_long_sample_time_spoils_no_response() {
-    let one = |value| DMatrix::from_element(1, 1, value);
-    let plant = StateSpace {
-        a: one(-0.01),
-        b: one(0.02),
-        c: one(1.0),
-        d: one(0.0),
-        domain: Domain::Continuous,
-    };
+    let plant = scalar(-0.01, 0.02, 1.0, 0.0);
     let delays = Delays { inputs: vec![30.0], outputs: vec![5.0] };
     for order in [3, 10] {
         let approximated = delays.approximated(&plant, order).unwrap();

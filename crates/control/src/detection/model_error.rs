@@ -152,16 +152,15 @@ mod tests {
         }
     }
 
+    fn plant(sizes: [f64; 3]) -> UncertainPlant {
+        let [a, b, c, d] = [-1.0, 1.0, 1.0, 0.0].map(scalar);
+        let nominal = StateSpace { a, b, c, d, domain: Domain::Continuous };
+        UncertainPlant { nominal, sizes: sizes.map(scalar) }
+    }
+
     fn bound(sizes: [f64; 3]) -> Option<f64> {
-        let nominal = StateSpace {
-            a: scalar(-1.0),
-            b: scalar(1.0),
-            c: scalar(1.0),
-            d: scalar(0.0),
-            domain: Domain::Continuous,
-        };
-        let plant = UncertainPlant { nominal, sizes: sizes.map(scalar) };
-        let bounds = plant.largest_mean(&filter(), &scalar(1.0), &DVector::from_element(1, 3.0));
+        let inputs = DVector::from_element(1, 3.0);
+        let bounds = plant(sizes).largest_mean(&filter(), &scalar(1.0), &inputs);
         bounds.unwrap().map(|bound| bound[0])
     }
 
@@ -176,11 +175,8 @@ mod tests {
 
     #[test]
     fn bounds_of_another_number_of_inputs_are_refused() {
-        let one = || scalar(1.0);
-        let nominal =
-            StateSpace { a: -one(), b: one(), c: one(), d: one(), domain: Domain::Continuous };
-        let plant = UncertainPlant { nominal, sizes: [one(), one(), one()] };
-        let bounds = plant.largest_mean(&filter(), &one(), &DVector::zeros(2));
+        let plant = plant([1.0; 3]);
+        let bounds = plant.largest_mean(&filter(), &scalar(1.0), &DVector::zeros(2));
         assert!(matches!(bounds, Err(Error::Shape { .. })), "{bounds:?}");
         let rows = plant.largest_mean(&filter(), &DMatrix::zeros(1, 2), &DVector::zeros(1));
         assert!(matches!(rows, Err(Error::Shape { .. })), "{rows:?}");
