@@ -4,7 +4,7 @@
 //! extension and measure of stiffness: E. Hairer, S. P. Norsett and G. Wanner, "Solving Ordinary
 //! Differential Equations I" (2nd ed.), section II.6, and part II (2nd ed.), section IV.2.
 
-use crate::start::StepStart;
+use crate::start::{StepStart, weighted};
 
 /// Nodes of the stages 2 to 7.
 const NODES: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
@@ -103,8 +103,7 @@ impl Explicit {
             let rise = self.end[i] - start[i];
             let first = size * self.slopes[0][i] - rise;
             let last = rise - size * self.slopes[6][i] - first;
-            let bend: f64 = BEND.iter().zip(&self.slopes).map(|(d, slope)| d * slope[i]).sum();
-            let inner = last + rest * size * bend;
+            let inner = last + rest * size * weighted(&BEND, &self.slopes, i);
             *state = start[i] + part * (rise + rest * (first + part * inner));
         }
     }
@@ -119,8 +118,7 @@ fn combine(
     slopes: &[Vec<f64>; 7],
 ) {
     for (i, value) in result.iter_mut().enumerate() {
-        let sum: f64 = weights.iter().zip(slopes).map(|(weight, slope)| weight * slope[i]).sum();
-        *value = base.map_or(0.0, |base| base[i]) + size * sum;
+        *value = base.map_or(0.0, |base| base[i]) + size * weighted(weights, slopes, i);
     }
 }
 

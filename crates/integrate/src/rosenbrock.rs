@@ -5,7 +5,7 @@
 
 use solve::Factors;
 
-use crate::start::StepStart;
+use crate::start::{StepStart, weighted};
 
 /// The coefficient of the Jacobian in every stage.
 const GAMMA: f64 = 0.25;
@@ -162,14 +162,14 @@ impl Rosenbrock {
             if stage == 0 {
                 self.slope.copy_from_slice(slope);
             } else {
-                let weights = ARGUMENTS[stage - 1];
-                combine(&mut self.argument, states, weights, &self.increments);
+                for (i, value) in self.argument.iter_mut().enumerate() {
+                    *value = states[i] + weighted(ARGUMENTS[stage - 1], &self.increments, i);
+                }
                 derivative(time + NODES[stage - 1] * size, &self.argument, &mut self.slope)?;
             }
             let couplings = if stage == 0 { &[][..] } else { COUPLINGS[stage - 1] };
             for i in 0..n {
-                let pairs = couplings.iter().zip(&self.increments);
-                let sum: f64 = pairs.map(|(c, increment)| c * increment[i]).sum();
+                let sum = weighted(couplings, &self.increments, i);
                 self.slope[i] += sum / size + TIMES[stage] * size * self.with_time[i];
             }
             self.factors.solve(&mut self.slope);
@@ -190,21 +190,10 @@ impl Rosenbrock {
     pub(crate) fn interpolate(&self, part: f64, start: &[f64], states: &mut [f64]) {
         let rest = 1.0 - part;
         for (i, state) in states.iter_mut().enumerate() {
-            let term = |weights: &[f64; 5]| -> f64 {
-                weights.iter().zip(&self.increments).map(|(d, increment)| d * increment[i]).sum()
-            };
-            let inner = term(&EXTENSION[0]) + part * term(&EXTENSION[1]);
+            let [first, second] = EXTENSION.map(|weights| weighted(&weights, &self.increments, i));
+            let inner = first + part * second;
             *state = start[i] * rest + part * (self.end[i] + rest * inner);
         }
-    }
-}
-
-/// Computes `base + sum(weight * increment)`.
-fn combine(result: &mut [f64], base: &[f64], weights: &[f64], increments: &[Vec<f64>; 6]) {
-    for (i, value) in result.iter_mut().enumerate() {
-        let sum: f64 =
-            weights.iter().zip(increments).map(|(weight, other)| weight * other[i]).sum();
-        *value = base[i] + sum;
     }
 }
 

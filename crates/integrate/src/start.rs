@@ -9,3 +9,8 @@ pub(crate) struct StepStart<'a> {
     /// The derivative of the states.
     pub(crate) slope: &'a [f64],
 }
+
+/// The sum of weight times component `i` of each vector.
+pub(crate) fn weighted(weights: &[f64], vectors: &[Vec<f64>], i: usize) -> f64 {
+    weights.iter().zip(vectors).map(|(weight, vector)| weight * vector[i]).sum()
+}

@@ -271,19 +271,21 @@ impl Stepper {
         }
     }
 
+    /// The stiff method if it made the last step.
+    fn last_stiff(&self) -> Option<&Rosenbrock> {
+        self.stiff.as_ref().filter(|_| self.last_is_stiff)
+    }
+
     /// The states at the end of the last step.
     pub(crate) fn end(&self) -> &[f64] {
-        match &self.stiff {
-            Some(method) if self.last_is_stiff => &method.end,
-            _ => &self.explicit.end,
-        }
+        self.last_stiff().map_or(&self.explicit.end, |method| &method.end)
     }
 
     /// Computes the states at the fraction `part` of the last step.
     pub(crate) fn interpolate(&self, part: f64, states: &mut [f64]) {
-        match &self.stiff {
-            Some(method) if self.last_is_stiff => method.interpolate(part, &self.start, states),
-            _ => self.explicit.interpolate(part, self.size, &self.start, states),
+        match self.last_stiff() {
+            Some(method) => method.interpolate(part, &self.start, states),
+            None => self.explicit.interpolate(part, self.size, &self.start, states),
         }
     }
 
@@ -322,10 +324,7 @@ impl Stepper {
 
     /// The first state of the last step without a finite error, else that of the largest; whether it is finite.
     fn worst(&self) -> (usize, bool) {
-        let error = match &self.stiff {
-            Some(method) if self.last_is_stiff => method.error(),
-            _ => &self.explicit.error,
-        };
+        let error = self.last_stiff().map_or(self.explicit.error.as_slice(), Rosenbrock::error);
         let end = self.end();
         let ratio = |i: usize| error[i].abs() / self.scale.weight(i, self.start[i], end[i]);
         if let Some(broken) = (0..error.len()).find(|&i| !ratio(i).is_finite()) {

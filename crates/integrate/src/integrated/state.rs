@@ -48,13 +48,10 @@ impl Integrated {
 
     /// Returns the bytes of the state of the integration and of the state of the FMU.
     pub(super) fn serialize(&mut self) -> Result<Vec<u8>, CallError> {
-        let saved = Saved {
-            point: Some(Point { memory: self.stepper.memory, ..self.point }),
-            states: self.states.clone(),
-            nominals: self.stepper.nominals().to_vec(),
-            indicators: self.indicators.clone(),
-            tracks: self.inputs.tracks.clone(),
-        };
+        // In a temporary slot after those of the master.
+        let slot = self.saved.len();
+        self.save_integration(slot);
+        let saved = self.saved.pop().unwrap_or_default();
         let fmu_state = self.instance.serialize_state()?;
         postcard::to_allocvec(&(saved, fmu_state))
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
