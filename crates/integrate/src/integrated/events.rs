@@ -19,23 +19,11 @@ impl Integrated {
         Ok(())
     }
 
-    /// Updates the discrete states once.
-    fn update(&mut self) -> Result<EventInfo, CallError> {
-        let info = self.instance.update_discrete_states()?;
-        self.nominals_changed |= info.nominals_changed;
-        self.point.ends |= info.terminate_simulation;
-        self.point.next_event = info.next_event_time;
-        Ok(info)
-    }
-
-    /// Iterates the event and enters continuous-time mode; stays in event mode if the FMU requests the end.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] of a call, or if the discrete states still change after 1000 iterations.
+    /// Iterates the event and enters continuous-time mode; stays in event mode if the FMU requests the end. It is an
+    /// error if the discrete states still change after 1000 iterations.
     pub(super) fn settle(&mut self) -> Result<(), CallError> {
         let mut iterations = 0;
-        while self.update()?.discrete_states_need_update && !self.point.ends {
+        while self.update_discrete_states()?.discrete_states_need_update && !self.point.ends {
             iterations += 1;
             if iterations == ITERATIONS {
                 let time = seconds(self.point.time);
@@ -45,38 +33,7 @@ impl Integrated {
                 )));
             }
         }
-        if self.point.ends { Ok(()) } else { self.leave_event() }
-    }
-
-    /// Enters continuous-time mode.
-    fn leave_event(&mut self) -> Result<(), CallError> {
-        self.instance.enter_continuous_time_mode()?;
-        self.point.mode = Mode::Continuous;
-        self.read_point()?;
-        if std::mem::take(&mut self.nominals_changed) {
-            let scale = self.scale()?;
-            self.stepper.set_scale(scale);
-        }
-        self.stepper.restart();
-        Ok(())
-    }
-
-    /// Reads states and event indicators, the states always: not all FMUs report that an event changed them.
-    fn read_point(&mut self) -> Result<(), CallError> {
-        if !self.states.is_empty() {
-            self.instance.get_continuous_states(&mut self.states)?;
-        }
-        self.read_indicators()
-    }
-
-    /// Reads the event indicators at the present point.
-    pub(super) fn read_indicators(&mut self) -> Result<(), CallError> {
-        self.point.input_changed = false;
-        if self.indicators.is_empty() {
-            return Ok(());
-        }
-        self.instance.get_event_indicators(&mut self.indicators)?;
-        check_indicators(self.point.time, &self.indicators)
+        if self.point.ends { Ok(()) } else { self.leave_event_mode() }
     }
 }
 
@@ -95,11 +52,31 @@ impl Events for Integrated {
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        self.update()
+        let info = self.instance.update_discrete_states()?;
+        self.nominals_changed |= info.nominals_changed;
+        self.point.ends |= info.terminate_simulation;
+        self.point.next_event = info.next_event_time;
+        Ok(info)
     }
 
     fn leave_event_mode(&mut self) -> Result<(), CallError> {
-        self.leave_event()
+        self.instance.enter_continuous_time_mode()?;
+        self.point.mode = Mode::Continuous;
+        // Not all FMUs report that an event changed the states.
+        if !self.states.is_empty() {
+            self.instance.get_continuous_states(&mut self.states)?;
+        }
+        self.point.input_changed = false;
+        if !self.indicators.is_empty() {
+            self.instance.get_event_indicators(&mut self.indicators)?;
+            check_indicators(self.point.time, &self.indicators)?;
+        }
+        if std::mem::take(&mut self.nominals_changed) {
+            let scale = self.scale()?;
+            self.stepper.set_scale(scale);
+        }
+        self.stepper.restart();
+        Ok(())
     }
 }
 
