@@ -9,8 +9,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use fmu_import::{Fmu, preload};
-use linearise::Signal;
-use linearise::{Linearise, linearise};
+use linearise::{Linearise, Signal, linearise};
 
 fn list(text: &str) -> Vec<String> {
     text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect()

@@ -9,8 +9,7 @@ use super::differences::{Side, extrapolate, reach};
 use super::parts::{Part, Parts};
 use super::point::{NAME, finite, initialise, read};
 use super::{Linearise, LineariseError};
-use fmu_import::Fmu;
-use fmu_import::Instance;
+use fmu_import::{Fmu, Instance};
 use slave::Slave as _;
 
 /// Target for the response of a state to a pulse, relative to the state's typical size.
@@ -209,19 +208,15 @@ impl<'p> Bench<'p> {
                 let size = response.column(k).amax() + self.rest.column(k).amax();
                 *noise = noise.max(f64::EPSILON * size + errors[k] * pulse.height);
             }
-            for step in 0..count {
-                let row = input * count + step;
-                for k in 0..n {
-                    record.before[(row, k)] = response[(step, k)];
-                    record.after[(row, k)] = response[(step + 1, k)];
-                    record.change[(row, k)] = response[(step + 1, k)] - response[(step, k)];
-                }
-                for k in 0..self.parts.outputs.len() {
-                    record.outputs[(row, k)] = response[(step + 1, n + k)];
-                }
-                let value = if step < count / 2 { pulse.height } else { 0.0 };
-                record.before[(row, n + input)] = value;
-                record.after[(row, n + input)] = value;
+            let (first, p) = (input * count, self.parts.outputs.len());
+            let (start, end) = (response.view((0, 0), (count, n)), response.rows(1, count));
+            record.change.rows_mut(first, count).copy_from(&(end.columns(0, n) - start));
+            record.outputs.rows_mut(first, count).copy_from(&end.columns(n, p));
+            for (matrix, states) in
+                [(&mut record.before, start), (&mut record.after, end.columns(0, n))]
+            {
+                matrix.view_mut((first, 0), (count, n)).copy_from(&states);
+                matrix.view_mut((first, n + input), (count / 2, 1)).fill(pulse.height);
             }
             record.pulses.push(pulse);
         }
@@ -249,19 +244,9 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Returns the regressors of the change of the states; see `with_time`.
-    pub(super) fn for_change(&self, degree: usize) -> DMatrix<f64> {
-        self.with_time(&self.before, 0, degree)
-    }
-
-    /// Returns the regressors of the outputs; see `with_time`.
-    pub(super) fn for_outputs(&self, degree: usize) -> DMatrix<f64> {
-        self.with_time(&self.after, 1, degree)
-    }
-
-    /// Returns [X, t X, ..., t^degree X]: the fitted coefficients are polynomials of time. t is the elapsed fraction of
+    /// Returns the regressors [X, t X, ..., t^degree X]: the fitted coefficients are polynomials of time. t is the elapsed fraction of
     /// the record; the rows of each pulse begin `first` steps after its start.
-    fn with_time(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
+    pub(super) fn regressors(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
         let columns = x.ncols();
         DMatrix::from_fn(x.nrows(), (degree + 1) * columns, |i, j| {
             let part = index(i % self.count + first) / index(self.count);

@@ -30,8 +30,7 @@ pub use equations::PlantEquations;
 pub use error::LineariseError;
 pub use result::{Differences, Disagreement, Linearisation, Matrices, Method, Signal};
 
-use fmu_import::Fmu;
-use fmu_import::Interface;
+use fmu_import::{Fmu, Interface};
 use parts::{Part, Parts, State};
 use point::{Equations, NAME, all_settable, initialise, nominals, read};
 use result::{MethodResult, RawResult, assemble};

@@ -1,7 +1,6 @@
 //! An FMU instance at the operating point.
 
-use fmu_description::Experiment;
-use fmu_description::{Causality, DefaultExperiment};
+use fmu_description::{Causality, DefaultExperiment, Experiment};
 
 use super::parts::{Part, Parts, Setting, State};
 use super::{Linearise, LineariseError};

@@ -93,7 +93,8 @@ pub(super) fn of_steps(
                     break;
                 }
             }
-            Err(error) if refusal.as_ref().is_none_or(is_about_length) => {
+            // A record of another length may excite all directions.
+            Err(error) if matches!(refusal, None | Some(LineariseError::Unreachable { .. })) => {
                 refusal = Some(error);
             }
             Ok(_) | Err(_) => {}
@@ -103,13 +104,7 @@ pub(super) fn of_steps(
     best.ok_or_else(|| refusal.unwrap_or_else(|| unreachable(None, parts, states)))
 }
 
-/// Returns whether a record of another length may succeed.
-fn is_about_length(refusal: &LineariseError) -> bool {
-    matches!(refusal, LineariseError::Unreachable { .. })
-}
-
-/// Linearises by records of `count` steps; `benches` differ in their step, and the last one has the
-/// shortest.
+/// Linearises by records of `count` steps; of `benches`, which differ in their step, the last has the shortest.
 fn of_count(
     benches: &mut [Bench],
     parts: &Parts,
@@ -213,8 +208,10 @@ fn map(bench: &Bench, record: &Record, parts: &Parts, states: &[Part]) -> Option
 fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option<Discrete> {
     let width = record.before.ncols();
     let (state_noise, output_noise) = record.noise.split_at(states.len());
-    let change = least_squares(&record.for_change(degree), &record.change, state_noise)?;
-    let outputs = least_squares(&record.for_outputs(degree), &record.outputs, output_noise)?;
+    let before = record.regressors(&record.before, 0, degree);
+    let change = least_squares(&before, &record.change, state_noise)?;
+    let after = record.regressors(&record.after, 1, degree);
+    let outputs = least_squares(&after, &record.outputs, output_noise)?;
     let at_zero = |matrix: &DMatrix<f64>| matrix.rows(0, width).transpose();
     let powers = |matrix: &DMatrix<f64>| matrix.rows(width, matrix.nrows() - width).transpose();
     let mut discrete = Discrete {
