@@ -26,36 +26,21 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A plant in sampled time, z having N states and faults and y having p measurements.
+#[expect(clippy::missing_errors_doc, reason = "the type says it")]
 pub trait SampledPlant {
-    /// Why the plant cannot be evaluated.
+    /// Why the plant has no value, or no derivative, at some z.
     type Error;
 
     /// Replaces z by g(z).
-    ///
-    /// # Errors
-    ///
-    /// The plant has no value there.
     fn advance(&mut self, z: &mut [f64]) -> Result<(), Self::Error>;
 
     /// Replaces z by g(z), and sets `g` to the Jacobian of g, N x N, at the former z.
-    ///
-    /// # Errors
-    ///
-    /// The plant has no value or no derivative there.
     fn advance_tangent(&mut self, z: &mut [f64], g: &mut DMatrix<f64>) -> Result<(), Self::Error>;
 
     /// Sets y to h(z).
-    ///
-    /// # Errors
-    ///
-    /// The plant has no value there.
     fn measure(&mut self, z: &[f64], y: &mut [f64]) -> Result<(), Self::Error>;
 
     /// Sets y to h(z), and `h` to the Jacobian of h, p x N, at z.
-    ///
-    /// # Errors
-    ///
-    /// The plant has no value or no derivative there.
     fn measure_tangent(
         &mut self,
         z: &[f64],

@@ -18,6 +18,9 @@ const DIFFERENCE: f64 = 6e-6;
 /// variables with a memory, such as the side of a hysteresis or the samples of a part in discrete time, do not
 /// remember earlier trajectories. An FMU that cannot save its state keeps its discrete variables instead. The states x
 /// have the order of the FMU; u has the inputs and then the faults of the request, y its outputs.
+///
+/// A [`LineariseError`] of any function: a function of the FMU fails or returns a number that is not finite, events do
+/// not end, or the FMU asks for the end of the simulation.
 pub struct PlantEquations {
     component: Box<dyn ModelExchange>,
     names: Names,
@@ -57,6 +60,7 @@ struct Names {
     rows: Vec<String>,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "the type says them")]
 impl PlantEquations {
     /// Creates the equations of `fmu` with the parameters of `request`, whose `states` do not matter: x has all.
     ///
@@ -163,10 +167,6 @@ impl PlantEquations {
 
     /// Begins a trajectory at `time` in s with the states `x` and the inputs `u`: an event makes the discrete variables
     /// consistent with them, and may change `x`.
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU ends the simulation.
     pub fn begin(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         if self.can_restore {
             self.component.restore_state(0)?;
@@ -178,10 +178,6 @@ impl PlantEquations {
     }
 
     /// Whether an event indicator has another sign at `time` in s, `x` and `u` than at the end of the last step.
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails.
     pub fn crosses(&mut self, time: f64, x: &[f64], u: &[f64]) -> Result<bool, LineariseError> {
         self.set(time, x, u)?;
         let [before, now] = &mut self.indicators;
@@ -190,10 +186,6 @@ impl PlantEquations {
     }
 
     /// Ends an integration step at `time` in s, `x` and `u`. An event during the step happens here, and may change `x`.
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails, the events do not end, or the FMU ends the simulation.
     pub fn complete(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
         let mut is_event = self.crosses(time, x, u)?;
         is_event |= self.next_event.is_some_and(|next| next <= time);
@@ -230,10 +222,6 @@ impl PlantEquations {
     }
 
     /// Sets `rates` to f(t, x, u).
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails, or a derivative is not finite.
     pub fn rates(
         &mut self,
         time: f64,
@@ -247,10 +235,6 @@ impl PlantEquations {
     }
 
     /// Sets `y` to h(t, x, u).
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails, or an output is not finite.
     pub fn outputs(
         &mut self,
         time: f64,
@@ -264,10 +248,6 @@ impl PlantEquations {
     }
 
     /// Sets `jacobian` to the derivatives of [f; h], n + p rows, by [x; u], n + m columns.
-    ///
-    /// # Errors
-    ///
-    /// [`LineariseError`]: a function of the FMU fails, or a derivative is not finite.
     pub fn jacobian(
         &mut self,
         time: f64,

@@ -59,7 +59,7 @@ pub struct Linearise {
     /// exchange the continuous states. All other variables have their start values.
     pub at: Vec<(String, String)>,
     /// Typical sizes of changes by name, in the unit of the variable. The default is `nominal`, otherwise
-    /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are relative to it.
+    /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are relative to this size.
     pub typical: Vec<(String, f64)>,
     /// Time of the operating point in s.
     pub start_time: f64,

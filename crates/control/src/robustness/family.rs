@@ -50,7 +50,7 @@ pub struct ToleranceCase {
     pub deviations: Vec<f64>,
 }
 
-/// The parts of [`super::tolerance_test`], for a caller that runs cases and climbs at the same time.
+/// The parts of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs at the same time.
 pub struct ToleranceSearch<'a, F> {
     /// The plants.
     pub family: &'a F,

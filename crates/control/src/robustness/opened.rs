@@ -10,20 +10,18 @@ use crate::{Error, StateSpace};
 
 /// A loop opened at one point, with its eigenvalues and the responses S and T on a sweep of frequencies.
 ///
-/// The two peaks are norms of S and T; each other method returns the value of the function of the same name. All share one sweep of 60 frequencies
-/// for each decade and the resonances, which needs 4 n^2 (1 + m) multiplications for each frequency.
+/// The two peaks are norms of S and T, with the errors of [`crate::response::h_infinity`]; each other method returns the
+/// value of the function of the same name, with its errors and panics. All share one sweep of 60 frequencies for each
+/// decade and the resonances, which needs 4 n^2 (1 + m) multiplications for each frequency.
 pub struct OpenedLoop {
     sensitivity: KnownResponse,
     complementary: KnownResponse,
     peak: HInfinity,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "those of the functions of the same names")]
 impl OpenedLoop {
     /// Opens `closed` at `at`.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`crate::response::h_infinity`].
     pub fn new(closed: &Loop, at: Point) -> Result<Self, Error> {
         let sensitivity = KnownResponse::new(closed.sensitivity(at))?.swept()?;
         // T = I - S: C of S with the opposite sign, and no D.
@@ -40,32 +38,16 @@ impl OpenedLoop {
     }
 
     /// The H-infinity norm of T, with a relative width of 1e-4.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`crate::response::h_infinity`].
     pub fn complementary_peak(&self) -> Result<HInfinity, Error> {
         norm_of(&self.complementary, WIDTH)
     }
 
     /// [`super::scaled_peak`] of S.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`super::scaled_peak`].
     pub fn scaled_peak(&self) -> Result<ScaledPeak, Error> {
         disk::scaled_below(&self.sensitivity, &self.peak)
     }
 
     /// [`super::disk_margin`] of all channels, or of one.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`super::disk_margin`].
-    ///
-    /// # Panics
-    ///
-    /// If there is no such channel.
     pub fn disk_margin(&self, channel: Option<usize>) -> Result<DiskMargin, Error> {
         disk::margin_of(match channel {
             Some(channel) => self.sensitivity.channel(channel),
@@ -74,33 +56,17 @@ impl OpenedLoop {
     }
 
     /// [`super::channel_margins`] of one channel.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`super::channel_margins`].
-    ///
-    /// # Panics
-    ///
-    /// If there is no such channel.
     pub fn channel_margins(&self, channel: usize) -> Result<ChannelMargins, Error> {
         channel::margins_of(&self.complementary.channel(channel))
     }
 
     /// [`super::delay_margin`] of a loop opened at its input.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`super::delay_margin`].
     pub fn delay_margin(&self) -> Result<f64, Error> {
         delay_of(&self.complementary)
     }
 
     /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`, continuous or sampled, and `controller`,
     /// sampled: those of the loop.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`super::sampled_delay_margin`].
     pub fn sampled_delay_margin(
         &self,
         plant: &StateSpace,

@@ -135,6 +135,7 @@ pub fn tolerance_test<F: PlantFamily>(
     search.result(&cases, climbed)
 }
 
+#[expect(clippy::missing_errors_doc, reason = "those of the whole test")]
 impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// The deviations of the random cases.
     #[must_use]
@@ -143,20 +144,12 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     }
 
     /// Computes the instability of the loop with the plant of these deviations.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`tolerance_test`].
     pub fn evaluate(&self, deviations: Vec<f64>) -> Result<ToleranceCase, F::Error> {
         let instability = self.instability(&deviations)?;
         Ok(ToleranceCase { instability, deviations })
     }
 
     /// Returns the start points of the worst-case search: the two worst cases and the nominal plant.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`tolerance_test`].
     pub fn starts(&self, cases: &[ToleranceCase]) -> Result<Vec<ToleranceCase>, F::Error> {
         let mut worst: Vec<&ToleranceCase> = cases.iter().collect();
         worst.sort_by(|x, y| y.instability.total_cmp(&x.instability));
@@ -166,19 +159,11 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     }
 
     /// The worst case that the search reaches from `start`.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`tolerance_test`].
     pub fn climb(&self, start: ToleranceCase) -> Result<ToleranceCase, F::Error> {
         climb(self, start)
     }
 
-    /// The result from all cases and the end of each climb.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`tolerance_test`]; [`Error::NotConverged`] if `climbed` is empty.
+    /// The result from all cases and the end of each climb; [`Error::NotConverged`] if `climbed` is empty.
     pub fn result(
         &self,
         cases: &[ToleranceCase],
