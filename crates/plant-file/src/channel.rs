@@ -3,9 +3,9 @@
 use control::Domain;
 use control::lmi::weight_of_table;
 use control::weight::{Weight, bilinear_frequency};
-use files::{Entry, PlaceError, Table};
+use files::{Entry, Table};
 
-use crate::read::{each, refuse};
+use crate::read::{Result, each, refuse};
 
 /// The entries of a plant file that belong to `h_infinity`.
 pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
@@ -65,7 +65,7 @@ impl Channel {
         table: &Table<'_>,
         signals: &ChannelSignals<'_>,
         domain: Domain,
-    ) -> Result<Self, PlaceError> {
+    ) -> Result<Self> {
         let mut channel = Self::default();
         if let Some(entry) = table.get("weights") {
             let one = |name: &&str| ChannelWeight {
@@ -97,11 +97,7 @@ impl Channel {
 }
 
 /// Reads one weight for all measurements, or one for each.
-fn noises(
-    entry: &Entry<'_>,
-    names: &[&str],
-    domain: Domain,
-) -> Result<Vec<ChannelWeight>, PlaceError> {
+fn noises(entry: &Entry<'_>, names: &[&str], domain: Domain) -> Result<Vec<ChannelWeight>> {
     let one = |entry: &Entry<'_>| weight(entry, String::new(), domain);
     let all = each(entry, names.len(), "numbers, one per measurement", one)?;
     let named = |(name, one)| ChannelWeight { signal: format!("noise of {name}"), ..one };
@@ -109,7 +105,7 @@ fn noises(
 }
 
 /// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`; both tables may state `order`, 1 or 2.
-fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight, PlaceError> {
+fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight> {
     if !entry.is_table() {
         let weight = Weight::constant(entry.positive()?);
         return Ok(ChannelWeight { signal, weight, deviation: None });
@@ -140,7 +136,7 @@ fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWe
 }
 
 /// Reads at least two pairs of a frequency and a magnitude, in ascending order of the frequency.
-fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>, PlaceError> {
+fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for member in entry.list()? {
         let [frequency, magnitude] = &member.list()?[..] else {
@@ -159,7 +155,7 @@ fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>, Pla
 }
 
 /// Reads a frequency in rad/s, in a sampled design below pi / T, and returns the frequency of the continuous weight.
-fn continuous_frequency(entry: &Entry<'_>, domain: Domain) -> Result<f64, PlaceError> {
+fn continuous_frequency(entry: &Entry<'_>, domain: Domain) -> Result<f64> {
     let stated = entry.positive()?;
     let frequency = bilinear_frequency(stated, domain);
     match domain {

@@ -1,11 +1,11 @@
 //! Reads the table `[detection]` and the list `[[disturbances]]` of a plant file.
 
-use files::{Entry, Place, PlaceError, Table};
+use files::{Entry, Place, Table};
 use nalgebra::{DMatrix, DVector};
 
 use crate::Model;
 use crate::faults::Fault;
-use crate::read::{each, is_first, positive, refuse, within};
+use crate::read::{Result, each, is_first, optional, positive, positives, refuse, within};
 use crate::signals::{Signal, name, position};
 
 /// The requirements on the detection of faults.
@@ -120,10 +120,8 @@ impl DetectionRequest {
         actuators: &[Signal],
         measurements: usize,
         faults: &[Fault],
-    ) -> Result<Option<Self>, PlaceError> {
-        let Some(entry) = file.get("detection") else {
-            return Ok(None);
-        };
+    ) -> Result<Option<Self>> {
+        let Some(entry) = file.get("detection") else { return Ok(None) };
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let sample_time = positive(&table, "sample_time")?;
@@ -135,27 +133,18 @@ impl DetectionRequest {
             false_alarm_interval: false_alarms(&table)?,
             isolation: table.get("isolation").map_or(Ok(false), |entry| entry.flag())?,
             noise: noise(file, &table, measurements)?,
-            process_noise: table
-                .get("process_noise")
-                .map(|entry| {
-                    let values = not_negative(&entry)?;
-                    Ok(ProcessNoise { values, is_list: entry.is_list(), place: entry.place })
-                })
-                .transpose()?,
+            process_noise: optional(&table, "process_noise", process_noise)?,
             sizes: sizes(&entry, faults)?,
             model_error: model_error(&table, actuators)?,
             sample_time,
             delay: positive(&table, "delay")?,
-            from: table
-                .get("from")
-                .map(|entry| within(&entry, 0.0.., "expected a time from 0"))
-                .transpose()?,
+            from: optional(&table, "from", |entry| within(entry, 0.0.., "expected a time from 0"))?,
             place: entry.place,
         }))
     }
 }
 
-fn method(table: &Table<'_>) -> Result<Method, PlaceError> {
+fn method(table: &Table<'_>) -> Result<Method> {
     let meaning = "the test: \"cusum\" or \"chi-square\"";
     let entry = table.require("method", meaning)?;
     if !is_first(&entry, ["cusum", "chi-square"])? {
@@ -166,7 +155,7 @@ fn method(table: &Table<'_>) -> Result<Method, PlaceError> {
 }
 
 /// Returns the mean time between false alarms in s, stated as such or as a number per hour.
-fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
+fn false_alarms(table: &Table<'_>) -> Result<f64> {
     match (table.get("false_alarm_interval"), table.get("false_alarms_per_hour")) {
         (Some(entry), None) => entry.positive(),
         (None, Some(entry)) => Ok(3600.0 / entry.positive()?),
@@ -181,8 +170,8 @@ fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
 }
 
 /// Reads `noise` of this table, otherwise of `[robustness]`: one number above 0 for all measurements, or one for each.
-fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec<f64>, PlaceError> {
-    let robustness = file.get("robustness").map(|entry| entry.table()).transpose()?;
+fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec<f64>> {
+    let robustness = optional(file, "robustness", Entry::table)?;
     let inherited = robustness.and_then(|table| table.get("noise"));
     let meaning = "the noise of the measurements (or `noise` in [robustness]): in continuous time the root \
                    of the spectral density, in a sampled design the standard deviation";
@@ -196,26 +185,22 @@ fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec
 }
 
 /// Reads one number or a list of numbers, none below 0.
-fn not_negative(entry: &Entry<'_>) -> Result<Vec<f64>, PlaceError> {
-    let numbers = if entry.is_list() { entry.numbers()? } else { vec![entry.number()?] };
-    match numbers.iter().find(|number| **number < 0.0) {
+fn process_noise(entry: &Entry<'_>) -> Result<ProcessNoise> {
+    let is_list = entry.is_list();
+    let values = if is_list { entry.numbers()? } else { vec![entry.number()?] };
+    match values.iter().find(|number| **number < 0.0) {
         Some(number) => Err(entry.error(format!("expected no less than 0, found {number}"))),
-        None if numbers.is_empty() => Err(entry.error("expected at least one number")),
-        None => Ok(numbers),
+        None if values.is_empty() => Err(entry.error("expected at least one number")),
+        None => Ok(ProcessNoise { values, is_list, place: entry.place.clone() }),
     }
 }
 
 /// Reads the size of each fault: its entry of `sizes`, otherwise its `step`, otherwise its `bound`.
-fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
-    let table = entry.table()?;
-    let stated = table.get("sizes").map(|entry| entry.table()).transpose()?;
-    if let Some(stated) = &stated {
-        let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
-        stated.allow(&names)?;
-    }
-    let size = |fault: &Fault| {
-        let size = stated.as_ref().map_or(Ok(None), |table| positive(table, &fault.name))?;
-        size.or(fault.step).or(fault.bound).ok_or_else(|| {
+fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>> {
+    let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
+    let stated = positives(&entry.table()?, "sizes", &names)?;
+    let size = |(fault, stated): (&Fault, Option<f64>)| {
+        stated.or(fault.step).or(fault.bound).ok_or_else(|| {
             entry.error(format!(
                 "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
                  `step` or `bound` of the fault",
@@ -223,24 +208,17 @@ fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
             ))
         })
     };
-    faults.iter().map(size).collect()
+    faults.iter().zip(stated).map(size).collect()
 }
 
 /// Reads the margin for errors of the model, and the bounds of the commands; `None` without `model_error`.
-fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelError>, PlaceError> {
+fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelError>> {
     let Some(entry) = table.get("model_error") else {
         return refuse(table, &["commands"], "it belongs to `model_error`").map(|()| None);
     };
     let margin = within(&entry, 1.0.., "expected a factor from 1")?;
-    let stated = table.get("commands").map(|entry| entry.table()).transpose()?;
-    if let Some(stated) = &stated {
-        stated
-            .allow(&actuators.iter().map(|actuator| actuator.name.as_str()).collect::<Vec<_>>())?;
-    }
-    let bound = |actuator: &Signal| {
-        stated.as_ref().map_or(Ok(None), |table| positive(table, &actuator.name))
-    };
-    let commands = actuators.iter().map(bound).collect::<Result<_, _>>()?;
+    let names: Vec<_> = actuators.iter().map(|actuator| actuator.name.as_str()).collect();
+    let commands = positives(table, "commands", &names)?;
     Ok(Some(ModelError { margin, commands, place: entry.place }))
 }
 
@@ -251,10 +229,8 @@ pub(crate) fn disturbances(
     actuators: &[Signal],
     measurements: &[Signal],
     model: &Model,
-) -> Result<Vec<Disturbance>, PlaceError> {
-    let Some(entry) = file.get("disturbances") else {
-        return Ok(Vec::new());
-    };
+) -> Result<Vec<Disturbance>> {
+    let Some(entry) = file.get("disturbances") else { return Ok(Vec::new()) };
     if file.get("detection").is_none() {
         return Err(entry.error("the detection decouples them; expected [detection], too"));
     }
@@ -280,7 +256,7 @@ fn disturbance(
     entry: &Entry<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
-) -> Result<Disturbance, PlaceError> {
+) -> Result<Disturbance> {
     let table = entry.table()?;
     table.allow(&DISTURBANCE)?;
     let keys = ["E", "actuator", "sensor", "input"];

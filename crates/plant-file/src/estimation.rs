@@ -1,7 +1,7 @@
 //! The table `[estimation]` of a plant file: the law that estimates the faults.
 
-use crate::read::{each, not_negative, positive, positive_within};
-use files::{Entry, Place, PlaceError, Table};
+use crate::read::{Result, each, not_negative, optional, positive, positive_within};
+use files::{Entry, Place, Table};
 
 /// A law that estimates the faults, with the parameters that the file states; the others follow from plant and
 /// observer.
@@ -140,7 +140,7 @@ impl Law {
 
 impl EstimationRequest {
     /// Reads the table; without it the law is the augmented observer. `faults`: the number of faults.
-    pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
+    pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self> {
         let Some(entry) = file.get("estimation") else {
             return Ok(Self { law: Law::Augmented, place: file.place.clone() });
         };
@@ -172,13 +172,12 @@ impl EstimationRequest {
         table.allow(&known)?;
         let numbers = |key: &str| {
             let what = "numbers, one for each fault";
-            let entry = table.get(key);
-            entry.map(|entry| each(&entry, faults, what, Entry::positive)).transpose()
+            optional(&table, key, |entry| each(entry, faults, what, Entry::positive))
         };
         let law = match law {
             Law::Augmented => law,
             Law::ProportionalIntegral { .. } => Law::ProportionalIntegral {
-                proportional: table.get("proportional").as_ref().map(not_negative).transpose()?,
+                proportional: optional(&table, "proportional", not_negative)?,
             },
             Law::FastAdaptive { .. } => {
                 Law::FastAdaptive { sigma: positive(&table, "sigma")?, gamma: numbers("gamma")? }
@@ -188,8 +187,8 @@ impl EstimationRequest {
             }
             Law::Learning { .. } => {
                 let share =
-                    |entry: Entry<'_>| positive_within(&entry, ..=1.0, "expected at most 1");
-                Law::Learning { kept: table.get("K_1").map(share).transpose()? }
+                    |entry: &Entry<'_>| positive_within(entry, ..=1.0, "expected at most 1");
+                Law::Learning { kept: optional(&table, "K_1", share)? }
             }
         };
         Ok(Self { law, place: stated.place })

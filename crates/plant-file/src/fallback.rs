@@ -1,9 +1,9 @@
 //! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
 
-use crate::read::{alone, positive_within};
+use crate::read::{Result, alone, optional, positive_within};
 use crate::requirements::{Region, stated_region};
 use crate::signals::{Signal, positions};
-use files::{Entry, Place, PlaceError, Table};
+use files::{Place, Table};
 
 /// The failures that one feedback must serve without knowing which of them has occurred.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,25 +26,22 @@ impl FallbackRequest {
         file: &Table<'_>,
         actuators: &[Signal],
         sampled: bool,
-    ) -> Result<Option<Self>, PlaceError> {
-        let Some(entry) = file.get("fallback") else {
-            return Ok(None);
-        };
+    ) -> Result<Option<Self>> {
+        let Some(entry) = file.get("fallback") else { return Ok(None) };
         alone(&entry, file, &["reference", "schedule", "family"])?;
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let meaning = "the names of the actuators that may fail, or \"all\"";
         let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
-        let loss = |entry: Entry<'_>| {
-            positive_within(&entry, ..=1.0, "expected a fraction above 0 and at most 1")
-        };
-        let loss = table.get("loss").map_or(Ok(1.0), loss)?;
+        let rule = "expected a fraction above 0 and at most 1";
+        let loss = optional(&table, "loss", |entry| positive_within(entry, ..=1.0, rule))?;
+        let loss = loss.unwrap_or(1.0);
         if actuators.len() < 2 && loss >= 1.0 {
             let message =
                 "without its only actuator a plant is not controlled; expected a `loss` below 1";
             return Err(entry.error(message));
         }
-        let region = table.get("region").map(|entry| stated_region(&entry, sampled)).transpose()?;
+        let region = optional(&table, "region", |entry| stated_region(entry, sampled))?;
         Ok(Some(Self { actuators: used, loss, region, place: entry.place }))
     }
 }

@@ -1,9 +1,9 @@
 //! The faults of a plant file.
 
-use files::{Entry, Place, PlaceError, Table};
+use files::{Entry, Place, Table};
 
 use crate::matrix::matrix;
-use crate::read::{is_first, positive, positive_within, refuse};
+use crate::read::{Result, is_first, positive, positive_within, refuse};
 use crate::signals::{
     Signal, description, is_one_unit_of_differences, name, position, positions, unit,
 };
@@ -90,11 +90,17 @@ pub(crate) fn all_faults(
     file: &Table<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
-) -> Result<Vec<Fault>, PlaceError> {
+) -> Result<Vec<Fault>> {
     let mut all = Vec::new();
     if let Some(entry) = file.get("actuator_faults") {
-        let positions = positions(&entry, actuators, "actuator")?;
-        all.extend(actuator_faults(actuators, &positions, &entry.place));
+        let fault = |at: usize| Fault {
+            name: format!("f_{}", actuators[at].name),
+            unit: actuators[at].unit.clone(),
+            description: format!("fault of {}", actuators[at].name),
+            entry_point: EntryPoint::Actuator(at),
+            ..Fault::constant(&entry.place)
+        };
+        all.extend(positions(&entry, actuators, "actuator")?.into_iter().map(fault));
     }
     if let Some(entry) = file.get("faults") {
         all.extend(faults(&entry, actuators, measurements)?);
@@ -117,11 +123,7 @@ pub(crate) fn all_faults(
 
 /// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
 /// turn.
-fn faults(
-    entry: &Entry<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-) -> Result<Vec<Fault>, PlaceError> {
+fn faults(entry: &Entry<'_>, actuators: &[Signal], measurements: &[Signal]) -> Result<Vec<Fault>> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one fault"));
@@ -149,7 +151,7 @@ fn fault(
     actuators: &[Signal],
     measurements: &[Signal],
     column: usize,
-) -> Result<Fault, PlaceError> {
+) -> Result<Fault> {
     let table = entry.table()?;
     table.allow(&FAULT)?;
     let entry_point = entry_point(&table, actuators, measurements, column)?;
@@ -182,7 +184,7 @@ fn fault(
     })
 }
 
-fn dynamics(table: &Table<'_>) -> Result<FaultDynamics, PlaceError> {
+fn dynamics(table: &Table<'_>) -> Result<FaultDynamics> {
     match table.get("kind") {
         Some(entry) if !is_first(&entry, ["constant", "ramp"])? => Ok(FaultDynamics::Ramp),
         _ => Ok(FaultDynamics::Constant),
@@ -194,7 +196,7 @@ fn entry_point(
     actuators: &[Signal],
     measurements: &[Signal],
     column: usize,
-) -> Result<EntryPoint, PlaceError> {
+) -> Result<EntryPoint> {
     let keys = ["actuator", "sensor", "loss_of", "input"];
     let stated: Vec<_> = keys.iter().filter_map(|key| table.get(key)).collect();
     if let [_, second, ..] = stated.as_slice() {
@@ -220,28 +222,14 @@ fn entry_point(
 }
 
 /// Reads `up_to`, the largest fraction of a loss of effectiveness; `None` if it is not stated.
-fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
-    let Some(entry) = table.get("up_to") else {
-        return Ok(None);
-    };
+fn up_to(table: &Table<'_>) -> Result<Option<f64>> {
+    let Some(entry) = table.get("up_to") else { return Ok(None) };
     if table.get("loss_of").is_none() {
         return Err(entry.error("this belongs to a fault with `loss_of`"));
     }
     let rule = "expected a fraction above 0 and at most 1, the largest part of its effect that the \
                 actuator may lose";
     positive_within(&entry, ..=1.0, rule).map(Some)
-}
-
-/// Returns one additive fault for each actuator at `positions`.
-fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place) -> Vec<Fault> {
-    let fault = |&at: &usize| Fault {
-        name: format!("f_{}", actuators[at].name),
-        unit: actuators[at].unit.clone(),
-        description: format!("fault of {}", actuators[at].name),
-        entry_point: EntryPoint::Actuator(at),
-        ..Fault::constant(place)
-    };
-    positions.iter().map(fault).collect()
 }
 
 impl Fault {

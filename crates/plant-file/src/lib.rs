@@ -34,7 +34,7 @@ use crate::matrix::matrix;
 use crate::model::{read_fmu_plant, read_matrices};
 use crate::names::check_names;
 use crate::pid::Pid;
-use crate::read::{each, is_first, positive, refuse};
+use crate::read::{Result, each, is_first, positive, positives, refuse};
 use crate::reconfiguration::ReconfigurationRequest;
 use crate::references::References;
 use crate::requirements::{Request, request};
@@ -165,7 +165,7 @@ impl<'a> PlantFile<'a> {
     /// # Errors
     ///
     /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
+    pub fn read(source: &'a Source, file: &Table<'a>) -> Result<Self> {
         file.allow(&KEYS)?;
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
         let sampling = sampling(file)?;
@@ -192,17 +192,10 @@ impl<'a> PlantFile<'a> {
             request(&entry.table()?, weights, &signals, domain)
         };
         let [feedback, observer] = match &loop_shape {
-            Some(shape) => {
-                let [first, ..] = shape.starts(domain);
-                first
-            }
+            Some(shape) => shape.starts(domain)[0].clone(),
             None => [read("feedback", ["Q", "R"])?, read("observer", ["W", "V"])?],
         };
-        let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
-        if let Some(table) = &experiment {
-            table.allow(&["stop_time", "step_size"])?;
-        }
-        let time = |key| experiment.as_ref().map_or(Ok(None), |table| positive(table, key));
+        let times = positives(file, "experiment", &["stop_time", "step_size"])?;
         let plant_file = Self {
             source,
             places: KEYS.iter().filter_map(place).collect(),
@@ -216,8 +209,8 @@ impl<'a> PlantFile<'a> {
             observer,
             loop_shape,
             estimation: EstimationRequest::read(file, faults.len())?,
-            stop_time: time("stop_time")?,
-            step_size: time("step_size")?,
+            stop_time: times[0],
+            step_size: times[1],
             robustness: RobustnessLimits::read(file, &model, measurements.len())?,
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
@@ -313,7 +306,7 @@ impl<'a> PlantFile<'a> {
     }
 
     /// Refuses more than [`MOST_ACTUATORS`].
-    fn check_count(&self) -> Result<(), PlaceError> {
+    fn check_count(&self) -> Result<()> {
         let count = self.actuators.len();
         if count <= MOST_ACTUATORS {
             return Ok(());
@@ -325,7 +318,7 @@ impl<'a> PlantFile<'a> {
 
     /// Refuses ranges and longest holds of measurements in a continuous design with a schedule, and a longest hold of
     /// too many samples.
-    fn check_holds(&self) -> Result<(), PlaceError> {
+    fn check_holds(&self) -> Result<()> {
         for signal in &self.measurements {
             let [_, range, hold] = &signal.places;
             if self.sampling.is_none()
@@ -355,7 +348,7 @@ impl<'a> PlantFile<'a> {
 
     /// Checks that F_a has one column per fault that enters through F_a, and that there is no F_a without such faults;
     /// and that no fault is an input of an FMU if there is no FMU.
-    fn check_columns(&self, file: &Table<'_>) -> Result<(), PlaceError> {
+    fn check_columns(&self, file: &Table<'_>) -> Result<()> {
         let is_input = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Input(_));
         if let (None, Some(fault)) = (self.fmu(), self.faults.iter().find(is_input)) {
             let message = format!(
@@ -388,7 +381,7 @@ impl<'a> PlantFile<'a> {
 }
 
 /// Reads `sample_time` and `estimator`; `None` in continuous time.
-fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
+fn sampling(file: &Table<'_>) -> Result<Option<Sampling>> {
     let Some(entry) = file.get("sample_time") else {
         return refuse(file, &["estimator"], "the design has no `sample_time`").map(|()| None);
     };
@@ -409,11 +402,7 @@ pub fn estimator(estimator: Estimator) -> &'static str {
 
 /// Reads the rates of the measurement filter; `None` without one. Sensor faults require it; the design checks whether
 /// it is required otherwise.
-fn filter(
-    file: &Table<'_>,
-    measurements: &[Signal],
-    faults: &[Fault],
-) -> Result<Option<Vec<f64>>, PlaceError> {
+fn filter(file: &Table<'_>, measurements: &[Signal], faults: &[Fault]) -> Result<Option<Vec<f64>>> {
     let sensor = faults.iter().find(|fault| matches!(fault.entry_point, EntryPoint::Sensor(_)));
     match (file.get("filter"), sensor) {
         (None, None) => Ok(None),

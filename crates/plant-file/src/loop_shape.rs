@@ -1,11 +1,11 @@
 //! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
 
 use crate::pid::Pid;
-use crate::read::{alone, positive, positive_within};
+use crate::read::{Result, alone, optional, positive, positive_within};
 use crate::requirements::{Bandwidth, Request, Requirement};
 use crate::signals::Signal;
 use control::Domain;
-use files::{Place, PlaceError, Table};
+use files::{Place, Table};
 
 const KEYS: [&str; 7] =
     ["bandwidth", "set_point", "peak", "roll_off", "effort", "structure", "pairs"];
@@ -51,10 +51,8 @@ impl LoopShape {
         file: &Table<'_>,
         signals: [&[Signal]; 2],
         domain: Domain,
-    ) -> Result<Option<Self>, PlaceError> {
-        let Some(entry) = file.get("loop") else {
-            return Ok(None);
-        };
+    ) -> Result<Option<Self>> {
+        let Some(entry) = file.get("loop") else { return Ok(None) };
         alone(&entry, file, &OTHERS)?;
         let table = entry.table()?;
         table.allow(&KEYS)?;
@@ -69,14 +67,9 @@ impl LoopShape {
                 "expected at most {most:.3} rad/s for samples every {period} s, found {bandwidth}"
             )));
         }
-        let peak = match table.get("peak") {
-            None => PEAK,
-            Some(entry) => positive_within(
-                &entry,
-                1.0..,
-                "expected at least 1, as S is I at high frequencies",
-            )?,
-        };
+        let rule = "expected at least 1, as S is I at high frequencies";
+        let peak = optional(&table, "peak", |entry| positive_within(entry, 1.0.., rule))?;
+        let peak = peak.unwrap_or(PEAK);
         let roll_off = positive(&table, "roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
         let effort = positive(&table, "effort")?;
         let set_point = positive(&table, "set_point")?.unwrap_or(SET_POINT * bandwidth);

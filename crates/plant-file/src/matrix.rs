@@ -1,10 +1,11 @@
 //! Matrices as lists of rows.
 
-use files::{Entry, PlaceError};
+use crate::read::Result;
+use files::Entry;
 use nalgebra::DMatrix;
 
 /// Reads a matrix: a list of rows of the same length, with at least one row and one column.
-pub(crate) fn matrix(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
+pub(crate) fn matrix(entry: &Entry<'_>) -> Result<DMatrix<f64>> {
     let rows = entry.list()?;
     let mut values = Vec::new();
     let mut columns = None;
@@ -29,7 +30,7 @@ pub(crate) fn shaped(
     entry: &Entry<'_>,
     [rows, columns]: [usize; 2],
     meaning: &str,
-) -> Result<DMatrix<f64>, PlaceError> {
+) -> Result<DMatrix<f64>> {
     let matrix = matrix(entry)?;
     if matrix.shape() == (rows, columns) {
         return Ok(matrix);

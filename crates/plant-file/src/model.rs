@@ -6,10 +6,10 @@ use nalgebra::DMatrix;
 
 use crate::Sampling;
 use crate::matrix::{matrix, shaped};
-use crate::read::{positive, refuse};
+use crate::read::{Result, optional, positive, refuse};
 use crate::sampled_matrices::SampledMatrices;
-use crate::signals::{Role, Signal, signals};
-use files::{Entry, PlaceError, Source, Table};
+use crate::signals::{ACTUATOR, MEASUREMENT, STATE, Signal, signals};
+use files::{Entry, Source, Table};
 
 /// The source of the plant's matrices.
 #[derive(Clone)]
@@ -67,7 +67,7 @@ pub(crate) fn read_fmu_plant(
     source: &Source,
     file: &Table<'_>,
     plant: &Entry<'_>,
-) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+) -> Result<(Model, [Vec<Signal>; 2])> {
     let message = "an FMU is the plant; its matrices are not stated";
     refuse(file, &["A", "B", "C", "D", "F_a", "matrices"], message)?;
     let folder = source.path.parent().map(PathBuf::from).unwrap_or_default();
@@ -77,22 +77,22 @@ pub(crate) fn read_fmu_plant(
             operating_point.push((name.to_owned(), value.number()?));
         }
     }
-    let states = file.get("states").map(|entry| signals(&entry, Role::State)).transpose()?;
+    let states = optional(file, "states", |entry| signals(entry, STATE))?;
     let model = Model::Fmu(PlantFmu {
         path: folder.join(plant.text()?),
         operating_point,
         states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
-        preload: file.get("preload").map_or(Ok(Vec::new()), |entry| texts(&entry))?,
+        preload: optional(file, "preload", texts)?.unwrap_or_default(),
         step: positive(file, "linearisation_step")?,
     });
     let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
     let meaning = "the outputs of the FMU that the controller reads";
     let measurements = file.require("measurements", meaning)?;
-    Ok((model, [signals(&actuators, Role::Actuator)?, signals(&measurements, Role::Measurement)?]))
+    Ok((model, [signals(&actuators, ACTUATOR)?, signals(&measurements, MEASUREMENT)?]))
 }
 
 /// Reads a text, or a list of texts.
-fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
+fn texts(entry: &Entry<'_>) -> Result<Vec<String>> {
     if entry.is_text() {
         return Ok(vec![entry.text()?.to_owned()]);
     }
@@ -103,7 +103,7 @@ fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
 pub(crate) fn read_matrices(
     file: &Table<'_>,
     sampling: Option<Sampling>,
-) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+) -> Result<(Model, [Vec<Signal>; 2])> {
     refuse(file, &["preload", "linearisation_step"], "it belongs to `plant`, an FMU")?;
     let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
     refuse(file, &["operating_point"], advice)?;
@@ -119,14 +119,13 @@ pub(crate) fn read_matrices(
         Some(entry) => shaped(&entry, [c.nrows(), b.ncols()], "measurements x actuators")?,
         None => DMatrix::zeros(c.nrows(), b.ncols()),
     };
-    let f_a = file
-        .get("F_a")
-        .map(|entry| shaped(&entry, [n, matrix(&entry)?.ncols()], "states x faults"));
+    let columns = |entry: &Entry<'_>| shaped(entry, [n, matrix(entry)?.ncols()], "states x faults");
+    let f_a = optional(file, "F_a", columns);
     let states = read_signals(file, "states", "x", n, "states, the rows of A")?;
     let actuators = read_signals(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =
         read_signals(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
-    let f_a = f_a.transpose()?;
+    let f_a = f_a?;
     let sampled = SampledMatrices::read(file, sampling, (&a, &b))?;
     let (a, b, f_a) = match &sampled {
         None => (a, b, f_a),
@@ -145,16 +144,16 @@ fn read_signals(
     letter: &str,
     count: usize,
     meaning: &str,
-) -> Result<Vec<Signal>, PlaceError> {
+) -> Result<Vec<Signal>> {
     let Some(entry) = file.get(key) else {
         return Ok((1..=count).map(|k| Signal::named(format!("{letter}{k}"))).collect());
     };
-    let role = match key {
-        "actuators" => Role::Actuator,
-        "measurements" => Role::Measurement,
-        _ => Role::State,
+    let keys = match key {
+        "actuators" => ACTUATOR,
+        "measurements" => MEASUREMENT,
+        _ => STATE,
     };
-    let members = signals(&entry, role)?;
+    let members = signals(&entry, keys)?;
     if members.len() == count {
         return Ok(members);
     }

@@ -1,5 +1,6 @@
 //! Names that the controller FMU cannot have.
 
+use crate::read::Result;
 use files::PlaceError;
 use fmu_description::{array_element, is_structured_name, misplaced_elements};
 
@@ -25,31 +26,29 @@ const DETECTION: [&str; 7] = [
 
 /// Checks the names of the variables of the controller FMU (actuators, measurements, references, the input of a
 /// schedule), the order of elements of arrays among them, and that faults and rates of ramps have different names.
-pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<()> {
     let variables = ControllerVariables::of(file);
     let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
     let signals = file.actuators.iter().chain(&file.measurements).chain(references);
     for signal in signals.chain(schedule_input(file)) {
         let name = &signal.name;
-        if !is_structured_name(name) {
-            let message = format!(
+        let message = if !is_structured_name(name) {
+            format!(
                 "`{name}` cannot be the name of a variable of the controller FMU: expected letters A \
                  to Z, digits and `_`, not starting with a digit, or ASCII text in apostrophes; \
                  `description` may hold any text"
-            );
-            return Err(at_name(file, signal, message));
-        }
-        if variables.include(name) {
-            let message = format!(
-                "the controller FMU has a variable `{name}` of its own; expected another name"
-            );
-            return Err(at_name(file, signal, message));
-        }
+            )
+        } else if variables.include(name) {
+            format!("the controller FMU has a variable `{name}` of its own; expected another name")
+        } else {
+            continue;
+        };
+        return Err(at_name(file, signal, message));
     }
-    let is_actuator =
-        |signal: &&Signal| file.actuators.iter().any(|other| other.name == signal.name);
-    let is_measurement =
-        |signal: &&Signal| file.measurements.iter().any(|other| other.name == signal.name);
+    let is_among =
+        |signals: &[Signal], signal: &Signal| signals.iter().any(|other| other.name == signal.name);
+    let is_actuator = |signal: &&Signal| is_among(&file.actuators, signal);
+    let is_either = |signal: &&Signal| is_actuator(signal) || is_among(&file.measurements, signal);
     if let Some(signal) = file.measurements.iter().find(is_actuator) {
         let message = format!(
             "the actuator and the measurement `{}` would be one variable of the controller FMU; \
@@ -58,7 +57,6 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
         );
         return Err(at_name(file, signal, message));
     }
-    let is_either = |signal: &&Signal| is_actuator(signal) || is_measurement(signal);
     if let Some(signal) = references.iter().find(is_either) {
         let message = format!(
             "the reference `{}` would have the name of an actuator or a measurement in the controller \
@@ -88,7 +86,7 @@ fn schedule_input<'a>(file: &'a PlantFile<'_>) -> Option<&'a Signal> {
 
 /// Checks that the elements of each array are adjacent and in order. In the FMU, references,
 /// `compensate` and the input of a schedule are between measurements and actuators.
-fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result<(), PlaceError> {
+fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result<()> {
     let signals = file.measurements.iter().chain(references).map(Some).chain([None]);
     let signals = signals.chain(schedule_input(file).map(Some));
     let signals: Vec<_> = signals.chain(file.actuators.iter().map(Some)).collect();
@@ -106,7 +104,7 @@ fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result
 }
 
 /// Checks that faults and rates of ramps have different names.
-fn check_fault_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+fn check_fault_names(file: &PlantFile<'_>) -> Result<()> {
     for (at, fault) in file.faults.iter().enumerate() {
         let is_rate_of = |other: &Fault| {
             other.dynamics == FaultDynamics::Ramp && fault.name == format!("{}_rate", other.name)

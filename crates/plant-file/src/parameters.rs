@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::read::within;
-use files::{Entry, PlaceError};
+use crate::read::{Result, within};
+use files::Entry;
 
 /// A parameter of the plant's FMU, and how far it may be from its value.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub enum Tolerance {
 }
 
 /// Reads a table of one or more parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
-pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
+pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>> {
     let one = |(name, entry): (&str, Entry<'_>)| {
         let tolerance = if entry.is_list() {
             match entry.list()?.as_slice() {
@@ -51,6 +51,6 @@ pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceEr
 }
 
 /// Reads a fraction from 0 to below 1.
-pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64> {
     within(entry, 0.0..1.0, "expected a number from 0 to below 1")
 }

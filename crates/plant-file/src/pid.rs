@@ -1,10 +1,10 @@
 //! The entries `structure` and `pairs` of `[loop]`: PI, PID or other controllers of low order in place of a state
 //! feedback.
 
-use crate::read::{alone, refuse, whole};
+use crate::read::{Result, alone, refuse, whole};
 use crate::references::References;
 use crate::signals::{Signal, position, position_of};
-use files::{Place, PlaceError, Table};
+use files::{Place, Table};
 use nalgebra::RowDVector;
 
 /// Entries of the file that are not possible with such controllers: a measurement filter, and entries that need a state
@@ -55,7 +55,7 @@ impl Pid {
         table: &Table<'_>,
         [actuators, measurements]: [&[Signal]; 2],
         corner: f64,
-    ) -> Result<Option<Self>, PlaceError> {
+    ) -> Result<Option<Self>> {
         let Some(entry) = table.get("structure") else {
             let message = "it belongs to `structure`, \"PI\" for example";
             return refuse(table, &["pairs"], message).map(|()| None);
@@ -115,7 +115,7 @@ impl Pid {
         file: &Table<'_>,
         references: Option<&References>,
         measurements: &[Signal],
-    ) -> Result<(), PlaceError> {
+    ) -> Result<()> {
         let names =
             self.measurements().into_iter().map(|at| format!("{:?}", measurements[at].name));
         let names: Vec<_> = names.collect();

@@ -4,17 +4,33 @@ use std::ops::{RangeBounds, RangeInclusive};
 
 use files::{Entry, PlaceError, Table};
 
+/// The result of reading an entry.
+pub(crate) type Result<T, E = PlaceError> = std::result::Result<T, E>;
+
 /// Reads a number above 0; `None` if the table does not have the entry.
-pub(crate) fn positive(table: &Table<'_>, key: &str) -> Result<Option<f64>, PlaceError> {
-    table.get(key).map(|entry| entry.positive()).transpose()
+pub(crate) fn positive(table: &Table<'_>, key: &str) -> Result<Option<f64>> {
+    optional(table, key, Entry::positive)
+}
+
+/// Reads an entry with `read`; `None` if the table does not have it.
+pub(crate) fn optional<'a, T>(
+    table: &Table<'a>,
+    key: &str,
+    read: impl FnOnce(&Entry<'a>) -> Result<T>,
+) -> Result<Option<T>> {
+    table.get(key).as_ref().map(read).transpose()
+}
+
+/// Reads a table with a number above 0 for some of `names`; returns that of each name, if it is stated.
+pub(crate) fn positives(table: &Table<'_>, key: &str, names: &[&str]) -> Result<Vec<Option<f64>>> {
+    let Some(entry) = table.get(key) else { return Ok(vec![None; names.len()]) };
+    let stated = entry.table()?;
+    stated.allow(names)?;
+    names.iter().map(|name| positive(&stated, name)).collect()
 }
 
 /// Reads a number in `range`; `rule` is the text for other numbers, such as "expected at most 1".
-pub(crate) fn within(
-    entry: &Entry<'_>,
-    range: impl RangeBounds<f64>,
-    rule: &str,
-) -> Result<f64, PlaceError> {
+pub(crate) fn within(entry: &Entry<'_>, range: impl RangeBounds<f64>, rule: &str) -> Result<f64> {
     match entry.number()? {
         number if range.contains(&number) => Ok(number),
         number => Err(entry.error(format!("{rule}, found {number}"))),
@@ -26,18 +42,18 @@ pub(crate) fn positive_within(
     entry: &Entry<'_>,
     range: impl RangeBounds<f64>,
     rule: &str,
-) -> Result<f64, PlaceError> {
+) -> Result<f64> {
     entry.positive()?;
     within(entry, range, rule)
 }
 
 /// Reads a number of at least 0.
-pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64> {
     within(entry, 0.0.., "expected no less than 0")
 }
 
 /// Reads a whole number in `range`.
-pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32, PlaceError> {
+pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32> {
     let (least, most) = range.into_inner();
     let number = entry.number()?;
     if number.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&number) {
@@ -48,7 +64,7 @@ pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32
 }
 
 /// Reads one of two texts; returns whether it is the first one.
-pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<bool, PlaceError> {
+pub(crate) fn is_first(entry: &Entry<'_>, [first, second]: [&str; 2]) -> Result<bool> {
     match entry.text()? {
         text if text == first || text == second => Ok(text == first),
         other => Err(entry.error(format!("expected {first:?} or {second:?}, found {other:?}"))),
@@ -60,8 +76,8 @@ pub(crate) fn each<'a, T: Clone>(
     entry: &Entry<'a>,
     count: usize,
     what: &str,
-    read: impl Fn(&Entry<'a>) -> Result<T, PlaceError>,
-) -> Result<Vec<T>, PlaceError> {
+    read: impl Fn(&Entry<'a>) -> Result<T>,
+) -> Result<Vec<T>> {
     if !entry.is_list() {
         return Ok(vec![read(entry)?; count]);
     }
@@ -73,7 +89,7 @@ pub(crate) fn each<'a, T: Clone>(
 }
 
 /// Refuses the first of `keys` that the table has, with `message`.
-pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<(), PlaceError> {
+pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<()> {
     match keys.iter().find_map(|key| table.get(key)) {
         Some(entry) => Err(entry.error(message)),
         None => Ok(()),
@@ -81,11 +97,7 @@ pub(crate) fn refuse(table: &Table<'_>, keys: &[&str], message: &str) -> Result<
 }
 
 /// Refuses `entry` if the file has one of `others`.
-pub(crate) fn alone(
-    entry: &Entry<'_>,
-    file: &Table<'_>,
-    others: &[&str],
-) -> Result<(), PlaceError> {
+pub(crate) fn alone(entry: &Entry<'_>, file: &Table<'_>, others: &[&str]) -> Result<()> {
     match others.iter().find(|key| file.get(key).is_some()) {
         Some(other) => Err(entry.error(format!("it is not possible together with `{other}`"))),
         None => Ok(()),

@@ -1,9 +1,9 @@
 //! The table `[reconfiguration]` of a plant file: the requirements on the controller without actuators.
 
 use crate::faults::{EntryPoint, Fault};
-use crate::read::{alone, positive_within};
+use crate::read::{Result, alone, positive_within};
 use crate::signals::{Signal, positions};
-use files::{Place, PlaceError, Table};
+use files::{Place, Table};
 
 /// The requirements on the controller without actuators.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,10 +34,8 @@ impl ReconfigurationRequest {
         actuators: &[Signal],
         measurements: &[Signal],
         faults: &[Fault],
-    ) -> Result<Option<Self>, PlaceError> {
-        let Some(entry) = file.get("reconfiguration") else {
-            return Ok(None);
-        };
+    ) -> Result<Option<Self>> {
+        let Some(entry) = file.get("reconfiguration") else { return Ok(None) };
         alone(&entry, file, &["reference", "schedule"])?;
         if actuators.len() < 2 {
             return Err(entry.error("without its only actuator a plant is not controlled"));
@@ -94,10 +92,8 @@ impl ReconfigurationRequest {
 
 /// Reads `together`, how many actuators may be gone together; 1 if it is missing. `used`: the number of actuators that
 /// may be gone, of `all`. An error if these are more than [`MOST_SETS`] sets.
-fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceError> {
-    let Some(entry) = table.get("together") else {
-        return Ok(1);
-    };
+fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize> {
+    let Some(entry) = table.get("together") else { return Ok(1) };
     let most = used.min(all - 1);
     let number = entry.number()?;
     let most_together = (1..=most)
@@ -123,11 +119,9 @@ fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceEr
 }
 
 /// Reads `stuck_at`, a table from actuators to commands; 0 for actuators that it does not name.
-fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<f64>, PlaceError> {
+fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<f64>> {
     let mut commands = vec![0.0; used.len()];
-    let Some(entry) = table.get("stuck_at") else {
-        return Ok(commands);
-    };
+    let Some(entry) = table.get("stuck_at") else { return Ok(commands) };
     for (name, value) in entry.table()?.entries() {
         let Some(at) = used.iter().position(|at| actuators[*at].name == name) else {
             let names: Vec<_> = used.iter().map(|at| actuators[*at].name.as_str()).collect();
@@ -142,11 +136,7 @@ fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<
 }
 
 /// Reads `loss` and `time`, which belong together and require a fault with `loss_of`; `None` without both.
-fn decision(
-    table: &Table<'_>,
-    used: &[usize],
-    faults: &[Fault],
-) -> Result<Option<(f64, f64)>, PlaceError> {
+fn decision(table: &Table<'_>, used: &[usize], faults: &[Fault]) -> Result<Option<(f64, f64)>> {
     let (loss, time) = match (table.get("loss"), table.get("time")) {
         (None, None) => return Ok(None),
         (Some(loss), Some(time)) => (loss, time),

@@ -1,6 +1,7 @@
 //! The table `[reference]` of a plant file: set points of measurements.
 
-use files::{Entry, Place, PlaceError, Table};
+use crate::read::Result;
+use files::{Entry, Place, Table};
 use nalgebra::DMatrix;
 
 use crate::signals::{Signal, description, name, position, position_of, unit};
@@ -31,13 +32,8 @@ const REFERENCE: [&str; 6] = ["measurement", "combination", "name", "unit", "des
 
 impl References {
     /// Reads the table, if there is one.
-    pub(crate) fn read(
-        file: &Table<'_>,
-        measurements: &[Signal],
-    ) -> Result<Option<Self>, PlaceError> {
-        let Some(entry) = file.get("reference") else {
-            return Ok(None);
-        };
+    pub(crate) fn read(file: &Table<'_>, measurements: &[Signal]) -> Result<Option<Self>> {
+        let Some(entry) = file.get("reference") else { return Ok(None) };
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let track = table.require("track", "the measurements that follow references")?;
@@ -110,7 +106,7 @@ impl References {
 fn reference(
     entry: &Entry<'_>,
     measurements: &[Signal],
-) -> Result<(Signal, Vec<f64>, Option<f64>), PlaceError> {
+) -> Result<(Signal, Vec<f64>, Option<f64>)> {
     let mut weights = vec![0.0; measurements.len()];
     if entry.is_text() {
         let at = position(entry, measurements, "measurement")?;

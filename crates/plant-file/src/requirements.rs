@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use crate::matrix::matrix;
-use crate::read::{not_negative, positive, positive_within, refuse};
+use crate::read::{Result, not_negative, optional, positive, positive_within, refuse};
 use nalgebra::{Complex, DMatrix};
 
 use crate::channel::{CHANNEL, Channel, ChannelSignals};
 use control::{Domain, lmi};
-use files::{Entry, Place, PlaceError, Table};
+use files::{Entry, Place, Table};
 
 /// A requirement on a gain.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,7 +127,7 @@ pub(crate) fn request(
     weights: [&str; 2],
     signals: &ChannelSignals<'_>,
     domain: Domain,
-) -> Result<Request, PlaceError> {
+) -> Result<Request> {
     let sampled = domain != Domain::Continuous;
     let mut known = KEYS.to_vec();
     known.extend(weights);
@@ -183,16 +183,13 @@ pub(crate) fn request(
 }
 
 /// Refuses a disc or a sector in a sampled design: the map z = e^(s T) does not preserve their shape.
-fn refuse_disc_and_sector(region: &Entry<'_>) -> Result<(), PlaceError> {
+fn refuse_disc_and_sector(region: &Entry<'_>) -> Result<()> {
     refuse(&region.table()?, &["disc", "sector"], "a sampled design has a region by `decay` only")
 }
 
 /// Returns the only method of the table besides a region, with its key; `None` without one. Several methods are an
 /// error.
-fn only_one<'a, 'k>(
-    table: &Table<'a>,
-    weight: &'k str,
-) -> Result<Option<(&'k str, Entry<'a>)>, PlaceError> {
+fn only_one<'a, 'k>(table: &Table<'a>, weight: &'k str) -> Result<Option<(&'k str, Entry<'a>)>> {
     let keys = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
     let mut stated = keys.into_iter().filter_map(|key| Some((key, table.get(key)?)));
     let first = stated.next();
@@ -205,7 +202,7 @@ fn only_one<'a, 'k>(
 }
 
 /// Reads a bandwidth, in a sampled design below pi / T.
-fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth, PlaceError> {
+fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth> {
     let rate = entry.positive()?;
     match domain {
         Domain::Sampled { period } if rate * period >= PI => Err(entry.error(format!(
@@ -217,7 +214,7 @@ fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth, PlaceError>
 }
 
 /// Reads the eigenvalues and checks that they are stable.
-fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceError> {
+fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>> {
     let all = eigenvalues(entry)?;
     let unstable =
         |value: &&Complex<f64>| if sampled { value.norm() >= 1.0 } else { value.re >= 0.0 };
@@ -233,7 +230,7 @@ fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceEr
 }
 
 /// Reads a list of numbers, and `{ re = -3.0, im = 4.0 }` for complex conjugate pairs.
-fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
+fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>> {
     let mut all = Vec::new();
     for member in entry.list()? {
         if !member.is_table() {
@@ -250,7 +247,7 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
 }
 
 /// Reads a region; in a sampled design it has a decay rate only.
-pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
+pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region> {
     if sampled {
         refuse_disc_and_sector(entry)?;
     }
@@ -258,25 +255,21 @@ pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, 
 }
 
 /// Reads a region with at least one of decay, disc and sector.
-fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
+fn region(entry: &Entry<'_>) -> Result<Region> {
     let table = entry.table()?;
     table.allow(&["decay", "disc", "sector"])?;
     let decay = positive(&table, "decay")?;
-    let sector = table.get("sector").map(|entry| angle(&entry)).transpose()?;
-    let disc = table.get("disc").map(|entry| disc(&entry)).transpose()?;
+    let below = "expected less than 90 degrees";
+    let sector = optional(&table, "sector", |entry| positive_within(entry, ..90.0, below))?;
+    let disc = optional(&table, "disc", disc)?;
     if decay.is_none() && sector.is_none() && disc.is_none() {
         return Err(entry.error("expected at least one of decay, disc, sector"));
     }
     Ok(Region { decay, disc, sector })
 }
 
-/// Reads an angle above 0 and below 90 degrees.
-fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    positive_within(entry, ..90.0, "expected less than 90 degrees")
-}
-
 /// Reads the centre and the radius of a disc that reaches the left half plane.
-fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
+fn disc(entry: &Entry<'_>) -> Result<(f64, f64)> {
     let table = entry.table()?;
     table.allow(&["center", "radius"])?;
     let center = table.require("center", "a point of the real axis, 1/s")?;
@@ -292,7 +285,7 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
 }
 
 /// Reads a bound of the norm, or the text "least" (`None`). `remedy`: what "least" needs, if it is not possible.
-fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>, PlaceError> {
+fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     if !entry.is_text() {
         return entry.positive().map(Some);
     }
@@ -311,7 +304,7 @@ const UNSYMMETRIC: f64 = 1e-12;
 
 /// Reads a symmetric matrix, or a list of numbers of at least 0 as a diagonal matrix. A matrix that rounding made
 /// unsymmetric becomes the mean of itself and its transpose.
-fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
+fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>> {
     let members = entry.list()?;
     if members.iter().any(Entry::is_list) {
         let matrix = matrix(entry)?;

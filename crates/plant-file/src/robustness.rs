@@ -1,11 +1,11 @@
 //! Reads the table `[robustness]` of a plant file: tolerances, measurement noise, limits.
 
 use control::robustness::PlantEntry;
-use files::{Entry, PlaceError, Table};
+use files::{Entry, Table};
 
 use crate::Model;
 use crate::parameters::{self, ParameterTolerance, fraction};
-use crate::read::{each, not_negative, whole, within};
+use crate::read::{Result, each, not_negative, optional, whole, within};
 
 /// The tolerances and the noise for which the robustness of a design is computed, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,11 +51,7 @@ const RED: f64 = 4.0;
 
 impl RobustnessLimits {
     /// Reads the table, or returns the defaults for a plant with that many measurements.
-    pub(crate) fn read(
-        file: &Table<'_>,
-        model: &Model,
-        measurements: usize,
-    ) -> Result<Self, PlaceError> {
+    pub(crate) fn read(file: &Table<'_>, model: &Model, measurements: usize) -> Result<Self> {
         // A single entry of a sampled A has no physical meaning, and hence no relative tolerance.
         let of_a = if model.only_samples().is_some() { 0.0 } else { TOLERANCE };
         let mut limits = Self {
@@ -69,9 +65,7 @@ impl RobustnessLimits {
             amber: AMBER,
             red: RED,
         };
-        let Some(entry) = file.get("robustness") else {
-            return Ok(limits);
-        };
+        let Some(entry) = file.get("robustness") else { return Ok(limits) };
         let table = entry.table()?;
         table.allow(&KEYS)?;
         if let Some(entry) = table.get("tolerance") {
@@ -96,12 +90,9 @@ impl RobustnessLimits {
             limits.parameters = parameters::read(&entry)?;
             limits.tolerance = [0.0; 4];
         }
-        if let Some(entry) = table.get("cases") {
-            limits.cases = whole(&entry, 0..=100_000)?;
-        }
-        if let Some(entry) = table.get("seed") {
-            limits.seed = whole(&entry, 0..=u32::MAX)?;
-        }
+        let number = |key: &str, most| optional(&table, key, |entry| whole(entry, 0..=most));
+        limits.cases = number("cases", 100_000)?.unwrap_or(limits.cases);
+        limits.seed = number("seed", u32::MAX)?.unwrap_or(limits.seed);
         if let Some(entry) = table.get("noise") {
             limits.noise =
                 each(&entry, measurements, "numbers, one per measurement", not_negative)?;
@@ -124,7 +115,7 @@ impl RobustnessLimits {
 
 /// Reads tolerances of single entries: `"A[2][1]" = 0.5`, `"A[2][1], B[2][1]" = 0.5` for entries that change by
 /// the same factor.
-fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>, PlaceError> {
+fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>> {
     let Model::Matrices { a, b, c, d, .. } = model else {
         return Err(
             entry.error("an FMU is the plant: expected `parameters`, its parameters that vary")
@@ -169,7 +160,7 @@ fn plant_entry(text: &str) -> Option<PlantEntry> {
 }
 
 /// Reads one number for A, B, C and D, or a table with a number for some of them; 0 for the others.
-fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
+fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4]> {
     if !entry.is_table() {
         return Ok([fraction(entry)?; 4]);
     }

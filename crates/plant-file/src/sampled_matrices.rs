@@ -3,11 +3,11 @@
 use control::Domain;
 use control::eigen::eigenvalues;
 use control::hold::{continuous, zero_order_hold};
-use files::{PlaceError, Table};
+use files::Table;
 use nalgebra::DMatrix;
 
 use crate::Sampling;
-use crate::read::{is_first, refuse};
+use crate::read::{Result, is_first, refuse};
 
 /// An entry of the logarithm is rounding below this fraction of the geometric mean of the largest entries in its row
 /// and column.
@@ -44,7 +44,7 @@ impl SampledMatrices {
         file: &Table<'_>,
         sampling: Option<Sampling>,
         pair: (&DMatrix<f64>, &DMatrix<f64>),
-    ) -> Result<Option<Box<Self>>, PlaceError> {
+    ) -> Result<Option<Box<Self>>> {
         let Some(entry) = file.get("matrices") else { return Ok(None) };
         if is_first(&entry, ["continuous", "sampled"])? {
             return Ok(None);

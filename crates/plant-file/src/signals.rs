@@ -3,8 +3,8 @@
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
 
-use crate::read::{whole, within};
-use files::{Entry, Place, PlaceError, Table};
+use crate::read::{Result, optional, whole, within};
+use files::{Entry, Place, Table};
 
 /// A state, an actuator, a measurement, a reference or a scheduling variable.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,17 +25,6 @@ pub struct Signal {
     pub delay: f64,
     /// The places of name, limits or range, and longest time of a hold, if the file states them.
     pub places: [Option<Place>; 3],
-}
-
-/// The role of a signal, which decides which entries it may have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// A state.
-    State,
-    /// A command.
-    Actuator,
-    /// A measurement.
-    Measurement,
 }
 
 impl Signal {
@@ -60,20 +49,24 @@ impl Signal {
 const DELAY_ORDER: usize = 3;
 /// The largest number of states of the observer for each delay.
 const MOST_DELAY_ORDER: u32 = 8;
-const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
-const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits", "delay"];
-const MEASUREMENT: [&str; 7] =
-    ["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
+/// The entries of a state.
+pub(crate) const STATE: &[&str] = &["name", "unit", "description", "operating"];
+/// The entries of an actuator.
+pub(crate) const ACTUATOR: &[&str] =
+    &["name", "unit", "description", "operating", "limits", "delay"];
+/// The entries of a measurement.
+pub(crate) const MEASUREMENT: &[&str] =
+    &["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
 
-/// Reads a list of at least one signal, each a text (its name) or a table. Their names differ.
-pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
+/// Reads a list of at least one signal, each a text (its name) or a table with some of `keys`. Their names differ.
+pub(crate) fn signals(entry: &Entry<'_>, keys: &[&str]) -> Result<Vec<Signal>> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one"));
     }
     let mut all: Vec<Signal> = Vec::with_capacity(members.len());
     for member in &members {
-        let signal = signal(member, role)?;
+        let signal = signal(member, keys)?;
         if all.iter().any(|other| other.name == signal.name) {
             return Err(member.error(format!("the name `{}` is there twice", signal.name)));
         }
@@ -82,30 +75,25 @@ pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, Plac
     Ok(all)
 }
 
-fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
+fn signal(entry: &Entry<'_>, keys: &[&str]) -> Result<Signal> {
     if entry.is_text() {
         let places = [Some(entry.place.clone()), None, None];
         return Ok(Signal { places, ..Signal::named(name(entry)?) });
     }
     let table = entry.table()?;
-    table.allow(match role {
-        Role::State => &SIGNAL[..],
-        Role::Actuator => &ACTUATOR,
-        Role::Measurement => &MEASUREMENT,
-    })?;
-    let range = table.get(if role == Role::Measurement { "range" } else { "limits" });
+    table.allow(keys)?;
+    let range = table.get("range").or_else(|| table.get("limits"));
     let longest_hold = table.get("longest_hold");
+    let delay = |entry: &Entry<'_>| within(entry, 0.0.., "expected a time in s, 0 or more");
     let name_entry = table.require("name", "the name of the signal")?;
     Ok(Signal {
         name: name(&name_entry)?,
         unit: unit(&table)?,
         description: description(&table)?,
-        operating: table.get("operating").map(|entry| entry.number()).transpose()?,
+        operating: optional(&table, "operating", Entry::number)?,
         limits: range.as_ref().map(limits).transpose()?,
         longest_hold: longest_hold.as_ref().map(Entry::positive).transpose()?,
-        delay: table
-            .get("delay")
-            .map_or(Ok(0.0), |entry| within(&entry, 0.0.., "expected a time in s, 0 or more"))?,
+        delay: optional(&table, "delay", delay)?.unwrap_or(0.0),
         places: [
             Some(name_entry.place),
             range.map(|entry| entry.place),
@@ -115,7 +103,7 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
 }
 
 /// Reads a name: a text of one line that is not empty.
-pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
+pub(crate) fn name(entry: &Entry<'_>) -> Result<String> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
         name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
@@ -128,25 +116,20 @@ pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
 }
 
 /// Reads the entry `description`, whose characters XML must allow; empty without it.
-pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
-    let Some(entry) = table.get("description") else {
-        return Ok(String::new());
-    };
+pub(crate) fn description(table: &Table<'_>) -> Result<String> {
+    let Some(entry) = table.get("description") else { return Ok(String::new()) };
     let text = entry.text()?;
     match text.chars().find(|sign| !is_character(*sign)) {
         None => Ok(text.to_owned()),
         Some(sign) => {
-            let message = format!("found {sign:?}, which the XML of an FMU cannot hold");
-            Err(entry.error(message))
+            Err(entry.error(format!("found {sign:?}, which the XML of an FMU cannot hold")))
         }
     }
 }
 
 /// Reads the entry `unit`, which must be a unit of FMI; `None` without it.
-pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
-    let Some(entry) = table.get("unit") else {
-        return Ok(None);
-    };
+pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>> {
+    let Some(entry) = table.get("unit") else { return Ok(None) };
     let text = entry.text()?;
     match Unit::parse(text) {
         Ok(_) => Ok(Some(text.to_owned())),
@@ -179,7 +162,7 @@ fn conversion(one: &str, other: &str) -> Option<(f64, f64)> {
 
 /// Reads `delay_order`, the number of states with which the observer approximates each delay; an error if no signal has
 /// a delay.
-pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize, PlaceError> {
+pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize> {
     let Some(entry) = file.get("delay_order") else { return Ok(DELAY_ORDER) };
     if signals.into_iter().flatten().all(|signal| signal.delay <= 0.0) {
         return Err(entry.error("no actuator and no measurement has a `delay`"));
@@ -188,7 +171,7 @@ pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<u
 }
 
 /// Reads a lower and an upper limit.
-fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
+fn limits(entry: &Entry<'_>) -> Result<[f64; 2]> {
     match entry.numbers()?.as_slice() {
         &[low, high] if low < high => Ok([low, high]),
         &[low, high] => Err(entry.error(format!("expected lower < upper, found {low} and {high}"))),
@@ -199,11 +182,7 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
 }
 
 /// Returns the position of the signal that the entry names; `what` says in errors what the signals are.
-pub(crate) fn position(
-    entry: &Entry<'_>,
-    signals: &[Signal],
-    what: &str,
-) -> Result<usize, PlaceError> {
+pub(crate) fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize> {
     position_of(entry.text()?, entry, signals, what)
 }
 
@@ -213,19 +192,14 @@ pub(crate) fn position_of(
     entry: &Entry<'_>,
     signals: &[Signal],
     what: &str,
-) -> Result<usize, PlaceError> {
+) -> Result<usize> {
     signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
-        let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
-        entry.error(format!("no {what} is named {name:?}; there are {}", names.join(", ")))
+        entry.error(format!("no {what} is named {name:?}; there are {}", signal_names(signals)))
     })
 }
 
 /// Reads names of signals, each once, or the text "all"; returns the positions of at least one signal.
-pub(crate) fn positions(
-    entry: &Entry<'_>,
-    signals: &[Signal],
-    what: &str,
-) -> Result<Vec<usize>, PlaceError> {
+pub(crate) fn positions(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<Vec<usize>> {
     if entry.is_text() {
         return match entry.text()? {
             "all" => Ok((0..signals.len()).collect()),
@@ -238,8 +212,7 @@ pub(crate) fn positions(
     for member in entry.list()? {
         let at = position(&member, signals, what)?;
         if all.contains(&at) {
-            let name = &signals[at].name;
-            return Err(member.error(format!("the {what} `{name}` is there twice")));
+            return Err(member.error(format!("the {what} `{}` is there twice", signals[at].name)));
         }
         all.push(at);
     }

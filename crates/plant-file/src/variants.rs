@@ -1,10 +1,10 @@
 //! Reads the plants besides the one of the file: the members of a family, and the points of a
 //! schedule.
 
-use files::{Entry, Place, PlaceError, Table};
+use files::{Entry, Place, Table};
 
 use crate::matrix::shaped;
-use crate::read::{positive, refuse};
+use crate::read::{Result, optional, positive, refuse};
 use crate::references::References;
 use crate::signals::{Signal, description, name, unit};
 use crate::{Model, PlantFile};
@@ -102,7 +102,7 @@ impl PlantFile<'_> {
 }
 
 /// Reads `[[family]]`, plants with names that differ; empty without it.
-pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
+pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
     let message = "expected `family` (one gain) or `schedule` (gains by a variable)";
     refuse(file, &["schedule"], message)?;
@@ -120,7 +120,7 @@ pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, Pl
                 format!("the name `{title}` is there twice; `nominal` is the plant of the file");
             return Err(member.error(message));
         }
-        let variant = variant(&table, title, member.place.clone(), model)?;
+        let variant = variant(&table, title, model)?;
         if !keys[1..].iter().any(|key| table.get(key).is_some()) {
             let expected = keys[1..].join(", ");
             return Err(member.error(format!("the plant of the file again: expected {expected}")));
@@ -138,7 +138,7 @@ pub(crate) fn schedule(
     file: &Table<'_>,
     model: &Model,
     measurements: &[Signal],
-) -> Result<Option<Schedule>, PlaceError> {
+) -> Result<Option<Schedule>> {
     let Some(entry) = file.get("schedule") else { return Ok(None) };
     let table = entry.table()?;
     table.allow(&["variable", "unit", "description", "rate_bound", "points"])?;
@@ -164,7 +164,7 @@ pub(crate) fn schedule(
 }
 
 /// Reads the points of a schedule; returns the position of the one with the plant of the file, too.
-fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {
+fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize)> {
     let mut all: Vec<SchedulePoint> = Vec::new();
     let mut nominal = None;
     for member in &list.list()? {
@@ -183,7 +183,7 @@ fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize)
             let message = format!("a second point with the plant of the file: expected {expected}");
             return Err(member.error(message));
         }
-        let plant = variant(&table, value.to_string(), member.place.clone(), model)?;
+        let plant = variant(&table, value.to_string(), model)?;
         all.push(SchedulePoint { at: value, plant });
     }
     if all.len() < 2 {
@@ -208,17 +208,12 @@ fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'stat
 }
 
 /// Reads a plant: the plant of the file with the entries of `table`.
-fn variant(
-    table: &Table<'_>,
-    name: String,
-    place: Place,
-    model: &Model,
-) -> Result<Variant, PlaceError> {
+fn variant(table: &Table<'_>, name: String, model: &Model) -> Result<Variant> {
     let mut model = model.clone();
     let mut operating = [None, None];
     match &mut model {
         Model::Fmu(fmu) => {
-            let stated = table.get(POINT).map(|entry| entry.table()).transpose()?;
+            let stated = optional(table, POINT, Entry::table)?;
             for (name, value) in stated.iter().flat_map(Table::entries) {
                 let value = value.number()?;
                 fmu.operating_point.retain(|(other, _)| other != name);
@@ -246,11 +241,11 @@ fn variant(
             operating = [numbers(table, "u_op", m)?, numbers(table, "y_op", p)?];
         }
     }
-    Ok(Variant { name, place, model, operating })
+    Ok(Variant { name, place: table.place.clone(), model, operating })
 }
 
 /// Reads a list of `count` numbers; `None` if the table does not have it.
-fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>>, PlaceError> {
+fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>>> {
     let Some(entry) = table.get(key) else { return Ok(None) };
     let values = entry.numbers()?;
     if values.len() == count {
@@ -260,7 +255,7 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
 }
 
 /// Refuses references without integral action in a file with a family: its members would not reach them.
-pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<()> {
     let references = file
         .references
         .as_ref()
