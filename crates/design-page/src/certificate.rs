@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::matrix::matrix;
+use super::matrix::square;
 use super::table::{Cell, Columns, table, table_of};
-use design_report::{Bound, FreeP, Matrix, Norm, Report, Theorem1, Ultimate};
+use design_report::{Bound, FreeP, Norm, Report, Theorem1, Ultimate};
 
 pub(super) fn bounds(report: &Report) -> Markup {
     let columns: Columns<'_, Bound, 5> = [
@@ -91,7 +91,7 @@ fn printed(report: &Report, theorem: &Theorem1) -> Markup {
              units they have, says little of any of them; the table of largest values says more."
         }
         (numbers("Theorem 1", &rows))
-        (matrix("p-printed", &p_matrix(report, "P", "solution of (12)", &theorem.p)))
+        (p_matrix(report, "p-printed", ["P", "solution of (12)"], &theorem.p))
     }
 }
 
@@ -110,14 +110,14 @@ fn free(report: &Report, free: &FreeP) -> Markup {
              were checked again by eigenvalues, and hold by the margin stated."
         }
         (numbers("Free P", &rows))
-        (matrix("p-free", &p_matrix(report, "P_free", "by linear matrix inequalities", &free.p)))
+        (p_matrix(report, "p-free", ["P_free", "by linear matrix inequalities"], &free.p))
     }
 }
 
 fn numbers(caption: &str, rows: &[(&str, f64)]) -> Markup {
     let rows: Vec<Vec<Cell>> =
         rows.iter().map(|(name, value)| vec![(*name).into(), (*value).into()]).collect();
-    table(caption, &["quantity", "value"], &rows)
+    table(caption, ["quantity", "value"], &rows)
 }
 
 /// Returns the row names of L_x and L_f as names of `count` errors; numbers from 1 if there are not as many rows.
@@ -128,16 +128,9 @@ fn error_names(report: &Report, count: usize) -> Vec<String> {
     if named.len() == count { named } else { (1..=count).map(|k| k.to_string()).collect() }
 }
 
-/// Returns P with the names of the errors for rows and columns.
-fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> Matrix {
-    let names = error_names(report, values.len());
-    Matrix {
-        name: name.to_owned(),
-        meaning: meaning.to_owned(),
-        rows: names.clone(),
-        columns: names,
-        values: values.to_vec(),
-    }
+/// Returns P, a name and a meaning, with the names of the errors for rows and columns.
+fn p_matrix(report: &Report, id: &str, titles: [&str; 2], values: &[Vec<f64>]) -> Markup {
+    square(id, titles, &error_names(report, values.len()), values)
 }
 
 fn norms(norms: &[Norm]) -> Markup {

@@ -10,23 +10,12 @@ const TOP: f64 = 10.0;
 const BOTTOM: f64 = 48.0;
 
 /// The outer size of a figure, in its own units.
-#[derive(Clone, Copy)]
-pub(super) struct Size {
-    pub(super) width: f64,
-    pub(super) height: f64,
-}
-
-impl Size {
-    /// Returns the ends of the horizontal axis.
-    pub(super) fn horizontal(self) -> (f64, f64) {
-        (LEFT, self.width - RIGHT)
-    }
-
-    /// Returns the ends of the vertical axis, from bottom to top.
-    pub(super) fn vertical(self) -> (f64, f64) {
-        (self.height - BOTTOM, TOP)
-    }
-}
+const WIDTH: f64 = 440.0;
+const HEIGHT: f64 = 370.0;
+/// The ends of the horizontal axis.
+pub(super) const HORIZONTAL: (f64, f64) = (LEFT, WIDTH - RIGHT);
+/// The ends of the vertical axis, from bottom to top.
+pub(super) const VERTICAL: (f64, f64) = (HEIGHT - BOTTOM, TOP);
 
 /// A pair of axes.
 pub(super) struct Chart<'a> {
@@ -35,7 +24,6 @@ pub(super) struct Chart<'a> {
     pub(super) title: &'a str,
     /// A description of the figure for screen readers.
     pub(super) description: &'a str,
-    pub(super) size: Size,
     pub(super) x: Axis,
     pub(super) y: Axis,
     pub(super) x_label: &'a str,
@@ -45,12 +33,11 @@ pub(super) struct Chart<'a> {
 impl Chart<'_> {
     /// Draws the figure; `content` is clipped to the frame.
     pub(super) fn draw(&self, content: &Markup) -> Markup {
-        let Size { width, height } = self.size;
         let (title, description) = (format!("{}-title", self.id), format!("{}-what", self.id));
         let window = format!("{}-window", self.id);
         let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
         html! {
-            svg viewBox={ "0 0 " (width) " " (height) } role="img"
+            svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img"
                 aria-labelledby={ (title) " " (description) } {
                 title id=(title) { (self.title) }
                 desc id=(description) { (self.description) }

@@ -1,46 +1,40 @@
 //! `comparison.html`: the laws that estimate faults on one plant, side by side.
 
-use maud::{DOCTYPE, Markup, html};
+use maud::{Markup, html};
 
-use super::estimation::{conditions, errors, parameters};
+use super::estimation::details;
 use super::table::{Cell, table};
-use crate::head;
+use crate::document;
 use design_report::comparison::{Comparison, LawResult};
 
 /// Returns the page of a comparison, a complete HTML document.
 #[must_use]
 pub fn comparison(comparison: &Comparison) -> String {
     let title = format!("Estimation laws for {}", comparison.plant_file);
-    let document = html! {
-        (DOCTYPE)
-        html lang="en" {
-            (head(&title, &comparison.identity))
-            body {
-                header {
-                    p.kind { "Comparison of estimation laws" }
-                    h1 { (title) }
-                    p {
-                        "All laws are designed for the same plant and the same requirement on the observer; \
-                         the law that the plant file names has the parameters of the file, the others have \
-                         default parameters. Feedback and compensation are the same."
-                    }
-                }
-                main {
-                    section aria-labelledby="overview" {
-                        h2 id="overview" { "Overview" }
-                        (overview(comparison))
-                    }
-                    @for law in &comparison.laws {
-                        section aria-labelledby=(law.law) {
-                            h2 id=(law.law) { (law.law) }
-                            (one(law))
-                        }
-                    }
+    let body = html! {
+        header {
+            p.kind { "Comparison of estimation laws" }
+            h1 { (title) }
+            p {
+                "All laws are designed for the same plant and the same requirement on the observer; \
+                 the law that the plant file names has the parameters of the file, the others have \
+                 default parameters. Feedback and compensation are the same."
+            }
+        }
+        main {
+            section aria-labelledby="overview" {
+                h2 id="overview" { "Overview" }
+                (overview(comparison))
+            }
+            @for law in &comparison.laws {
+                section aria-labelledby=(law.law) {
+                    h2 id=(law.law) { (law.law) }
+                    (one(law))
                 }
             }
         }
     };
-    document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
+    document(&title, &comparison.identity, &body)
 }
 
 /// A table with a row for each law and fault; a law that does not exist has one row.
@@ -84,7 +78,7 @@ fn overview(comparison: &Comparison) -> Markup {
         "disk margin at the measurements",
         "verdict",
     ];
-    table("Laws and faults", &heads, &rows)
+    table("Laws and faults", heads, &rows)
 }
 
 fn one(law: &LawResult) -> Markup {
@@ -94,10 +88,7 @@ fn one(law: &LawResult) -> Markup {
             p { "The law does not exist for this plant: " (reason) "." }
         }
         @if let Some(result) = &law.result {
-            ul { @for line in &result.estimation.equations { li { code { (line) } } } }
-            (parameters(&result.estimation))
-            (conditions(&result.estimation))
-            (errors(&result.estimation.errors))
+            (details(&result.estimation))
             @if !result.verdict.reasons.is_empty() {
                 ul { @for reason in &result.verdict.reasons { li { (reason) } } }
             }

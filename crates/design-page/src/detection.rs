@@ -91,14 +91,11 @@ fn or(number: Option<f64>, missing: &str) -> Cell {
 }
 
 fn reactions(section: &Detection) -> Markup {
-    let mut heads = vec!["test"];
-    heads.extend(section.faults.iter().map(|fault| fault.fault.as_str()));
+    let faults = section.faults.iter().map(|fault| fault.fault.as_str());
     let row = |(test, reacts): (&Test, &Vec<bool>)| {
-        let mut cells = vec![Cell::from(test.name.as_str())];
-        let sign = |reacts: &bool| Cell::from(if *reacts { "1" } else { "0" });
-        cells.extend(reacts.iter().map(sign));
-        cells
+        let signs = reacts.iter().map(|reacts| if *reacts { "1" } else { "0" });
+        std::iter::once(test.name.as_str()).chain(signs).map(Cell::from).collect()
     };
     let rows: Vec<_> = section.tests.iter().zip(&section.reacts).map(row).collect();
-    table("Structure", &heads, &rows)
+    table("Structure", std::iter::once("test").chain(faults), &rows)
 }

@@ -4,32 +4,29 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::table::{Cell, Columns, table_of};
+use design_report::robustness::Number;
 use design_report::{Check, Estimation, EstimationErrors};
 
 pub(super) fn estimation(estimation: &Estimation) -> Markup {
     html! {
         p { "Law " code { (estimation.law) } " (" (estimation.sources) "), with the gains above:" }
-        ul { @for line in &estimation.equations { li { code { (line) } } } }
-        (parameters(estimation))
-        (conditions(estimation))
-        (errors(&estimation.errors))
+        (details(estimation))
     }
 }
 
-pub(super) fn parameters(estimation: &Estimation) -> Markup {
-    table_of(
-        "Parameters",
-        &estimation.parameters,
-        &[
-            ("parameter", |one| (&one.name).into()),
-            ("unit", |one| (&one.unit).into()),
-            ("value", |one| one.value.into()),
-        ],
-    )
-}
-
-pub(super) fn conditions(estimation: &Estimation) -> Markup {
-    checked("Conditions for its existence", "value", &estimation.conditions)
+/// Shows equations, parameters, conditions and errors of a law.
+pub(super) fn details(estimation: &Estimation) -> Markup {
+    let parameters: Columns<'_, Number, 3> = [
+        ("parameter", |one| (&one.name).into()),
+        ("unit", |one| (&one.unit).into()),
+        ("value", |one| one.value.into()),
+    ];
+    html! {
+        ul { @for line in &estimation.equations { li { code { (line) } } } }
+        (table_of("Parameters", &estimation.parameters, &parameters))
+        (checked("Conditions for its existence", "value", &estimation.conditions))
+        (errors(&estimation.errors))
+    }
 }
 
 /// Shows conditions; `number`: the head of their numbers.
@@ -47,7 +44,7 @@ pub(super) fn checked(caption: &str, number: &str, checks: &[Check]) -> Markup {
 }
 
 /// Shows the errors of the estimates and their noise.
-pub(super) fn errors(errors: &[EstimationErrors]) -> Markup {
+fn errors(errors: &[EstimationErrors]) -> Markup {
     let columns: Columns<'_, EstimationErrors, 10> = [
         ("fault", |one| (&one.fault).into()),
         ("lasting error of a constant fault", |one| one.constant.into()),

@@ -81,6 +81,5 @@ fn at_rest(
     };
     let rows: Vec<Vec<Cell>> = numbers(first).iter().enumerate().map(row).collect();
     let names = cases.iter().map(|case| case.name.as_str());
-    let heads: Vec<_> = ["signal", "unit"].into_iter().chain(names).collect();
-    table(title, &heads, &rows)
+    table(title, ["signal", "unit"].into_iter().chain(names), &rows)
 }

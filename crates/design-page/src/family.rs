@@ -2,23 +2,27 @@
 
 use maud::{Markup, html};
 
-use super::matrix::{matrices, matrix};
+use super::matrix::{matrices, square};
 use super::number::number;
 use super::table::{Cell, Columns, table, table_of, with_unit};
-use design_report::family::{CommonCertificate, FamilyReport, MemberReport};
+use design_report::Report;
+use design_report::family::{FamilyReport, MemberReport};
 use design_report::robustness::{LoopPoint, Number, ToleranceResult};
-use design_report::schedule::{RateCertificate, ScheduleReport};
-use design_report::{Matrix, Report};
+use design_report::schedule::ScheduleReport;
+
+/// The meaning of P.
+const LYAPUNOV: &str = "Lyapunov matrix";
 
 pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
+    let members: Vec<_> = family.members.iter().collect();
     html! {
         p {
             "One controller for all members; its observer has the model of the nominal plant. The worst \
              member is judged. A constant member is judged by the eigenvalues of the whole loop; a \
              common P is about a plant that moves between the members, arbitrarily fast."
         }
-        (margins("Members of the family", "member", &family.members.iter().collect::<Vec<_>>()))
-        (noise(&family.members.iter().collect::<Vec<_>>()))
+        (margins("Members of the family", "member", &members))
+        (noise(&members))
         @match &family.whole {
             Ok(certificate) => {
                 p {
@@ -28,7 +32,7 @@ pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
                     @if report.sampling.is_some() { " from one sample to the next" }
                     "."
                 }
-                (p_matrix("family-P", &loop_names(report), certificate))
+                (square("family-P", ["P", LYAPUNOV], &loop_names(report), &certificate.p))
             }
             Err(reason) => p {
                 strong { "Stability while the plant moves between the members is not proven: " }
@@ -42,7 +46,7 @@ pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
             }
             // The states that K = [K_x, K_i] feeds back.
             @let names = [state_names(report), integral_names(report)].concat();
-            (p_matrix("family-feedback-P", &names, certificate))
+            (square("family-feedback-P", ["P", LYAPUNOV], &names, &certificate.p))
         }
     }
 }
@@ -77,7 +81,7 @@ pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
                      the first and the last point, so that the interpolated loop is stable however \
                      fast the variable changes."
                 }
-                (p_matrix("schedule-P", &loop_names(report), certificate))
+                (square("schedule-P", ["P", LYAPUNOV], &loop_names(report), &certificate.p))
             }
             (Err(reason), Ok(bounded)) => {
                 p {
@@ -86,7 +90,11 @@ pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
                      stable while the variable changes by at most " (number(bounded.rate)) " "
                     (unit) " per s."
                 }
-                (rate_matrices(report, schedule, bounded))
+                @let names = loop_names(report);
+                @for (index, (point, p)) in schedule.points.iter().zip(&bounded.p).enumerate() {
+                    @let id = format!("schedule-P-{}", index + 1);
+                    (square(&id, [&format!("P at {}", point.at), LYAPUNOV], &names, p))
+                }
             }
             (Err(any), Err(bounded)) => p {
                 strong { "Stability while the variable changes is not proven. " }
@@ -145,9 +153,8 @@ fn noise(members: &[&MemberReport]) -> Markup {
         std::iter::once(with_unit(&number.name, number.unit.as_ref())).chain(values).collect()
     };
     let rows: Vec<Vec<Cell>> = first.noise_together.iter().enumerate().map(row).collect();
-    let heads: Vec<&str> =
-        std::iter::once("signal").chain(stable.iter().map(|(name, _)| name.as_str())).collect();
-    table("Root-mean-square values under the noise of all measurements", &heads, &rows)
+    let heads = std::iter::once("signal").chain(stable.iter().map(|(name, _)| name.as_str()));
+    table("Root-mean-square values under the noise of all measurements", heads, &rows)
 }
 
 fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
@@ -166,11 +173,10 @@ fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
         let values = schedule.points.iter().map(|point| point.coupled_instability.into());
         rows.push(std::iter::once(coupled.into()).chain(values).collect());
     }
-    let heads: Vec<&str> = std::iter::once("value at the operating point")
-        .chain(schedule.points.iter().map(|point| point.closed.name.as_str()))
-        .collect();
+    let heads = std::iter::once("value at the operating point")
+        .chain(schedule.points.iter().map(|point| point.closed.name.as_str()));
     html! {
-        (table("Operating points", &heads, &rows))
+        (table("Operating points", heads, &rows))
         @if schedule.measured {
             p {
                 "A measurement schedules: through the interpolated operating points it acts on the \
@@ -208,28 +214,4 @@ fn loop_names(report: &Report) -> Vec<String> {
     );
     names.extend(integral_names(report));
     names
-}
-
-fn p_matrix(id: &str, names: &[String], certificate: &CommonCertificate) -> Markup {
-    lyapunov_matrix(id, "P", names, &certificate.p)
-}
-
-fn rate_matrices(report: &Report, schedule: &ScheduleReport, bounded: &RateCertificate) -> Markup {
-    let names = loop_names(report);
-    html! {
-        @for (index, (point, p)) in schedule.points.iter().zip(&bounded.p).enumerate() {
-            (lyapunov_matrix(&format!("schedule-P-{}", index + 1), &format!("P at {}", point.at), &names, p))
-        }
-    }
-}
-
-fn lyapunov_matrix(id: &str, name: &str, names: &[String], values: &[Vec<f64>]) -> Markup {
-    let labelled = Matrix {
-        name: name.to_owned(),
-        meaning: "Lyapunov matrix".to_owned(),
-        rows: names.to_vec(),
-        columns: names.to_vec(),
-        values: values.to_vec(),
-    };
-    matrix(id, &labelled)
 }

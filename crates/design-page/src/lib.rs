@@ -50,56 +50,62 @@ pub fn page(report: &Report, identity: &str) -> String {
         if report.description.is_empty() { &report.plant_file } else { &report.description };
     let mut plots = Plots::default();
     let sections = sections(report, &mut plots);
+    let body = html! {
+        header {
+            p.kind { "Design report" }
+            h1 { (title) }
+            p.file { "Plant file " code { (report.plant_file) } }
+            (verdict::verdict(report))
+            @if !plots.is_empty() {
+                (about_plots())
+                noscript {
+                    p.warned {
+                        "The curves over time and frequency need JavaScript; their points come from "
+                        code { "aso-ftc design --json" } ", too. Tables and maps need no JavaScript."
+                    }
+                }
+            }
+        }
+        main {
+            @for (index, section) in sections.iter().enumerate() {
+                section aria-labelledby=(section.id) {
+                    details {
+                        summary { h2 id=(section.id) { (index + 1) ". " (section.title) } }
+                        (section.content)
+                    }
+                }
+            }
+        }
+        footer {
+            p {
+                "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
+                 five digits, the pointer shows all. The same numbers, and the points of \
+                 the curves, come from "
+                code { "aso-ftc design --json" } "."
+            }
+            @if !plots.is_empty() {
+                p { "Plots by uPlot." }
+                details.stays { summary { "Licence of uPlot" } pre tabindex="0" { (UPLOT_LICENCE) } }
+            }
+            p role="status" #copied {}
+        }
+        (script(FOLD))
+        @if !plots.is_empty() {
+            script type="application/json" #curves { (PreEscaped(plots.json())) }
+            @for text in [UPLOT, LINKED, FIGURES] { (script(text)) }
+        }
+        (script(COPY))
+    };
+    document(title, identity, &body)
+}
+
+/// Returns a complete HTML document.
+fn document(title: &str, identity: &str, body: &Markup) -> String {
     let document = html! {
         (DOCTYPE)
         html lang="en" {
             (head(title, identity))
-            body {
-                header {
-                    p.kind { "Design report" }
-                    h1 { (title) }
-                    p.file { "Plant file " code { (report.plant_file) } }
-                    (verdict::verdict(report))
-                    @if !plots.is_empty() {
-                        (about_plots())
-                        noscript {
-                            p.warned {
-                                "The curves over time and frequency need JavaScript; their points come from "
-                                code { "aso-ftc design --json" } ", too. Tables and maps need no JavaScript."
-                            }
-                        }
-                    }
-                }
-                main {
-                    @for (index, section) in sections.iter().enumerate() {
-                        section aria-labelledby=(section.id) {
-                            details {
-                                summary { h2 id=(section.id) { (index + 1) ". " (section.title) } }
-                                (section.content)
-                            }
-                        }
-                    }
-                }
-                footer {
-                    p {
-                        "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
-                         five digits, the pointer shows all. The same numbers, and the points of \
-                         the curves, come from "
-                        code { "aso-ftc design --json" } "."
-                    }
-                    @if !plots.is_empty() {
-                        p { "Plots by uPlot." }
-                        details.stays { summary { "Licence of uPlot" } pre tabindex="0" { (UPLOT_LICENCE) } }
-                    }
-                    p role="status" #copied {}
-                }
-                (script(FOLD))
-                @if !plots.is_empty() {
-                    script type="application/json" #curves { (PreEscaped(plots.json())) }
-                    @for text in [UPLOT, LINKED, FIGURES] { (script(text)) }
-                }
-                (script(COPY))
-            }
+            body { (body) }
         }
     };
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
@@ -149,22 +155,17 @@ fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
     let Report { reconfiguration, fallback, interface, .. } = report;
     let family = family.as_ref().map(|family| family::family(report, family));
     let schedule = schedule.as_ref().map(|schedule| family::schedule(report, schedule));
+    let without = |section| reconfiguration::reconfiguration(section, Plane::of(report));
+    let law = || estimation::estimation(estimation);
+    let robustness = robustness.as_ref().map(|all| robustness::robustness(report, all, plots));
     let all = [
         ("plant", "Plant", Some(plant::plant(&report.plant))),
         ("checks", "Checks", any(checks, || plant::checks(report))),
         ("gains", "Gains", any(gains, || plant::gains(report))),
         ("poles", "Eigenvalues", Some(loops::poles(report))),
         ("conditioning", "Condition and pole errors", Some(loops::conditioning(report))),
-        (
-            "estimation",
-            "Estimation of the faults",
-            any(&estimation.errors, || estimation::estimation(estimation)),
-        ),
-        (
-            "robustness",
-            "Robustness",
-            robustness.as_ref().map(|figures| robustness::robustness(report, figures, plots)),
-        ),
+        ("estimation", "Estimation of the faults", any(&estimation.errors, law)),
+        ("robustness", "Robustness", robustness),
         ("family", "Family of plants", family),
         ("schedule", "Schedule", schedule),
         ("detection", "Detection of faults", detection.as_ref().map(detection::detection)),
@@ -175,13 +176,7 @@ fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
         ("certificate", "Certificate", Some(certificate::certificate(report))),
         ("assumptions", "Assumptions", any(assumptions, || plant::assumptions(report))),
         ("effectiveness", "Loss of effectiveness", any(effectiveness, || losses::losses(report))),
-        (
-            "reconfiguration",
-            "Without an actuator",
-            reconfiguration
-                .as_ref()
-                .map(|section| reconfiguration::reconfiguration(section, Plane::of(report))),
-        ),
+        ("reconfiguration", "Without an actuator", reconfiguration.as_ref().map(without)),
         ("fallback", "Fall-back", fallback.as_ref().map(fallback::fallback)),
         ("interface", "Interface of the FMU", any(interface, || plant::interface(report))),
     ];

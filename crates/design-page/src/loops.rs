@@ -138,7 +138,7 @@ fn eigenvalues(name: &str, system: &Loop, plane: Plane) -> Markup {
         "natural frequency (rad/s)",
         "damping ratio",
     ];
-    table(&format!("{name}, {}", system.matrix), &heads, &rows)
+    table(&format!("{name}, {}", system.matrix), heads, &rows)
 }
 
 fn open_loop(plant: &Plant) -> Markup {
@@ -148,7 +148,7 @@ fn open_loop(plant: &Plant) -> Markup {
         vec![Cell::Text((index + 1).to_string()), Some(*pole).into(), stable.into()]
     };
     let rows: Vec<_> = plant.eigenvalues.iter().enumerate().map(row).collect();
-    table("Open loop, A", &["no.", &format!("eigenvalue{}", plane.unit()), "on its own"], &rows)
+    table("Open loop, A", ["no.", &format!("eigenvalue{}", plane.unit()), "on its own"], &rows)
 }
 
 /// Shows how the gains were found and how well conditioned the loops are.
@@ -199,7 +199,7 @@ fn weights(report: &Report) -> Markup {
         "denominator",
         "largest deviation from the table (dB)",
     ];
-    html! { @if !rows.is_empty() { (table("Weights over frequency", &heads, &rows)) } }
+    html! { @if !rows.is_empty() { (table("Weights over frequency", heads, &rows)) } }
 }
 
 /// The gains and filters for which a lower bound holds, in the table.

@@ -86,7 +86,7 @@ fn of_loop(loop_losses: &LossLoop, losses: &LossReport) -> Markup {
             }
             Err(reason) => p { strong { "The stated losses are not proven: " } (reason) "." },
         }
-        (table(&format!("Limits of the losses, {}", loop_losses.name), &heads, &limits))
+        (table(&format!("Limits of the losses, {}", loop_losses.name), heads, &limits))
         @if let Ok(proof) = &loop_losses.proof {
             @let caption = format!("Largest states for all stated losses, {}", loop_losses.name);
             (table_of(&caption, &proof.peaks, &peaks))

@@ -19,6 +19,18 @@ pub(super) fn matrices(id: &str, matrices: &[Matrix]) -> Markup {
     }
 }
 
+/// Returns a matrix whose rows and columns have the same names.
+pub(super) fn square(
+    id: &str,
+    [name, meaning]: [&str; 2],
+    names: &[String],
+    values: &[Vec<f64>],
+) -> Markup {
+    let (name, meaning) = (name.to_owned(), meaning.to_owned());
+    let (rows, columns, values) = (names.to_vec(), names.to_vec(), values.to_vec());
+    matrix(id, &Matrix { name, meaning, rows, columns, values })
+}
+
 pub(super) fn matrix(id: &str, matrix: &Matrix) -> Markup {
     let shape = format!("{} × {}", matrix.rows.len(), matrix.columns.len());
     html! {

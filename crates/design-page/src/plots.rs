@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use miniz_oxide::deflate::compress_to_vec_zlib;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Largest number of values of a page in double precision. More are in single precision, so that the page of a plant
 /// with 100 states, a million values, has less than 10 MB.
@@ -31,15 +31,20 @@ pub(super) enum Mark {
 }
 
 /// A curve: its name, and its values at the places of its plot, as many as there are places.
+#[derive(Serialize)]
+#[serde(transparent)]
 pub(super) struct Line<'a> {
     pub(super) name: String,
+    #[serde(skip)]
     pub(super) values: &'a [f64],
 }
 
-/// A plot.
+/// A plot; in the JSON it is without its numbers.
+#[derive(Serialize)]
 pub(super) struct Plot<'a> {
     /// Identifier of its place on the page.
     pub(super) id: String,
+    #[serde(rename = "axis")]
     pub(super) quantity: Quantity,
     /// Whether the vertical axis is logarithmic.
     pub(super) logarithmic: bool,
@@ -47,8 +52,10 @@ pub(super) struct Plot<'a> {
     pub(super) label: &'a str,
     /// What the plot shows, for screen readers.
     pub(super) title: String,
-    /// Times in s or frequencies in rad/s.
+    /// Times in s or frequencies in rad/s; in the JSON the number of points of each curve.
+    #[serde(rename = "points", serialize_with = "count")]
     pub(super) places: &'a [f64],
+    #[serde(rename = "curves")]
     pub(super) lines: Vec<Line<'a>>,
     pub(super) marks: Vec<Mark>,
 }
@@ -96,21 +103,18 @@ impl<'a> Plots<'a> {
         let bits = if values.len() > DOUBLE { 32 } else { 64 };
         #[expect(clippy::cast_possible_truncation, reason = "a picture needs seven digits")]
         let single = |value: &f64| (*value as f32).to_le_bytes();
+        let double = |list: &[f64]| planes(list.iter().map(|value| value.to_le_bytes()));
         let block = [
-            planes(grids[0].iter().map(|at| at.to_le_bytes())),
-            planes(grids[1].iter().map(|at| at.to_le_bytes())),
+            double(&grids[0]),
+            double(&grids[1]),
             planes(steps.iter().map(|step| step.to_le_bytes())),
-            if bits == 64 {
-                planes(values.iter().map(|value| value.to_le_bytes()))
-            } else {
-                planes(values.iter().map(single))
-            },
+            if bits == 64 { double(&values) } else { planes(values.iter().map(single)) },
         ]
         .concat();
         let data = Data {
             grids: grids.map(|grid| grid.len()),
             bits,
-            plots: self.0.iter().map(Plot::header).collect(),
+            plots: &self.0,
             block: STANDARD.encode(compress_to_vec_zlib(&block, LEVEL)),
         };
         let text = serde_json::to_string(&data).unwrap_or_default();
@@ -128,25 +132,20 @@ impl<'a> Plots<'a> {
 }
 
 impl Plot<'_> {
-    /// Returns the members of a list at the places that an axis with decades can show: those that are finite and above
-    /// 0.
+    /// Returns the members of a list at the places that an axis with decades can show.
     fn shown(&self, list: &[f64]) -> impl Iterator<Item = f64> {
-        let members = self.places.iter().zip(list);
-        members.filter(|(at, _)| **at > 0.0 && at.is_finite()).map(|(_, member)| *member)
+        let members = self.places.iter().zip(list).filter(|(at, _)| is_shown(**at));
+        members.map(|(_, member)| *member)
     }
+}
 
-    fn header(&self) -> Header<'_> {
-        Header {
-            id: &self.id,
-            axis: self.quantity,
-            logarithmic: self.logarithmic,
-            label: self.label,
-            title: &self.title,
-            points: self.shown(self.places).count(),
-            curves: self.lines.iter().map(|line| line.name.as_str()).collect(),
-            marks: &self.marks,
-        }
-    }
+/// Whether an axis with decades can show a place: whether it is finite and above 0.
+fn is_shown(at: f64) -> bool {
+    at > 0.0 && at.is_finite()
+}
+
+fn count<S: Serializer>(places: &&[f64], serializer: S) -> Result<S::Ok, S::Error> {
+    places.iter().filter(|at| is_shown(**at)).count().serialize(serializer)
 }
 
 /// The JSON of all plots.
@@ -156,22 +155,8 @@ struct Data<'a> {
     grids: [usize; 2],
     /// The bits of a value of a curve: 64 or 32.
     bits: u8,
-    plots: Vec<Header<'a>>,
+    plots: &'a [Plot<'a>],
     block: String,
-}
-
-/// A plot in the JSON, without its numbers.
-#[derive(Serialize)]
-struct Header<'a> {
-    id: &'a str,
-    axis: Quantity,
-    logarithmic: bool,
-    label: &'a str,
-    title: &'a str,
-    /// The number of points of each curve.
-    points: usize,
-    curves: Vec<&'a str>,
-    marks: &'a [Mark],
 }
 
 /// Returns the first bytes of all numbers, then the second bytes and so on.

@@ -2,14 +2,16 @@
 
 use maud::{Markup, html};
 
-use super::chart::{Chart, Size, legend, line_sample, tenth};
+use super::chart::{Chart, HORIZONTAL, VERTICAL, legend, line_sample, tenth};
 use super::number::{complex, exact};
 use super::plane::Plane;
 use super::region::boundary;
 use design_report::Region;
 use figure::axis::Axis;
 
-const SIZE: Size = Size { width: 440.0, height: 370.0 };
+/// Width and height of the frame.
+const WIDE: f64 = HORIZONTAL.1 - HORIZONTAL.0;
+const TALL: f64 = VERTICAL.0 - VERTICAL.1;
 /// Ratio of the largest to the smallest eigenvalue above which the axes are logarithmic.
 const LINEAR_UP_TO: f64 = 30.0;
 
@@ -75,9 +77,8 @@ impl Map<'_> {
     /// Returns axes that contain the unit circle and all eigenvalues.
     fn sampled_view(&self) -> (Axis, Axis) {
         let reach = self.poles().flatten().fold(1.0, |most: f64, part| most.max(part.abs()));
-        let (wide, tall) = (extent(SIZE.horizontal().into()), extent(SIZE.vertical().into()));
-        let (x, y) = (1.12 * reach * wide / tall, 1.12 * reach);
-        (Axis::exact(-x, x, SIZE.horizontal(), 5), Axis::exact(-y, y, SIZE.vertical(), 5))
+        let (x, y) = (1.12 * reach * WIDE / TALL, 1.12 * reach);
+        (Axis::exact(-x, x, HORIZONTAL, 5), Axis::exact(-y, y, VERTICAL, 5))
     }
 
     /// Returns axes of the s-plane: both with the same linear scale, or both logarithmic.
@@ -92,8 +93,8 @@ impl Map<'_> {
             let beyond = |end: f64| 2.0 * end.abs().max(knee);
             let (x, y) = ((-beyond(left), beyond(right)), (-beyond(low), beyond(high)));
             return (
-                Axis::symmetric(x, knee, SIZE.horizontal(), 9),
-                Axis::symmetric(y, knee, SIZE.vertical(), 9),
+                Axis::symmetric(x, knee, HORIZONTAL, 9),
+                Axis::symmetric(y, knee, VERTICAL, 9),
             );
         }
         if let Some(region) = self.region {
@@ -101,12 +102,11 @@ impl Map<'_> {
             let marks = [disc.0 - disc.1, disc.0 + disc.1, -region.decay.unwrap_or(0.0)];
             (left, right) = ends(marks.into_iter().chain([left, right]));
         }
-        let (wide, tall) = (extent(SIZE.horizontal().into()), extent(SIZE.vertical().into()));
-        let pixel = (1.24 * (right - left) / wide).max(2.4 * high.max(-low) / tall);
-        let (center, reach) = (f64::midpoint(left, right), 0.5 * pixel * wide);
+        let pixel = (1.24 * (right - left) / WIDE).max(2.4 * high.max(-low) / TALL);
+        let (center, reach) = (f64::midpoint(left, right), 0.5 * pixel * WIDE);
         (
-            Axis::exact(center - reach, center + reach, SIZE.horizontal(), 6),
-            Axis::exact(-0.5 * pixel * tall, 0.5 * pixel * tall, SIZE.vertical(), 6),
+            Axis::exact(center - reach, center + reach, HORIZONTAL, 6),
+            Axis::exact(-0.5 * pixel * TALL, 0.5 * pixel * TALL, VERTICAL, 6),
         )
     }
 
@@ -125,8 +125,7 @@ impl Map<'_> {
             format!("{}: {}", group.name, poles.join(", "))
         };
         let description = self.groups.iter().map(sentence).collect::<Vec<_>>().join("; ");
-        let chart =
-            Chart { id, title, description: &description, size: SIZE, x, y, x_label, y_label };
+        let chart = Chart { id, title, description: &description, x, y, x_label, y_label };
         html! {
             figure {
                 figcaption { (title) }
@@ -206,8 +205,4 @@ fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     })
-}
-
-fn extent([first, last]: [f64; 2]) -> f64 {
-    (last - first).abs()
 }

@@ -89,7 +89,7 @@ fn controller(name: &str, case: &Reconfigured, plane: Plane) -> Markup {
                 " " strong { "Beyond their limits: " } (case.beyond_limits.join(", ")) "."
             }
         }
-        (table(&format!("Eigenvalues without {name}"), &["number", &head], &eigenvalues))
+        (table(&format!("Eigenvalues without {name}"), ["number", &head], &eigenvalues))
         (table_of(
             &format!("Commands at rest without {name}"),
             &case.commands,

@@ -106,13 +106,13 @@ fn disks(robustness: &Robustness) -> Markup {
         rows.push(disk_cells(&format!("all at the {}", point.point), &point.together));
         rows.extend(point.channels.iter().map(|channel| disk_cells(&channel.name, &channel.disk)));
     }
-    let heads: Vec<&str> = std::iter::once("channel").chain(DISK).collect();
+    let heads = std::iter::once("channel").chain(DISK);
     html! {
         p {
             "Each factor of the disk (1 + δα/2) / (1 − δα/2), |δ| < 1, may multiply a channel: gain \
              and phase change together. For all channels the factors are independent of each other."
         }
-        (table("Disk margins", &heads, &rows))
+        (table("Disk margins", heads, &rows))
     }
 }
 
@@ -166,7 +166,7 @@ fn noise(report: &Report, robustness: &Robustness) -> Markup {
                  times √s."
             }
         }
-        (table("Assumed noise", &["measurement", "noise"], &assumed))
+        (table("Assumed noise", ["measurement", "noise"], &assumed))
         (table_of("Under all noises", &robustness.noise_together, &columns))
         (matrices("noise-each", std::slice::from_ref(&robustness.noise)))
     }
@@ -219,19 +219,18 @@ fn parameters(report: &Report, robustness: &Robustness) -> Markup {
         [first[at].0.as_str().into(), value].into_iter().chain(effects).collect()
     };
     let rows: Vec<Vec<Cell>> = order.iter().take(SHOWN).map(row).collect();
-    let points = robustness
+    let changes: Vec<_> = robustness
         .sensitivity
         .iter()
-        .map(|sensitivity| format!("change at the {}", sensitivity.point));
-    let heads: Vec<String> =
-        ["entry", "value"].into_iter().map(str::to_owned).chain(points).collect();
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+        .map(|sensitivity| format!("change at the {}", sensitivity.point))
+        .collect();
+    let heads = ["entry", "value"].into_iter().chain(changes.iter().map(String::as_str));
     html! {
         p {
             "The change of the judged peak of S for a change of one entry of the plant by +1 %, to \
              first order; the " (rows.len()) " entries with the largest effect."
         }
-        (table("Sensitivity of the peaks of S", &heads, &rows))
+        (table("Sensitivity of the peaks of S", heads, &rows))
         @for (index, sensitivity) in robustness.sensitivity.iter().enumerate() {
             p { "At the " (sensitivity.point) ", for a change by 100 %:" }
             (matrices(&format!("sensitivity-of-{}", index + 1), &sensitivity.matrices))
@@ -320,6 +319,6 @@ fn limits(all: &[Parameter]) -> Markup {
             "The last two columns: change of the judged peak of S while the parameter goes from its \
              value to a limit, to first order."
         }
-        (table("Parameters of the FMU", &heads, &rows))
+        (table("Parameters of the FMU", heads, &rows))
     }
 }

@@ -71,7 +71,12 @@ impl Cell {
 
 /// Returns a table whose first column names its rows. Other columns without a value are left out; a table without rows
 /// is empty.
-pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
+pub(super) fn table<'a>(
+    caption: &str,
+    heads: impl IntoIterator<Item = &'a str>,
+    rows: &[Vec<Cell>],
+) -> Markup {
+    let heads: Vec<&str> = heads.into_iter().collect();
     let filled = |column: usize| rows.iter().any(|row| !matches!(row[column], Cell::Missing));
     let is_number = |cell: &Cell| matches!(cell, Cell::Number(_) | Cell::Complex(_));
     let numeric = |column: usize| rows.iter().any(|row| is_number(&row[column]));
@@ -119,7 +124,7 @@ pub(super) fn table_of<'a, T: 'a, const N: usize>(
 ) -> Markup {
     let heads = columns.map(|(head, _)| head);
     let row = |item: &T| columns.iter().map(|(_, cell)| cell(item)).collect();
-    table(caption, &heads, &items.into_iter().map(row).collect::<Vec<_>>())
+    table(caption, heads, &items.into_iter().map(row).collect::<Vec<_>>())
 }
 
 /// A name with its unit, if there is one.
