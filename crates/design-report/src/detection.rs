@@ -61,7 +61,7 @@ impl ParameterCases {
 }
 
 /// A test of the residuals.
-#[derive(Serialize, JsonSchema)]
+#[derive(Default, Serialize, JsonSchema)]
 pub struct Test {
     /// The fault that it is for, or `all`.
     pub name: String,

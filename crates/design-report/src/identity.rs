@@ -1,7 +1,7 @@
 //! The identity of a design: the text with which a file names the plant that it was written for.
 
 use crate::Report;
-use crate::robustness::{Level, Verdict};
+use crate::robustness::Verdict;
 
 /// Returns `aso-ftc design for NAME (NUMBER)`: the name of the plant file and a number from the
 /// names of states, actuators and measurements. Designs of the same plant with other requirements or
@@ -22,14 +22,12 @@ pub fn identity(report: &Report) -> String {
     format!("aso-ftc design for {} ({hash:016x})", printable(&report.plant_file))
 }
 
-/// Returns the comment at the start of a design file: identity, verdict, and the reasons of one that is not green.
+/// Returns the comment at the start of a design file: identity, verdict and its reasons.
 #[must_use]
 pub fn heading(identity: &str, verdict: &Verdict) -> String {
     let mut text = format!("# Written by {identity}.\n# Verdict: {}.\n", verdict.level.word());
-    if verdict.level != Level::Green {
-        for reason in &verdict.reasons {
-            text.extend(["# - ", &printable(reason), "\n"]);
-        }
+    for reason in &verdict.reasons {
+        text.extend(["# - ", &printable(reason), "\n"]);
     }
     text
 }

@@ -444,7 +444,7 @@ pub struct StepResponse {
 }
 
 /// The response of the loop to a step of a reference, from rest, without faults and limits.
-#[derive(Serialize, JsonSchema)]
+#[derive(Default, Serialize, JsonSchema)]
 pub struct ReferenceStep {
     /// The reference.
     pub reference: String,
@@ -477,7 +477,7 @@ pub struct ReferenceStep {
 }
 
 /// The extremes of a command after a step of a reference.
-#[derive(Serialize, JsonSchema)]
+#[derive(Default, Serialize, JsonSchema)]
 pub struct CommandPeak {
     /// The actuator.
     pub name: String,

@@ -18,10 +18,10 @@ pub fn rounded(value: f64) -> String {
     }
     let scientific = format!("{value:.4e}");
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
-    match exponent {
-        "-4" | "-3" | "-2" | "-1" | "0" | "1" | "2" | "3" | "4" | "5" => {
-            let decimals = 4 - exponent.parse::<i32>().unwrap_or(0);
-            trimmed(&format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))).to_owned()
+    match exponent.parse::<i32>() {
+        Ok(power @ -4..=5) => {
+            let decimals = usize::try_from(4 - power).unwrap_or(0);
+            trimmed(&format!("{value:.decimals$}")).to_owned()
         }
         _ => format!("{}e{exponent}", trimmed(mantissa)),
     }

@@ -259,7 +259,7 @@ pub struct VaryingEntries {
 }
 
 /// Stability while the parameters of the plant vary within their tolerances.
-#[derive(Serialize, JsonSchema)]
+#[derive(Default, Serialize, JsonSchema)]
 pub struct ToleranceResult {
     /// Number of entries that vary; 0 if `parameters` vary.
     pub entries: u32,
