@@ -43,8 +43,8 @@ pub(crate) struct Detection {
 }
 
 /// A filter with the tests of its residuals.
-struct Part {
-    decoupling: Decoupling,
+struct Part<'a> {
+    decoupling: Decoupling<'a>,
     tests: Vec<PlannedTest>,
 }
 
@@ -69,9 +69,7 @@ pub(crate) fn detection(
     designed: &Designed,
     family: Option<&ParameterFamily<'_>>,
 ) -> Result<Option<Detection>, crate::Error> {
-    let Some(request) = &file.detection else {
-        return Ok(None);
-    };
+    let Some(request) = &file.detection else { return Ok(None) };
     check_plants(file, request)?;
     let problem = Problem::new(file, request, &designed.nominal)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
@@ -114,22 +112,22 @@ struct Planner<'a> {
     errors: Option<&'a ModelErrors<'a>>,
 }
 
-impl Planner<'_> {
+impl<'a> Planner<'a> {
     /// With isolation each fault has a filter and a test, without there is one filter: by CUSUM it has a test for each
     /// fault, by chi-square one test for all.
-    fn parts(&self) -> Result<Vec<Part>, crate::Error> {
+    fn parts(&self) -> Result<Vec<Part<'a>>, crate::Error> {
         let Self { file, request, problem, .. } = *self;
         let q = problem.faults.len();
         let base = problem.base(file)?;
-        let shifts = problem.shifts(file, &base)?;
+        let shifts = base.shifts(file)?;
         let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
         if request.isolation {
             let part = |fault: usize| {
                 let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
-                let decoupling = problem.isolating(&base, fault, &others, shifts[fault]);
+                let decoupling = base.isolating(fault, &others, shifts[fault]);
                 let decoupling = decoupling.map_err(refuse)?;
                 let test = self.plan(&decoupling, &[fault], q)?;
-                let reacts = reacting(problem, &decoupling, &test, fault).map_err(refuse)?;
+                let reacts = reacting(&decoupling, &test, fault).map_err(refuse)?;
                 Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
             };
             return (0..q).map(part).collect();
@@ -147,14 +145,14 @@ impl Planner<'_> {
     /// Plans the test for some faults, one of `count` tests that share the rate of false alarms.
     fn plan(
         &self,
-        decoupling: &Decoupling,
+        decoupling: &Decoupling<'_>,
         faults: &[usize],
         count: usize,
     ) -> Result<PlannedTest, crate::Error> {
         let Self { file, request, problem, errors } = *self;
         let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
         let bias = |rows: &DMatrix<f64>| match errors {
-            Some(errors) => errors.largest_mean(problem, decoupling, rows),
+            Some(errors) => errors.largest_mean(decoupling, rows),
             None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
         };
         #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
@@ -167,7 +165,7 @@ impl Planner<'_> {
         let rows = decoupling.filter.generator.c.nrows();
         match request.method {
             Method::Cusum => {
-                let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]));
+                let mean = decoupling.steady_mean(problem.fault_at(faults[0]));
                 let mean = mean.map_err(refuse)?;
                 let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
                 let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
@@ -180,7 +178,7 @@ impl Planner<'_> {
                 Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
             }
             Method::ChiSquare { window } => {
-                let means = |&fault: &usize| problem.means(decoupling, problem.fault_at(fault));
+                let means = |&fault: &usize| decoupling.means(problem.fault_at(fault));
                 let means: Result<Vec<_>, _> = faults.iter().map(means).collect();
                 let means = means.map_err(refuse)?;
                 let count = u32::try_from(rows).unwrap_or(u32::MAX);
@@ -202,13 +200,13 @@ impl Planner<'_> {
 
 /// Returns for each fault whether the test for the fault `tested` reacts to it.
 fn reacting(
-    problem: &Problem,
-    decoupling: &Decoupling,
+    decoupling: &Decoupling<'_>,
     test: &PlannedTest,
     tested: usize,
 ) -> Result<Vec<bool>, control::Error> {
+    let problem = decoupling.problem;
     let peak = |fault: usize| {
-        let means = problem.means(decoupling, problem.fault_at(fault))?;
+        let means = decoupling.means(problem.fault_at(fault))?;
         Ok(largest(&(&test.rows * means)))
     };
     let least = INSENSITIVE * peak(tested)?;
@@ -226,14 +224,14 @@ fn largest(means: &DMatrix<f64>) -> f64 {
 }
 
 /// Returns all tests, each with the filter that it belongs to.
-fn tests(parts: &[Part]) -> impl Iterator<Item = (&Decoupling, &PlannedTest)> {
+fn tests<'a>(parts: &'a [Part<'a>]) -> impl Iterator<Item = (&'a Decoupling<'a>, &'a PlannedTest)> {
     parts.iter().flat_map(|part| part.tests.iter().map(|test| (&part.decoupling, test)))
 }
 
 fn report(
     request: &DetectionRequest,
     problem: &Problem,
-    parts: &[Part],
+    parts: &[Part<'_>],
     parameter_cases: Option<ParameterCases>,
     warnings: &mut Vec<String>,
 ) -> Result<Report, control::Error> {
@@ -241,14 +239,14 @@ fn report(
     let mut structure = DMatrix::zeros(tests(parts).count(), q);
     for (at, (decoupling, test)) in tests(parts).enumerate() {
         for fault in 0..q {
-            let means = problem.means(decoupling, problem.fault_at(fault))?;
+            let means = decoupling.means(problem.fault_at(fault))?;
             structure[(at, fault)] = largest(&(&test.rows * means));
         }
     }
-    let reported = tests(parts).map(|(decoupling, test)| test_report(problem, decoupling, test));
+    let reported = tests(parts).map(|(decoupling, test)| test_report(decoupling, test));
     let reported = reported.collect::<Result<Vec<_>, _>>()?;
     let within = request.delay.unwrap_or(10.0 / problem.rate);
-    let faults = (0..q).filter_map(|fault| fault_report(problem, parts, fault, within).transpose());
+    let faults = (0..q).map(|fault| fault_report(problem, parts, fault, within));
     let reacts: Vec<Vec<bool>> = tests(parts).map(|(_, test)| test.reacts.clone()).collect();
     let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
     let faults = faults.collect::<Result<Vec<_>, _>>()?;
@@ -262,9 +260,12 @@ fn report(
         }
         .to_owned(),
         sample_time: problem.period,
-        from: match request.from {
-            Some(from) => from,
-            None => SETTLING / problem.slowest_decay(parts.iter().map(|part| &part.decoupling))?,
+        from: if let Some(from) = request.from {
+            from
+        } else {
+            let decays = parts.iter().map(|part| part.decoupling.decay());
+            SETTLING
+                / decays.collect::<Result<Vec<_>, _>>()?.into_iter().fold(f64::INFINITY, f64::min)
         },
         false_alarm_interval: 1.0 / rate,
         noise: request.noise.clone(),
@@ -284,13 +285,10 @@ fn report(
     })
 }
 
-fn test_report(
-    problem: &Problem,
-    decoupling: &Decoupling,
-    test: &PlannedTest,
-) -> Result<Test, control::Error> {
+fn test_report(decoupling: &Decoupling<'_>, test: &PlannedTest) -> Result<Test, control::Error> {
+    let problem = decoupling.problem;
     let decoupled = |&(input, exact): &(usize, bool)| {
-        let means = problem.means(decoupling, input)?;
+        let means = decoupling.means(input)?;
         Ok(DecoupledInput {
             name: problem.names[input].clone(),
             exact,
@@ -311,37 +309,35 @@ fn test_report(
     })
 }
 
-/// Predicts the detection of a fault by the test that is for it; None if there is no such test.
+/// Predicts the detection of a fault by the test that is for it.
 fn fault_report(
     problem: &Problem,
-    parts: &[Part],
+    parts: &[Part<'_>],
     fault: usize,
     within: f64,
-) -> Result<Option<DetectedFault>, control::Error> {
+) -> Result<DetectedFault, control::Error> {
     let (input, period) = (problem.fault_at(fault), problem.period);
     let name = &problem.names[input];
     // One test for each fault, or one for all.
-    let position = if tests(parts).count() == 1 { 0 } else { fault };
-    let Some((decoupling, test)) = tests(parts).nth(position) else {
-        return Ok(None);
-    };
-    let means = &test.rows * problem.means(decoupling, input)?;
+    let tests: Vec<_> = tests(parts).collect();
+    let (decoupling, test) = tests[if tests.len() == 1 { 0 } else { fault }];
+    let means = &test.rows * decoupling.means(input)?;
     let prediction = Prediction { kind: &test.kind, means: &means, period };
     let delay = prediction.delay(1.0);
     let size = problem.sizes[input].unwrap_or(1.0);
-    Ok(Some(DetectedFault {
+    Ok(DetectedFault {
         fault: name.clone(),
         unit: problem.units[fault].clone(),
         size,
         test: test.name.clone(),
-        mean: (&test.rows * problem.steady_mean(decoupling, input)?).norm(),
+        mean: (&test.rows * decoupling.steady_mean(input)?).norm(),
         // A fault starts between two samples: half a sample before the first one with it, on average.
         delay: delay.mean().map(|samples| (samples - 0.5) * period),
         #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
         delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
         within,
         least: prediction.least(within).map(|factor| factor * size),
-    }))
+    })
 }
 
 /// Warns of faults that no test tells apart, of parameters that are worst within their limits, and of disturbances that
@@ -418,17 +414,7 @@ mod tests {
             (Some(1.5), None, "; its drift allows for the largest"),
             (None, Some(8), "; its threshold allows for the largest"),
         ] {
-            let test = Test {
-                name: "f_u1".to_owned(),
-                residuals: 1,
-                drift,
-                window,
-                model_error: 1.0,
-                interior_excess: Some(0.1),
-                threshold: 5.0,
-                false_alarm_interval: 1e4,
-                decoupled: Vec::new(),
-            };
+            let test = Test { drift, window, interior_excess: Some(0.1), ..Test::default() };
             let mut warnings = Vec::new();
             warn(&[test], &[], &mut warnings);
             assert!(warnings.len() == 1 && warnings[0].contains(part), "{warnings:?}");

@@ -20,32 +20,28 @@ const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
 #[derive(Clone)]
-pub(super) struct Decoupling {
+pub(super) struct Decoupling<'a> {
+    pub(super) problem: &'a Problem,
     pub(super) filter: DetectionFilter,
     /// The number of states of the plant with the random walks.
-    pub(super) states: usize,
+    states: usize,
     /// Each decoupled input, and whether it is decoupled exactly.
     pub(super) inputs: Vec<(usize, bool)>,
 }
 
-impl Decoupling {
+impl<'a> Decoupling<'a> {
     /// Returns the filter that decouples nothing.
-    pub(super) fn without(problem: &Problem) -> Result<Self, Error> {
+    pub(super) fn without(problem: &'a Problem) -> Result<Self, Error> {
         let decoupling = attempt(problem, Vec::new())?;
         decoupling
             .ok_or(Error::NotConverged { what: "the filter without unknown inputs", iterations: 0 })
     }
 
     /// Returns the filter that also decouples `input`, exactly or as a random walk; None if there is none.
-    pub(super) fn with(
-        &self,
-        problem: &Problem,
-        input: usize,
-        exact: bool,
-    ) -> Result<Option<Self>, Error> {
+    fn with(&self, input: usize, exact: bool) -> Result<Option<Self>, Error> {
         let mut inputs = self.inputs.clone();
         inputs.push((input, exact));
-        match attempt(problem, inputs) {
+        match attempt(self.problem, inputs) {
             Err(Error::NotDetectable { .. } | Error::Unweighted { .. }) => Ok(None),
             other => other,
         }
@@ -54,9 +50,78 @@ impl Decoupling {
     pub(super) fn has(&self, input: usize) -> bool {
         self.inputs.iter().any(|(decoupled, _)| *decoupled == input)
     }
+
+    /// Returns for each fault the length of the steady mean of the residuals after a step by its size; an error names a
+    /// fault whose steady mean is negligible.
+    pub(super) fn shifts(&self, file: &PlantFile<'_>) -> Result<Vec<f64>, crate::Error> {
+        let place = |fault: usize| &file.faults[fault].place;
+        let shift = |fault: usize| {
+            let refuse = |error: Error| file.error_at(place(fault), error.to_string());
+            let at = self.problem.fault_at(fault);
+            let steady = self.steady_mean(at).map_err(refuse)?.norm();
+            let means = self.means(at).map_err(refuse)?;
+            if steady <= NO_TRACE * largest(&means) || steady <= 0.0 {
+                let name = &self.problem.names[at];
+                let message = format!(
+                    "a constant fault `{name}` leaves no trace in the residuals: the measurements cannot \
+                     tell it from the disturbances or from a motion of the states"
+                );
+                return Err(file.error_at(place(fault), message).into());
+            }
+            Ok(steady)
+        };
+        self.problem.faults.clone().map(shift).collect()
+    }
+
+    /// Returns the filter for `fault`: this one that also decouples each of `others` in turn, exactly or else as a random
+    /// walk, except those whose decoupling leaves no trace of `fault`. `shift`: the length of the steady mean of
+    /// `fault` in this filter.
+    pub(super) fn isolating(
+        &self,
+        fault: usize,
+        others: &[usize],
+        shift: f64,
+    ) -> Result<Self, Error> {
+        let problem = self.problem;
+        let mut decoupling = self.clone();
+        for &other in others {
+            for exact in [true, false] {
+                let next = decoupling.with(problem.fault_at(other), exact)?;
+                let Some(next) = next else { continue };
+                if next.steady_mean(problem.fault_at(fault))?.norm() > NO_TRACE * shift {
+                    decoupling = next;
+                    break;
+                }
+            }
+        }
+        Ok(decoupling)
+    }
+
+    fn effect(&self, input: usize) -> Result<StateSpace, Error> {
+        self.filter.effect(&self.problem.inputs[input].extended(self.states))
+    }
+
+    /// Returns the mean of the residuals long after a step of an input by its size.
+    pub(super) fn steady_mean(&self, input: usize) -> Result<DVector<f64>, Error> {
+        let size = self.problem.sizes[input].unwrap_or(1.0);
+        Ok(mean_of_constant(&self.effect(input)?, self.problem.period)? * size)
+    }
+
+    /// Returns the means of the residuals, residuals x samples, after a step of an input by its size, until they are
+    /// settled; at least 2 and at most [`MOST_SAMPLES`] samples.
+    pub(super) fn means(&self, input: usize) -> Result<DMatrix<f64>, Error> {
+        let (size, period) = (self.problem.sizes[input].unwrap_or(1.0), self.problem.period);
+        let samples = whole(SETTLED / (self.decay()? * period)).clamp(2, MOST_SAMPLES);
+        Ok(mean_after_step(&self.effect(input)?, period, samples)? * size)
+    }
+
+    /// Returns the decay rate in 1/s of the slowest eigenvalue of the filter.
+    pub(super) fn decay(&self) -> Result<f64, Error> {
+        self.problem.decay(&self.filter.generator.a)
+    }
 }
 
-fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decoupling>, Error> {
+fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decoupling<'_>>, Error> {
     let mut plant = problem.plant.clone();
     for &(input, _) in inputs.iter().filter(|(_, exact)| !exact) {
         // The random walk moves by the size of the input within a time constant of the loop.
@@ -72,13 +137,13 @@ fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decou
         .map(|(input, _)| problem.inputs[*input].extended(states))
         .collect();
     let filter = detection_filter(&plant, &exact)?;
-    Ok(filter.map(|filter| Decoupling { filter, states, inputs }))
+    Ok(filter.map(|filter| Decoupling { problem, filter, states, inputs }))
 }
 
 impl Problem {
     /// Returns the filter for all faults, which decouples each disturbance, exactly if possible, otherwise as a random
     /// walk by its bound. An error names a disturbance that cannot be decoupled.
-    pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling, crate::Error> {
+    pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling<'_>, crate::Error> {
         let refuse = |error: Error| {
             let request = file.detection.as_ref();
             let stated = request.and_then(|request| request.process_noise.as_ref());
@@ -100,7 +165,7 @@ impl Problem {
         };
         let mut decoupling = Decoupling::without(self).map_err(refuse)?;
         for (input, disturbance) in file.disturbances.iter().enumerate() {
-            if let Some(next) = decoupling.with(self, input, true).map_err(refuse)? {
+            if let Some(next) = decoupling.with(input, true).map_err(refuse)? {
                 decoupling = next;
                 continue;
             }
@@ -113,7 +178,7 @@ impl Problem {
                 );
                 return Err(file.error_at(&disturbance.place, message).into());
             }
-            decoupling = decoupling.with(self, input, false).map_err(refuse)?.ok_or_else(|| {
+            decoupling = decoupling.with(input, false).map_err(refuse)?.ok_or_else(|| {
                 let message = format!(
                     "the measurements cannot tell disturbance `{}` from a motion of the states, or no \
                      residual is left without it; expected more measurements, or fewer disturbances",
@@ -123,92 +188,5 @@ impl Problem {
             })?;
         }
         Ok(decoupling)
-    }
-
-    /// Returns for each fault the length of the steady mean of the residuals of `base` after a step by its size; an
-    /// error names a fault whose steady mean is negligible.
-    pub(super) fn shifts(
-        &self,
-        file: &PlantFile<'_>,
-        base: &Decoupling,
-    ) -> Result<Vec<f64>, crate::Error> {
-        let place = |fault: usize| &file.faults[fault].place;
-        let shift = |fault: usize| {
-            let refuse = |error: Error| file.error_at(place(fault), error.to_string());
-            let at = self.fault_at(fault);
-            let steady = self.steady_mean(base, at).map_err(refuse)?.norm();
-            let means = self.means(base, at).map_err(refuse)?;
-            if steady <= NO_TRACE * largest(&means) || steady <= 0.0 {
-                let name = &self.names[at];
-                let message = format!(
-                    "a constant fault `{name}` leaves no trace in the residuals: the measurements cannot \
-                     tell it from the disturbances or from a motion of the states"
-                );
-                return Err(file.error_at(place(fault), message).into());
-            }
-            Ok(steady)
-        };
-        self.faults.clone().map(shift).collect()
-    }
-
-    /// Returns the filter for `fault`: `base` that also decouples each of `others` in turn, exactly or else as a random
-    /// walk, except those whose decoupling leaves no trace of `fault`. `shift`: the length of the steady mean of
-    /// `fault` in `base`.
-    pub(super) fn isolating(
-        &self,
-        base: &Decoupling,
-        fault: usize,
-        others: &[usize],
-        shift: f64,
-    ) -> Result<Decoupling, Error> {
-        let mut decoupling = base.clone();
-        for &other in others {
-            for exact in [true, false] {
-                let next = decoupling.with(self, self.fault_at(other), exact)?;
-                let Some(next) = next else { continue };
-                if self.steady_mean(&next, self.fault_at(fault))?.norm() > NO_TRACE * shift {
-                    decoupling = next;
-                    break;
-                }
-            }
-        }
-        Ok(decoupling)
-    }
-
-    fn effect(&self, decoupling: &Decoupling, input: usize) -> Result<StateSpace, Error> {
-        decoupling.filter.effect(&self.inputs[input].extended(decoupling.states))
-    }
-
-    /// Returns the mean of the residuals long after a step of an input by its size.
-    pub(super) fn steady_mean(
-        &self,
-        decoupling: &Decoupling,
-        input: usize,
-    ) -> Result<DVector<f64>, Error> {
-        let size = self.sizes[input].unwrap_or(1.0);
-        Ok(mean_of_constant(&self.effect(decoupling, input)?, self.period)? * size)
-    }
-
-    /// Returns the means of the residuals, residuals x samples, after a step of an input by its size, until they are
-    /// settled; at least 2 and at most [`MOST_SAMPLES`] samples.
-    pub(super) fn means(
-        &self,
-        decoupling: &Decoupling,
-        input: usize,
-    ) -> Result<DMatrix<f64>, Error> {
-        let size = self.sizes[input].unwrap_or(1.0);
-        let decay = self.decay(&decoupling.filter.generator.a)?;
-        let samples = whole(SETTLED / (decay * self.period)).clamp(2, MOST_SAMPLES);
-        Ok(mean_after_step(&self.effect(decoupling, input)?, self.period, samples)? * size)
-    }
-
-    /// Returns the decay rate in 1/s of the slowest of some filters.
-    pub(super) fn slowest_decay<'a>(
-        &self,
-        filters: impl Iterator<Item = &'a Decoupling>,
-    ) -> Result<f64, Error> {
-        filters
-            .map(|decoupling| self.decay(&decoupling.filter.generator.a))
-            .try_fold(f64::INFINITY, |least, decay| Ok(least.min(decay?)))
     }
 }

@@ -13,7 +13,7 @@ use crate::solve::solution::Solution;
 /// tests start.
 pub(super) fn section(
     problem: &Problem,
-    parts: &[Part],
+    parts: &[Part<'_>],
     from: f64,
     designed: &Solution,
 ) -> DetectionDesign {
@@ -54,10 +54,7 @@ pub(super) fn section(
     };
     let fault = |fault| problem.names[problem.fault_at(fault)].clone();
     DetectionDesign {
-        sample_time: match designed.domain {
-            Domain::Continuous => Some(problem.period),
-            Domain::Sampled { .. } => None,
-        },
+        sample_time: (designed.domain == Domain::Continuous).then_some(problem.period),
         from,
         a: matrix(&a),
         b_u: matrix(&b_u),

@@ -12,7 +12,6 @@ use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
 use crate::assess::detection::decoupling::Decoupling;
-use crate::assess::detection::problem::Problem;
 use crate::plant::delays::with_delays;
 use crate::plant::entries::tolerances;
 use crate::plant::linear::LinearPlant;
@@ -103,13 +102,12 @@ impl<'a> ModelErrors<'a> {
     /// largest bound of the plants that were tried at the corners and within.
     pub(super) fn largest_mean(
         &self,
-        problem: &Problem,
-        decoupling: &Decoupling,
+        decoupling: &Decoupling<'_>,
         rows: &DMatrix<f64>,
     ) -> Result<LargestMean, crate::Error> {
         let scale = match self.domain {
             Domain::Sampled { .. } => 1.0,
-            Domain::Continuous => problem.period.sqrt(),
+            Domain::Continuous => decoupling.problem.period.sqrt(),
         };
         let scale = scale * self.request.margin;
         let Some(family) = self.parameters else {
@@ -166,7 +164,7 @@ impl<'a> ModelErrors<'a> {
         &self,
         plant: &UncertainPlant,
         bounds: &DVector<f64>,
-        decoupling: &Decoupling,
+        decoupling: &Decoupling<'_>,
         rows: &DMatrix<f64>,
     ) -> Result<f64, crate::Error> {
         let refuse = |message: String| self.file.error_at(&self.request.place, message);
