@@ -14,7 +14,7 @@ use crate::reporting;
 use crate::solve::designed::design_by;
 use crate::solve::law::LawProblem;
 use crate::solve::solution::Solution;
-use files::{Source, Table};
+use files::Source;
 use plant_file::PlantFile;
 use plant_file::estimation::Law;
 
@@ -28,8 +28,7 @@ use plant_file::estimation::Law;
 /// Same as [`crate::design()`], for the augmented observer and for each law that exists.
 pub fn compare(path: &Path) -> Result<Comparison, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
-    let parsed = source.parse()?;
-    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let file = PlantFile::read(&source)?;
     let family = ParameterFamily::of(&file)?;
     let file = bandwidths::chosen(&file, &TimeLimits::default().of_gains())?;
     let base = design_by(&file, &Law::Augmented)?;
@@ -39,39 +38,33 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     for law in Law::ALL {
         let stated = file.estimation.law.name() == law.name();
         let law = if stated { file.estimation.law.clone() } else { law };
-        let mut result = LawResult {
-            law: law.name().to_owned(),
-            sources: law.sources().to_owned(),
-            reason: problem.design(&law).err(),
-            result: None,
-        };
+        let mut reason = problem.design(&law).err();
         if file.schedule.is_some() && !law.allows("schedule") {
-            result.reason = Some("it is not possible with a schedule".to_owned());
+            reason = Some("it is not possible with a schedule".to_owned());
         }
-        if result.reason.is_none() {
-            let designed = match design_by(&file, &law) {
+        let mut result = None;
+        if reason.is_none() {
+            match design_by(&file, &law) {
                 // The law may exist for the plant of the file and not at another point.
-                Err(error) if file.schedule.is_some() => {
-                    result.reason = Some(files::sentence(&error));
-                    laws.push(result);
-                    continue;
+                Err(error) if file.schedule.is_some() => reason = Some(files::sentence(&error)),
+                designed => {
+                    let (designed, steps) = (designed?, Steps::new(&|_| {}));
+                    let assessment = Assessment::new(&file, family.as_ref(), &designed, &steps);
+                    let report = reporting::report(assessment)?;
+                    plant_identity = identity(&report);
+                    result = Some(LawFigures {
+                        disk_margin: report.robustness.as_ref().and_then(|robustness| {
+                            let points = robustness.points.iter().map(|point| point.together.alpha);
+                            points.collect::<Vec<_>>().try_into().ok()
+                        }),
+                        estimation: report.estimation,
+                        verdict: report.verdict,
+                    });
                 }
-                designed => designed?,
-            };
-            let steps = Steps::new(&|_| {});
-            let assessment = Assessment::new(&file, family.as_ref(), &designed, &steps);
-            let report = reporting::report(assessment)?;
-            plant_identity = identity(&report);
-            result.result = Some(LawFigures {
-                disk_margin: report.robustness.as_ref().and_then(|robustness| {
-                    let points = robustness.points.iter().map(|point| point.together.alpha);
-                    points.collect::<Vec<_>>().try_into().ok()
-                }),
-                estimation: report.estimation,
-                verdict: report.verdict,
-            });
+            }
         }
-        laws.push(result);
+        let (name, sources) = (law.name().to_owned(), law.sources().to_owned());
+        laws.push(LawResult { law: name, sources, reason, result });
     }
     let model = file.fmu().map(Path::to_owned);
     Ok(Comparison { plant_file: file.name(), laws, identity: plant_identity, model })

@@ -268,23 +268,17 @@ fn per_second(unit: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
     use crate::solve::designed::design;
+    use crate::tests::read;
 
     /// The experiment of a loop that settles in one sample of 0.1 s, with `more` in its plant file.
     fn experiment(more: &str) -> Result<Defaults, String> {
         let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
                     sample_time = 0.1\nfeedback.sampled_eigenvalues = [1e-6]\n\
                     observer.sampled_eigenvalues = [0.5, 0.6]\n";
-        let source = Source::new(Path::new("plant.toml"), text.to_owned() + more);
-        let parsed = source.parse().unwrap();
-        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
-        let designed = design(&file).map_err(|error| error.to_string())?;
-        designed.nominal.experiment(&file).map_err(|error| error.to_string())
+        let experiment = |file: &PlantFile<'_>| design(file)?.nominal.experiment(file);
+        read(&(text.to_owned() + more), experiment).unwrap().map_err(|error| error.to_string())
     }
 
     /// The controller FMU needs more than one step.

@@ -8,7 +8,7 @@ mod mat;
 
 use std::path::{Path, PathBuf};
 
-use files::{Source, Table};
+use files::Source;
 
 use crate::Error;
 use crate::assess::bandwidths;
@@ -130,8 +130,7 @@ fn attempts(draft: &Draft) -> Vec<Settings> {
 /// Returns the bandwidths that the design of a plant file without requirements has.
 fn bandwidths(path: &Path, text: &str, budget: &Budget) -> Result<Option<Bandwidths>, Error> {
     let source = Source::new(path, text.to_owned());
-    let parsed = source.parse()?;
-    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let file = PlantFile::read(&source)?;
     let file = bandwidths::chosen(&file, budget)?;
     let both = file.feedback.bandwidth().zip(file.observer.bandwidth());
     Ok(both.map(|(feedback, observer)| Bandwidths { feedback, observer }))

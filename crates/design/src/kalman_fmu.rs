@@ -141,23 +141,17 @@ fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
+    use crate::tests::read;
 
     /// The factor for a measurement with this noise, of the relative variance 4.
     fn factor(stated: &str) -> Option<f64> {
         let text =
             "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\nrobustness.noise = ";
-        let source = Source::new(Path::new("plant.toml"), format!("{text}{stated}\n"));
-        let parsed = source.parse().unwrap();
-        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
         let [one, four] = [1.0, 4.0].map(|value| DMatrix::from_element(1, 1, value));
         let noise =
             Noise { process: one.clone(), measurements: four, covariance: one, is_relative: true };
-        scale(&file, &noise)
+        read(&format!("{text}{stated}\n"), |file| scale(file, &noise)).unwrap()
     }
 
     #[test]

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 
 use aso_controller::kalman::KalmanDesign;
 use control::robustness::Loop;
-use files::{PlaceError, Source, Table};
+use files::{PlaceError, Source};
 
 pub use budget::TimeLimits;
 pub use compare::compare;
@@ -116,8 +116,7 @@ pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
 }
 
 fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Result<Design, Error> {
-    let parsed = source.parse()?;
-    let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
+    let file = PlantFile::read(source)?;
     let family = ParameterFamily::of(&file)?;
     let budget = limits.of_gains();
     let file = bandwidths::chosen(&file, &budget)?;

@@ -15,7 +15,7 @@ use crate::budget::TimeLimits;
 use crate::report::Report;
 use crate::report::robustness::Level;
 use crate::solve::designed::{Designed, design};
-use files::{Source, Table};
+use files::Source;
 use plant_file::channel::Channel;
 use plant_file::faults::{EntryPoint, FaultDynamics};
 use plant_file::requirements::{Bandwidth, Region, Requirement};
@@ -275,10 +275,10 @@ const REFUSALS: [(&str, &str, &str); 66] = [
     ),
 ];
 
-fn read<T>(text: &str, look: impl Fn(&PlantFile<'_>) -> T) -> Result<T, String> {
+/// Reads a plant file, and returns what `look` sees in it.
+pub(crate) fn read<T>(text: &str, look: impl FnOnce(&PlantFile<'_>) -> T) -> Result<T, String> {
     let source = Source::new(Path::new("plant.toml"), text.to_owned());
-    let parsed = source.parse().map_err(|error| error.to_string())?;
-    let file = PlantFile::read(&source, &Table::whole(&source, &parsed));
+    let file = PlantFile::read(&source);
     file.map(|file| look(&file)).map_err(|error| error.to_string())
 }
 

@@ -226,8 +226,7 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
 /// plant.
 pub(crate) fn disturbances(
     file: &Table<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
+    signals: [&[Signal]; 2],
     model: &Model,
 ) -> Result<Vec<Disturbance>> {
     let Some(entry) = file.get("disturbances") else { return Ok(Vec::new()) };
@@ -236,7 +235,7 @@ pub(crate) fn disturbances(
     }
     let mut all: Vec<Disturbance> = Vec::new();
     for member in entry.list()? {
-        let mut stated = disturbance(file, &member, actuators, measurements)?;
+        let mut stated = disturbance(file, &member, signals)?;
         if let (DisturbanceEntry::Column(e), Model::Matrices { sampled: Some(sampled), .. }) =
             (&mut stated.entry_point, model)
         {
@@ -254,8 +253,7 @@ pub(crate) fn disturbances(
 fn disturbance(
     file: &Table<'_>,
     entry: &Entry<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
+    [actuators, measurements]: [&[Signal]; 2],
 ) -> Result<Disturbance> {
     let table = entry.table()?;
     table.allow(&DISTURBANCE)?;

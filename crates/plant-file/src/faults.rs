@@ -86,11 +86,10 @@ const FAULT: [&str; 13] = [
 
 /// Reads all faults: those of `actuator_faults`, "all" or names, then those of `[[faults]]`; without `[[faults]]` one
 /// fault for each column of `F_a`, named f1, f2 and so on. An error if there is no fault.
-pub(crate) fn all_faults(
-    file: &Table<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-) -> Result<Vec<Fault>> {
+///
+/// `signals`: actuators and measurements.
+pub(crate) fn all_faults(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<Vec<Fault>> {
+    let [actuators, _] = signals;
     let mut all = Vec::new();
     if let Some(entry) = file.get("actuator_faults") {
         let fault = |at: usize| Fault {
@@ -103,7 +102,7 @@ pub(crate) fn all_faults(
         all.extend(positions(&entry, actuators, "actuator")?.into_iter().map(fault));
     }
     if let Some(entry) = file.get("faults") {
-        all.extend(faults(&entry, actuators, measurements)?);
+        all.extend(faults(&entry, signals)?);
     } else if let Some(entry) = file.get("F_a") {
         let unnamed = |k: usize| Fault {
             name: format!("f{k}"),
@@ -123,7 +122,7 @@ pub(crate) fn all_faults(
 
 /// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
 /// turn.
-fn faults(entry: &Entry<'_>, actuators: &[Signal], measurements: &[Signal]) -> Result<Vec<Fault>> {
+fn faults(entry: &Entry<'_>, signals: [&[Signal]; 2]) -> Result<Vec<Fault>> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one fault"));
@@ -131,7 +130,7 @@ fn faults(entry: &Entry<'_>, actuators: &[Signal], measurements: &[Signal]) -> R
     let mut all: Vec<Fault> = Vec::with_capacity(members.len());
     for member in &members {
         let columns = all.iter().filter(|fault| matches!(fault.entry_point, EntryPoint::Column(_)));
-        let fault = fault(member, actuators, measurements, columns.count())?;
+        let fault = fault(member, signals, columns.count())?;
         if all.iter().any(|other| other.name == fault.name) {
             return Err(member.error(format!("the name `{}` is there twice", fault.name)));
         }
@@ -146,15 +145,11 @@ fn faults(entry: &Entry<'_>, actuators: &[Signal], measurements: &[Signal]) -> R
 }
 
 /// Reads a fault; without an entry point it enters by `column` of F_a, from 0.
-fn fault(
-    entry: &Entry<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-    column: usize,
-) -> Result<Fault> {
+fn fault(entry: &Entry<'_>, signals: [&[Signal]; 2], column: usize) -> Result<Fault> {
+    let [actuators, measurements] = signals;
     let table = entry.table()?;
     table.allow(&FAULT)?;
-    let entry_point = entry_point(&table, actuators, measurements, column)?;
+    let entry_point = entry_point(&table, signals, column)?;
     let signal = match entry_point {
         EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => Some(&actuators[at]),
         EntryPoint::Sensor(at) => Some(&measurements[at]),
@@ -193,8 +188,7 @@ fn dynamics(table: &Table<'_>) -> Result<FaultDynamics> {
 
 fn entry_point(
     table: &Table<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
+    [actuators, measurements]: [&[Signal]; 2],
     column: usize,
 ) -> Result<EntryPoint> {
     let keys = ["actuator", "sensor", "loss_of", "input"];

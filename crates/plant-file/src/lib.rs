@@ -165,7 +165,9 @@ impl<'a> PlantFile<'a> {
     /// # Errors
     ///
     /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(source: &'a Source, file: &Table<'a>) -> Result<Self> {
+    pub fn read(source: &'a Source) -> Result<Self> {
+        let parsed = source.parse()?;
+        let file = &Table::whole(source, &parsed);
         file.allow(&KEYS)?;
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
         let sampling = sampling(file)?;
@@ -173,13 +175,14 @@ impl<'a> PlantFile<'a> {
             Some(plant) => read_fmu_plant(source, file, &plant)?,
             None => read_matrices(file, sampling)?,
         };
-        let faults = all_faults(file, &actuators, &measurements)?;
+        let signals = [&actuators[..], &measurements[..]];
+        let faults = all_faults(file, signals)?;
         let references = References::read(file, &measurements)?;
         let domain = match sampling {
             Some(Sampling { period, .. }) => Domain::Sampled { period },
             None => Domain::Continuous,
         };
-        let loop_shape = LoopShape::read(file, [&actuators, &measurements], domain)?;
+        let loop_shape = LoopShape::read(file, signals, domain)?;
         let read = |key: &str, weights| {
             let Some(entry) = file.get(key) else { return Ok(Request::open(file.place.clone())) };
             let outputs: Vec<&str> = match key {
@@ -204,7 +207,7 @@ impl<'a> PlantFile<'a> {
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             transfer_time: positive(file, "transfer_time")?,
             filter: filter(file, &measurements, &faults)?,
-            delay_order: delay_order(file, [&actuators, &measurements])?,
+            delay_order: delay_order(file, signals)?,
             feedback,
             observer,
             loop_shape,
@@ -215,14 +218,9 @@ impl<'a> PlantFile<'a> {
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
             is_point: false,
-            disturbances: disturbances(file, &actuators, &measurements, &model)?,
+            disturbances: disturbances(file, signals, &model)?,
             detection: DetectionRequest::read(file, &actuators, measurements.len(), &faults)?,
-            reconfiguration: ReconfigurationRequest::read(
-                file,
-                &actuators,
-                &measurements,
-                &faults,
-            )?,
+            reconfiguration: ReconfigurationRequest::read(file, signals, &faults)?,
             fallback: FallbackRequest::read(file, &actuators, sampling.is_some())?,
             model,
             actuators,

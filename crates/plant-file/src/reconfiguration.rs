@@ -31,8 +31,7 @@ impl ReconfigurationRequest {
     /// Reads the table, if there is one.
     pub(crate) fn read(
         file: &Table<'_>,
-        actuators: &[Signal],
-        measurements: &[Signal],
+        [actuators, measurements]: [&[Signal]; 2],
         faults: &[Fault],
     ) -> Result<Option<Self>> {
         let Some(entry) = file.get("reconfiguration") else { return Ok(None) };

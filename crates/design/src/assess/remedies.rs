@@ -303,19 +303,11 @@ mod tests {
     use plant_file::parameters::{ParameterTolerance, Tolerance};
 
     use super::*;
+    use crate::tests::read;
 
     fn limits(parameters: Vec<ParameterTolerance>) -> RobustnessLimits {
-        RobustnessLimits {
-            tolerance: [0.1; 4],
-            entries: Vec::new(),
-            parameters,
-            cases: 0,
-            seed: 1,
-            noise: Vec::new(),
-            noise_is_stated: false,
-            amber: 2.0,
-            red: 4.0,
-        }
+        let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n";
+        read(text, |file| RobustnessLimits { parameters, ..file.robustness.clone() }).unwrap()
     }
 
     #[test]

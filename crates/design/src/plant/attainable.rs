@@ -173,11 +173,8 @@ fn is_right(value: Complex<f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
+    use crate::tests::read;
 
     /// The plant (1 - s) / (1 + s)^2. A modulus of 0.5 in 0.1 s is 6.9 rad/s, which the zero at 1 1/s does not allow.
     #[test]
@@ -185,10 +182,8 @@ mod tests {
         let count = |eigenvalues: &str| {
             let text = "A = [[0, 1], [-1, -2]]\nB = [[0], [1]]\nC = [[1, -1]]\nsample_time = 0.1\n\
                         actuator_faults = \"all\"\nfeedback.sampled_eigenvalues = ";
-            let source = Source::new(Path::new("plant.toml"), format!("{text}{eigenvalues}\n"));
-            let parsed = source.parse().unwrap();
-            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
-            warnings(&file, &LinearPlant::of(&file).unwrap()).unwrap().len()
+            let all = |file: &PlantFile<'_>| warnings(file, &LinearPlant::of(file).unwrap());
+            read(&format!("{text}{eigenvalues}\n"), all).unwrap().unwrap().len()
         };
         assert_eq!([count("[0.5, 0.5]"), count("[0, 0]")], [1, 0]);
     }

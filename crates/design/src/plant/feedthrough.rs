@@ -84,12 +84,9 @@ pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), Pl
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
     use crate::solve::designed::design;
+    use crate::tests::read;
 
     const MASS: &str = "A = [[0, 1], [-20, -1]]\nB = [[0], [2]]\nC = [[1, 0], [-20, -1]]\nD = [[0], [2]]\n\
         measurements = [\"q\", \"acceleration\"]\nactuator_faults = \"all\"\nfilter = 60\n\
@@ -98,10 +95,8 @@ mod tests {
     /// The error for `MASS` with `from` replaced by `to`.
     fn refused(from: &str, to: &str) -> String {
         assert!(MASS.contains(from), "{from}");
-        let source = Source::new(Path::new("plant.toml"), MASS.replacen(from, to, 1));
-        let parsed = source.parse().expect("a table");
-        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).expect("a plant file");
-        design(&file).err().map_or_else(|| "none".to_owned(), |error| error.to_string())
+        let error = read(&MASS.replacen(from, to, 1), |file| design(file).err());
+        error.expect("a plant file").map_or("none".to_owned(), |error| error.to_string())
     }
 
     #[test]
@@ -154,12 +149,12 @@ mod tests {
     fn the_shape_of_a_loop_with_the_feedthrough_of_an_fmu_is_refused() {
         let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\nfilter = 60\n\
                     loop.bandwidth = 1\n";
-        let source = Source::new(Path::new("plant.toml"), text.to_owned());
-        let parsed = source.parse().expect("a table");
-        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).expect("a plant file");
-        let mut linear = LinearPlant::of(&file).expect("a plant");
-        linear.d[(0, 0)] = 2.0;
-        let refusal = check(&file, &linear).expect_err("a refusal").to_string();
+        let refusal = read(text, |file| {
+            let mut linear = LinearPlant::of(file).expect("a plant");
+            linear.d[(0, 0)] = 2.0;
+            check(file, &linear).expect_err("a refusal").to_string()
+        })
+        .expect("a plant file");
         let expected = "`loop` is not possible then: expected `feedback` and `observer`";
         assert!(refusal.contains(expected), "{refusal}");
     }

@@ -551,11 +551,8 @@ pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
+    use crate::tests::read;
 
     fn row(entries: &[f64]) -> DMatrix<f64> {
         DMatrix::from_row_slice(1, entries.len(), entries)
@@ -623,13 +620,11 @@ mod tests {
                 "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
                  measurements = [{{ name = \"y\", unit = \"{stated}\" }}]\n"
             );
-            let source = Source::new(Path::new("plant.toml"), text);
-            let parsed = source.parse().unwrap();
-            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
             let (name, unit) = ("y".to_owned(), Some(unit.to_owned()));
             let output = linearise::Signal { name, unit, value: 0.0, typical: 1.0 };
-            let refusal = check_units(&file, &file.measurements, &[output]).err();
-            refusal.map(|error| error.message().to_owned())
+            let refusal =
+                read(&text, |file| check_units(file, &file.measurements, &[output]).err());
+            refusal.unwrap().map(|error| error.message().to_owned())
         };
         assert_eq!(refusal("N.m", "N m"), None);
         let message = "the FMU has `y` in rad; expected this unit, found deg";

@@ -185,23 +185,19 @@ pub(crate) fn line(file: &PlantFile<'_>, warning: &PlaceError) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
+    use crate::tests::read;
 
     /// The relative error of a row of zeros is infinite, and of rounding.
     #[test]
     fn errors_of_a_linearisation_above_one_percent_are_a_warning() {
         let text = "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n";
-        let source = Source::new(Path::new("plant.toml"), text.to_owned());
-        let parsed = source.parse().unwrap();
-        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
-        let mut linear = LinearPlant::of(&file).unwrap();
-        let mut warning = |error: f64| {
-            linear.inaccuracy = Some(error);
-            inaccurate(&file, &linear).map(|warning| warning.message().to_owned())
+        let warning = |error: f64| {
+            let warning = read(text, |file| {
+                let plant = LinearPlant::of(file).unwrap();
+                inaccurate(file, &LinearPlant { inaccuracy: Some(error), ..plant })
+            });
+            warning.unwrap().map(|warning| warning.message().to_owned())
         };
         assert!(warning(0.02).unwrap().contains("errors of up to 2 % of the largest entry"));
         assert_eq!([warning(0.009), warning(f64::INFINITY)], [None, None]);

@@ -314,11 +314,8 @@ impl DesignLoop {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use files::{Source, Table};
-
     use super::*;
+    use crate::tests::read;
 
     /// A combination has a unit of its own: 0.001 of millimetres are metres.
     #[test]
@@ -328,11 +325,9 @@ mod tests {
                 "A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
                  measurements = [{{ name = \"y\", unit = \"mm\" }}]\nreference.track = [{{ {track} }}]\n"
             );
-            let source = Source::new(Path::new("plant.toml"), text);
-            let parsed = source.parse().unwrap();
-            let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).unwrap();
-            let refusal = check_references(&file, &LinearPlant::of(&file).unwrap()).err();
-            refusal.map(|error| error.message().to_owned())
+            let refusal =
+                read(&text, |file| check_references(file, &LinearPlant::of(file).unwrap()).err());
+            refusal.unwrap().map(|error| error.message().to_owned())
         };
         assert_eq!(refusal("measurement = \"y\", unit = \"mm\""), None);
         assert_eq!(refusal("combination = { y = 0.001 }, name = \"r\", unit = \"m\""), None);
