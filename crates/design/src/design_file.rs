@@ -7,7 +7,6 @@ use aso_controller::design::{
     Actuator, Combination, Defaults, Estimator, Fallback, Fault, Measurement, Reconfiguration,
     Signal, SlidingMode,
 };
-use control::Domain;
 use control::aso::{FaultyPlant, Gains};
 use fmu_description::unit::Unit;
 
@@ -234,10 +233,7 @@ impl Solution {
     /// slowest feedback eigenvalue in 2000 steps, or in steps that are stated or of the sample time, at least ten.
     fn experiment(&self, file: &PlantFile<'_>) -> Result<Defaults, crate::Error> {
         let slowest = self.slowest_rate()?;
-        let sample_time = match self.domain {
-            Domain::Continuous => None,
-            Domain::Sampled { period } => Some(period),
-        };
+        let sample_time = file.sampling.map(|sampling| sampling.period);
         let steps = [file.step_size, sample_time];
         let shortest = 10.0 * steps.into_iter().flatten().fold(0.0, f64::max);
         let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest).max(shortest));
@@ -261,7 +257,7 @@ fn estimator(estimator: control::aso::Estimator) -> Estimator {
 }
 
 /// Returns the unit divided by seconds; None if FMI has no such unit.
-fn per_second(unit: &str) -> Option<String> {
+pub(crate) fn per_second(unit: &str) -> Option<String> {
     let slope = format!("{unit}/s");
     Unit::parse(&slope).is_ok().then_some(slope)
 }

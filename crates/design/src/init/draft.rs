@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::DMatrix;
+use plant_file::signals::Signal;
 
 /// A plant for which a plant file is written.
 pub(super) struct Draft {
     /// The source of the plant, in one line.
     pub(super) origin: String,
     pub(super) model: Model,
-    pub(super) actuators: Vec<Named>,
-    pub(super) measurements: Vec<Named>,
+    pub(super) actuators: Vec<Signal>,
+    pub(super) measurements: Vec<Signal>,
     /// Names of outputs that are no measurements, because they contain a command.
     pub(super) left_out: Vec<String>,
     pub(super) has_feedthrough: bool,
@@ -30,23 +31,13 @@ pub(super) struct Identification {
     pub(super) warnings: Vec<String>,
 }
 
-/// A signal: its name, and what is known about it.
-#[derive(Clone, Default)]
-pub(super) struct Named {
-    pub(super) name: String,
-    pub(super) unit: Option<String>,
-    pub(super) description: Option<String>,
-    /// The value at the operating point.
-    pub(super) operating: Option<f64>,
-}
-
 pub(super) enum Model {
     Matrices {
         a: DMatrix<f64>,
         b: DMatrix<f64>,
         c: DMatrix<f64>,
         d: DMatrix<f64>,
-        states: Vec<Named>,
+        states: Vec<Signal>,
         /// Sample time, s, of sampled matrices.
         sampled: Option<f64>,
     },
@@ -202,12 +193,13 @@ fn matrix(text: &mut String, name: &str, matrix: &DMatrix<f64>) {
     *text += "]\n";
 }
 
-fn list(text: &mut String, key: &str, signals: &[Named]) {
+fn list(text: &mut String, key: &str, signals: &[Signal]) {
     let _ = writeln!(text, "{key} = [");
-    for Named { name, unit, description, operating } in signals {
+    for Signal { name, unit, description, operating, .. } in signals {
         let mut parts = vec![format!("name = {}", quoted(name))];
-        for (key, value) in [("unit", unit), ("description", description)] {
-            parts.extend(value.as_ref().map(|value| format!("{key} = {}", quoted(value))));
+        let description = Some(description).filter(|text| !text.is_empty());
+        for (key, value) in [("unit", unit.as_ref()), ("description", description)] {
+            parts.extend(value.map(|value| format!("{key} = {}", quoted(value))));
         }
         parts.extend(operating.map(|value| format!("operating = {value}")));
         let _ = writeln!(text, "    {{ {} }},", parts.join(", "));

@@ -8,8 +8,9 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named};
+use crate::init::draft::{Draft, Identification, Model};
 use crate::plant::linear::direct_terms;
+use plant_file::signals::Signal;
 
 /// Reads the continuous inputs and outputs of the FMU; `out` is the plant file that will name it.
 ///
@@ -22,18 +23,18 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
     let outputs = continuous(&description, Causality::Output);
     for (count, what) in [(inputs.len(), "input"), (outputs.len(), "output")] {
         if count == 0 {
-            let message =
-                format!("it has no continuous {what}, and so is no plant for a controller");
-            return Err(invalid(message));
+            return Err(invalid(format!(
+                "it has no continuous {what}, and so is no plant for a controller"
+            )));
         }
     }
     let request =
         Linearise { inputs: inputs.clone(), outputs: outputs.clone(), ..Linearise::default() };
     let linear = linearise(&fmu, &request).map_err(|error| invalid(files::sentence(&error)))?;
-    let named = |signal: &linearise::Signal| Named {
-        name: signal.name.clone(),
-        description: described(&description, &signal.name),
-        ..Named::default()
+    let named = |signal: &linearise::Signal| {
+        let variable = description.variable(&signal.name);
+        let text = variable.and_then(|variable| variable.description.clone());
+        Signal { description: text.unwrap_or_default(), ..Signal::named(signal.name.clone()) }
     };
     // An output that contains a command, a force for example, is rarely what a sensor measures.
     let [d, _] = direct_terms(&linear);
@@ -60,11 +61,6 @@ fn continuous(description: &ModelDescription, causality: Causality) -> Vec<Strin
             && matches!(variable.kind, Kind::Real(_))
     });
     chosen.map(|variable| variable.name.clone()).collect()
-}
-
-fn described(description: &ModelDescription, name: &str) -> Option<String> {
-    let variable = description.variables.iter().find(|variable| variable.name == name);
-    variable.and_then(|variable| variable.description.clone()).filter(|text| !text.is_empty())
 }
 
 /// Returns the path of the FMU as the plant file at `out` states it: relative to the folder of `out` if the FMU is in

@@ -16,7 +16,8 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named, shown};
+use crate::init::draft::{Draft, Identification, Model, shown};
+use plant_file::signals::Signal;
 
 /// Reads the table in the file at `path`.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
@@ -32,7 +33,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     let cells = |line: &str| -> Vec<String> {
         line.split(separator).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
     };
-    let columns: Vec<Named> = cells(header).iter().skip(1).map(|cell| named(cell)).collect();
+    let columns: Vec<Signal> = cells(header).iter().skip(1).map(|cell| named(cell)).collect();
     if columns.is_empty() {
         return Err(EXPECTED.to_owned());
     }
@@ -43,7 +44,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
             let (expected, count) = (columns.len() + 1, cells.len());
             return Err(format!("line {}: expected {expected} cells, found {count}", at + 1));
         }
-        let number = |(cell, column): (&String, &Named)| {
+        let number = |(cell, column): (&String, &Signal)| {
             // A table with other separators may have decimal commas.
             let digits = if separator == ',' { cell.clone() } else { cell.replace(',', ".") };
             let value = digits.parse::<f64>().ok().filter(|value| value.is_finite());
@@ -53,7 +54,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
         };
         let values = cells[1..].iter().zip(&columns).map(number).collect::<Result<Vec<_>, _>>()?;
         let row = named(&cells[0]);
-        rows.push((Named { name: derivative(&row.name).to_owned(), ..row }, values));
+        rows.push((Signal { name: derivative(&row.name).to_owned(), ..row }, values));
     }
     split(&rows, &columns, file)
 }
@@ -62,7 +63,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
 const EXPECTED: &str = "expected a table of the matrices: the first line names states and commands, the first cell of \
                         each further line the state whose derivative it is, or the measurement";
 
-fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Draft, String> {
+fn split(rows: &[(Signal, Vec<f64>)], columns: &[Signal], file: &str) -> Result<Draft, String> {
     let row_of = |name: &str| rows.iter().position(|(row, _)| row.name == name);
     let of_states: Vec<_> = columns.iter().filter_map(|column| row_of(&column.name)).collect();
     let of_outputs: Vec<_> = (0..rows.len()).filter(|row| !of_states.contains(row)).collect();
@@ -107,7 +108,7 @@ fn derivative(name: &str) -> &str {
 
 /// Reads a signal from a cell: `name` or `name [unit]`. Digits in brackets directly behind the name, `q[2]` or
 /// `q[1,2]`, are the index of an element.
-pub(super) fn named(cell: &str) -> Named {
+pub(super) fn named(cell: &str) -> Signal {
     let is_index = |name: &str, text: &str| {
         let all = text.split(',').all(|index| index.parse::<u32>().is_ok());
         all && !name.is_empty() && !name.ends_with(char::is_whitespace)
@@ -116,11 +117,8 @@ pub(super) fn named(cell: &str) -> Named {
     let parts = parts.filter(|(name, text)| !is_index(name, text));
     let (name, unit) =
         parts.map_or((cell, None), |(name, unit)| (name, Some(unit.trim().to_owned())));
-    Named {
-        name: name.trim().to_owned(),
-        unit: unit.filter(|unit| !unit.is_empty()),
-        ..Named::default()
-    }
+    let unit = unit.filter(|unit| !unit.is_empty());
+    Signal { unit, ..Signal::named(name.trim().to_owned()) }
 }
 
 #[cfg(test)]

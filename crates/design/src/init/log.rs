@@ -8,12 +8,13 @@ mod read;
 use std::path::PathBuf;
 
 use control::StateSpace;
-use fmu_description::unit::Unit;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named, shown};
+use crate::design_file::per_second;
+use crate::init::draft::{Draft, Identification, Model, shown};
 use estimate::Estimate;
 use fit::Fit;
+use plant_file::signals::Signal;
 use read::Log;
 
 pub(super) use read::is_log;
@@ -55,10 +56,10 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     let warnings = judge::warnings(&logs, &estimate, &fits, tolerance.as_ref());
     let Log { inputs, outputs, .. } = &logs[0];
     let means = estimate.windows.means();
-    let signals = |names: &[Named], means: &[f64]| -> Vec<Named> {
-        let one = |(name, mean): (&Named, &f64)| Named {
+    let signals = |names: &[Signal], means: &[f64]| -> Vec<Signal> {
+        let one = |(signal, mean): (&Signal, &f64)| Signal {
             operating: Some(rounded(*mean)),
-            ..name.clone()
+            ..signal.clone()
         };
         names.iter().zip(means).map(one).collect()
     };
@@ -89,17 +90,13 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
 
 /// Returns the states: the measurements and, at the positions `rates`, their rates, without a unit if FMI has none for
 /// it (degC/s); without `rates` `x1`, `x2` and so on.
-fn states(rates: Option<&[usize]>, outputs: &[Named], order: usize) -> Vec<Named> {
+fn states(rates: Option<&[usize]>, outputs: &[Signal], order: usize) -> Vec<Signal> {
     let Some(rates) = rates else {
-        let one = |at| Named { name: format!("x{at}"), ..Named::default() };
-        return (1..=order).map(one).collect();
+        return (1..=order).map(|at| Signal::named(format!("x{at}"))).collect();
     };
-    let per_second =
-        |unit: &String| Some(format!("{unit}/s")).filter(|unit| Unit::parse(unit).is_ok());
-    let rate = |output: &Named| Named {
-        name: format!("{}_rate", output.name),
-        unit: output.unit.as_ref().and_then(per_second),
-        ..Named::default()
+    let rate = |output: &Signal| Signal {
+        unit: output.unit.as_deref().and_then(per_second),
+        ..Signal::named(format!("{}_rate", output.name))
     };
     outputs.iter().cloned().chain(rates.iter().map(|&at| rate(&outputs[at]))).collect()
 }
@@ -140,10 +137,9 @@ mod tests {
     /// A plant file with the unit degC/s is refused: degC has an offset.
     #[test]
     fn the_rate_of_a_temperature_in_degrees_celsius_has_no_unit() {
-        let named = |name: &str, unit: &str| Named {
-            name: name.to_owned(),
+        let named = |name: &str, unit: &str| Signal {
             unit: Some(unit.to_owned()),
-            ..Named::default()
+            ..Signal::named(name.to_owned())
         };
         let outputs = [named("oven", "degC"), named("valve", "m")];
         let states = states(Some(&[0, 1]), &outputs, 4);

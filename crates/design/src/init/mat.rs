@@ -7,7 +7,8 @@ use matfile::{Array, MatFile, NumericData};
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Identification, Model, Named, shown};
+use crate::init::draft::{Draft, Identification, Model, shown};
+use plant_file::signals::Signal;
 
 /// The variables that are read.
 const READ: [&str; 5] = ["A", "B", "C", "D", "Ts"];
@@ -63,7 +64,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         return Err(invalid(format!("Ts: expected the time of a sample in s, found {period}")));
     }
     let numbered = |letter: &str, count: usize| {
-        let one = |k| Named { name: format!("{letter}{k}"), ..Named::default() };
+        let one = |k| Signal::named(format!("{letter}{k}"));
         (1..=count).map(one).collect()
     };
     Ok(Draft {

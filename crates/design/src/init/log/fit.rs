@@ -94,7 +94,7 @@ mod tests {
     use control::identification::{Record, Subspace, Windows};
 
     use super::*;
-    use crate::init::draft::Named;
+    use plant_file::signals::Signal;
 
     /// y[k+1] = 3 + u[k] / 2, with a command that stays the same in the last quarter.
     #[test]
@@ -105,7 +105,7 @@ mod tests {
         let record = Record { inputs, outputs };
         let windows = Windows::new(&record, 3, 0..300)?;
         let model = Subspace::new(&windows, false)?.model(1)?;
-        let log = Log { period: 1.0, inputs: Vec::new(), outputs: vec![Named::default()], record };
+        let log = Log { period: 1.0, inputs: Vec::new(), outputs: vec![Signal::default()], record };
         let fit = fits(&[log], &model)?.swap_remove(0).predicted;
         assert!((fit - 100.0).abs() < 0.01, "{fit}");
         Ok(())

@@ -4,10 +4,10 @@ use control::eigen::eigenvalues;
 use control::identification::Windows;
 use nalgebra::DMatrix;
 
-use crate::init::draft::Named;
 use crate::init::log::estimate::Estimate;
 use crate::init::log::fit::{Fit, estimation, validation};
 use crate::init::log::read::Log;
+use plant_file::signals::Signal;
 
 /// The fewest samples of a log.
 const SAMPLES: usize = 100;
@@ -51,7 +51,7 @@ pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
 /// Returns the first signal that does not change in the samples that are used to estimate, with its value; None if all
 /// do.
 fn constant_signal<'a>(
-    signals: &'a [Named],
+    signals: &'a [Signal],
     logs: &[Log],
     rows: impl Fn(&Log) -> &DMatrix<f64>,
 ) -> Option<(&'a str, f64)> {

@@ -8,9 +8,9 @@ use nalgebra::DMatrix;
 use results::Table;
 
 use crate::Error;
-use crate::init::draft::Named;
 use crate::init::labelled::named;
 use crate::init::log::{LogOptions, rounded};
+use plant_file::signals::Signal;
 
 /// The largest deviation of a time from its place in the grid, as a part of the sample time.
 const JITTER: f64 = 0.2;
@@ -19,8 +19,8 @@ const JITTER: f64 = 0.2;
 pub(super) struct Log {
     /// The sample time in s.
     pub(super) period: f64,
-    pub(super) inputs: Vec<Named>,
-    pub(super) outputs: Vec<Named>,
+    pub(super) inputs: Vec<Signal>,
+    pub(super) outputs: Vec<Signal>,
     pub(super) record: Record,
 }
 
@@ -46,22 +46,20 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
         let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
         let table = Table::open(path).map_err(|error| Error::Invalid(files::sentence(&error)))?;
         let log = Log::read(&table, options).map_err(invalid)?;
-        if let Some(first) = logs.first()
-            && log.names() != first.names()
-        {
+        if let Some(first) = logs.first() {
             let (expected, names) = (first.names(), log.names());
-            return Err(invalid(format!(
-                "expected the columns {expected} as in the first log, found {names}; the same columns in the same \
-                 order are needed, or --inputs and --outputs"
-            )));
-        }
-        if let Some(first) = logs.first()
-            && (log.period / first.period - 1.0).abs() > 1e-3
-        {
+            if names != expected {
+                return Err(invalid(format!(
+                    "expected the columns {expected} as in the first log, found {names}; the same columns in the same \
+                     order are needed, or --inputs and --outputs"
+                )));
+            }
             let (expected, period) = (first.period, log.period);
-            return Err(invalid(format!(
-                "expected samples every {expected} s as in the first log, found every {period} s; resample one of them"
-            )));
+            if (period / expected - 1.0).abs() > 1e-3 {
+                return Err(invalid(format!(
+                    "expected samples every {expected} s as in the first log, found every {period} s; resample one of them"
+                )));
+            }
         }
         logs.push(log);
     }
@@ -113,10 +111,10 @@ impl Log {
 struct Columns<'a>(&'a Table);
 
 impl Columns<'_> {
-    fn name(&self, position: usize) -> Named {
+    fn name(&self, position: usize) -> Signal {
         let column = &self.0.columns()[position];
         let name = named(&column.name);
-        Named { unit: column.unit.clone().or(name.unit), ..name }
+        Signal { unit: column.unit.clone().or(name.unit), ..name }
     }
 
     /// Returns the length in s of the unit of the times, 1 if none is stated; an error if it is no unit of time.
