@@ -139,7 +139,7 @@ fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Res
     let section = detection.as_ref().map(|detection| &detection.section);
     let without = || {
         let solution = &designed.nominal;
-        let fallback = fallback::fallback(&file, solution, &assess::fallback::slowest)?;
+        let fallback = fallback::fallback(&file, solution)?;
         Ok::<_, Error>(reconfiguration::reconfigurations(&file, solution, fallback)?)
     };
     let without = || budget.run(without);

@@ -1,10 +1,10 @@
 //! The conditions that a design must satisfy.
 
-use control::Domain;
 use control::distance::Distance;
 
 use crate::plant::linear::AT_REST;
 use crate::report::Check;
+use crate::solve::law::measure;
 use crate::solve::solution::Solution;
 
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
@@ -23,10 +23,7 @@ pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
             "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
         ));
     }
-    let margin = match designed.domain {
-        Domain::Continuous => "largest real part of the eigenvalues, 1/s",
-        Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
-    };
+    let margin = measure(designed.domain);
     all.push(check(
         "plant and controller are stable together",
         designed.instability < 0.0,

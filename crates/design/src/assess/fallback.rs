@@ -16,41 +16,11 @@ use crate::plant::linear::LinearPlant;
 use crate::plant::rest::{Rest, beyond_limits, commands};
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{Level, LoopPoint, Number};
-use crate::solve::fallback::{Cases, Fallback, SlowCase, remaining};
+use crate::solve::fallback::{Cases, Fallback, LOSSES, remaining};
 use crate::solve::solution::{Solution, looped};
 use crate::solve::tracking::decay;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
-
-/// Number of losses between 0 and the largest one at which the decay rate is tested.
-const LOSSES: u32 = 10;
-/// Decay rates below this part of that of the intact loop count as zero.
-const NEGLIGIBLE: f64 = 1e-6;
-
-/// Returns the case with the slowest loop, if its decay rate is below the required one; None if all loops are fast
-/// enough.
-pub(crate) fn slowest(cases: &Cases<'_>, fallback: &Fallback) -> Result<Option<SlowCase>, Error> {
-    let Cases { designed, request } = *cases;
-    let gains = fallback.gains(designed);
-    let intact = decay(&cases.whole(&designed.gains, None)?, designed.domain)?;
-    let required = fallback.region.decay.unwrap_or(0.0).max(NEGLIGIBLE * intact);
-    let mut slowest: Option<SlowCase> = None;
-    let mut test = |name: String, case: Option<(usize, f64)>| -> Result<(), Error> {
-        let rate = decay(&cases.whole(&gains, case)?, designed.domain)?;
-        if slowest.as_ref().is_none_or(|slowest| rate < slowest.rate) {
-            slowest = Some(SlowCase { name, rate });
-        }
-        Ok(())
-    };
-    test(cases.name(0), None)?;
-    for &actuator in &request.actuators {
-        for point in 1..=LOSSES {
-            let loss = request.loss * f64::from(point) / f64::from(LOSSES);
-            test(cases.described(actuator, loss), Some((actuator, loss)))?;
-        }
-    }
-    Ok(slowest.filter(|slowest| slowest.rate < required))
-}
 
 /// Returns the report on the fall-back of `designed`; None if the plant file asks for none.
 pub(crate) fn report(

@@ -114,11 +114,10 @@ struct Variant {
 
 /// Returns the controllers with compensation on and off; only on if integrals act and the estimates are held.
 fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
-    let Solution { linear, plant, gains, domain, .. } = designed;
+    let Solution { plant, gains, .. } = designed;
     let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
     let (meaning, closed) = if designed.monitor {
-        let filter = designed.filter.as_deref();
-        let closed = DesignLoop::of(linear, plant, &uncompensated, filter, *domain)?;
+        let closed = designed.model().design_loop(&uncompensated)?;
         ("u = K_x x_hat; the faults are estimated, but not compensated", closed)
     } else {
         let controller = without_estimates(plant, &uncompensated, designed)?;

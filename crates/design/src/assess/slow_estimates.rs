@@ -1,11 +1,10 @@
 //! Estimates that are far slower than the loop that uses them.
 
-use control::eigen::eigenvalues;
-use control::{Domain, Error};
-use nalgebra::Complex;
+use control::Error;
 
 use crate::report::number::rounded;
 use crate::solve::solution::Solution;
+use crate::solve::tracking::decay;
 use plant_file::PlantFile;
 use plant_file::requirements::Requirement;
 use plant_file::signals::joined;
@@ -22,9 +21,8 @@ pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Optio
     if !matches!(requirement, Requirement::Bandwidth(_) | Requirement::Weights { .. }) {
         return Ok(None);
     }
-    let errors = solution.gains.error_dynamics(&solution.plant);
-    let observer = slowest(&eigenvalues(&errors)?, solution.domain);
-    let feedback = slowest(&eigenvalues(&solution.feedback_dynamics())?, solution.domain);
+    let observer = decay(&solution.gains.error_dynamics(&solution.plant), solution.domain)?;
+    let feedback = solution.slowest_rate()?;
     // An unstable loop has other reasons.
     if observer <= 0.0 || observer >= SLOW * feedback {
         return Ok(None);
@@ -40,13 +38,4 @@ pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Optio
         rounded(SETTLED / observer),
         rounded(SETTLED / feedback)
     )))
-}
-
-/// Returns the decay rate of the slowest mode, 1/s; of a sampled system -ln |z| / h.
-fn slowest(eigenvalues: &[Complex<f64>], domain: Domain) -> f64 {
-    let rate = |value: &Complex<f64>| match domain {
-        Domain::Continuous => -value.re,
-        Domain::Sampled { period } => -value.norm().ln() / period,
-    };
-    eigenvalues.iter().map(rate).fold(f64::INFINITY, f64::min)
 }

@@ -28,6 +28,10 @@ use plant_file::requirements::Region;
 const LARGEST_ORDER: usize = 30;
 /// Required decay rates, relative to that of the intact loop, that are tried in turn if none is stated.
 const RATES: [f64; 3] = [0.5, 0.125, 0.03125];
+/// Number of losses between 0 and the largest one at which the decay rate is tested.
+pub(crate) const LOSSES: u32 = 10;
+/// Decay rates below this part of that of the intact loop count as zero.
+const NEGLIGIBLE: f64 = 1e-6;
 /// Decay rates of the state feedback, relative to the required one, that are tried in turn: the observer
 /// slows the loop.
 const FASTER: [f64; 3] = [1.0, 1.5, 2.25];
@@ -45,8 +49,7 @@ pub(crate) struct Fallback {
     pub(crate) method: String,
 }
 
-/// Designs the fall-back that the plant file asks for; None if it asks for none. `judge` decides which state feedback
-/// is accepted, and whether with the compensation of the estimated faults.
+/// Designs the fall-back that the plant file asks for; None if it asks for none.
 ///
 /// # Errors
 ///
@@ -54,11 +57,9 @@ pub(crate) struct Fallback {
 pub(crate) fn fallback(
     file: &PlantFile<'_>,
     designed: &Solution,
-    judge: &Judge<'_>,
 ) -> Result<Option<Fallback>, crate::Error> {
     let Some(request) = &file.fallback else { return Ok(None) };
-    let search = Search { cases: Cases { designed, request }, judge };
-    match search.run()? {
+    match (Cases { designed, request }).search()? {
         Ok(design) => Ok(Some(design)),
         Err(reason) => {
             let message = format!("there is no fall-back: {reason}");
@@ -120,31 +121,35 @@ impl Cases<'_> {
         }
         closed_loop(plant, &controller(plant, gains, *domain)?, &effectiveness)
     }
-}
 
-/// A case in which a fall-back is not good enough.
-pub(crate) struct SlowCase {
-    pub(crate) name: String,
-    /// Decay rate of the slowest eigenvalue, 1/s; negative if it grows.
-    pub(crate) rate: f64,
-}
+    /// Returns the name and the decay rate in 1/s of the case with the slowest loop of plant, observer and fall-back, if
+    /// that rate is below the required one; None if all loops are fast enough.
+    fn slowest(&self, fallback: &Fallback) -> Result<Option<(String, f64)>, Error> {
+        let Self { designed, request } = *self;
+        let gains = fallback.gains(designed);
+        let rate = |gains: &Gains, case| decay(&self.whole(gains, case)?, designed.domain);
+        let intact = rate(&designed.gains, None)?;
+        let required = fallback.region.decay.unwrap_or(0.0).max(NEGLIGIBLE * intact);
+        let mut slowest = (self.name(0), rate(&gains, None)?);
+        for &actuator in &request.actuators {
+            for point in 1..=LOSSES {
+                let loss = request.loss * f64::from(point) / f64::from(LOSSES);
+                let rate = rate(&gains, Some((actuator, loss)))?;
+                if rate < slowest.1 {
+                    slowest = (self.described(actuator, loss), rate);
+                }
+            }
+        }
+        Ok(Some(slowest).filter(|(_, rate)| *rate < required))
+    }
 
-/// Judges the loops of plant, observer and fall-back: returns the slowest case if it is below the requirement.
-pub(crate) type Judge<'a> = dyn Fn(&Cases<'_>, &Fallback) -> Result<Option<SlowCase>, Error> + 'a;
-
-/// The search for the gains.
-struct Search<'a> {
-    cases: Cases<'a>,
-    judge: &'a Judge<'a>,
-}
-
-impl Search<'_> {
-    fn run(&self) -> Result<Result<Fallback, String>, Error> {
+    /// Returns the gains, or the reason why there are none.
+    fn search(&self) -> Result<Result<Fallback, String>, Error> {
         if let Some(reason) = self.obstacle()? {
             return Ok(Err(reason));
         }
-        let Cases { designed, request } = self.cases;
-        let intact = decay(&self.cases.whole(&designed.gains, None)?, designed.domain)?;
+        let Self { designed, request } = *self;
+        let intact = decay(&self.whole(&designed.gains, None)?, designed.domain)?;
         if intact <= 0.0 {
             return Ok(Err("the loop of the intact plant is not stable".to_owned()));
         }
@@ -163,7 +168,7 @@ impl Search<'_> {
 
     /// Returns why no gain can exist, or why none is searched; None if a search makes sense.
     fn obstacle(&self) -> Result<Option<String>, Error> {
-        let Cases { designed, request } = self.cases;
+        let Self { designed, request } = *self;
         let Solution { linear, whole, .. } = designed;
         let order = whole.plant.a.nrows() + whole.controller.a.nrows();
         if order > LARGEST_ORDER {
@@ -191,9 +196,9 @@ impl Search<'_> {
     /// Returns the gains with which all cases meet `region`, with the compensation of the estimated faults if that is
     /// possible, or the reason why none were found.
     fn within(&self, region: Region) -> Result<Result<Fallback, String>, Error> {
-        let Solution { extended, gains, domain, .. } = self.cases.designed;
+        let Solution { extended, gains, domain, .. } = self.designed;
         let n = extended.states;
-        let vertices = self.cases.vertices();
+        let vertices = self.vertices();
         let closed = |gain: &DMatrix<f64>| -> Vec<_> {
             vertices.iter().map(|Vertex { a, b }| a + b * gain).collect()
         };
@@ -225,7 +230,7 @@ impl Search<'_> {
                 }
                 _ if best.is_some() => break,
                 Outcome::Infeasible { conflict } => {
-                    let names: Vec<_> = conflict.iter().map(|at| self.cases.name(*at)).collect();
+                    let names: Vec<_> = conflict.iter().map(|at| self.name(*at)).collect();
                     return Ok(Err(format!(
                         "no gain with one Lyapunov matrix keeps the eigenvalues of these cases in the \
                          region ({}): {}; expected fewer `actuators`, a smaller `loss`, or a larger region",
@@ -253,10 +258,10 @@ impl Search<'_> {
         certificate: RegionCertificate,
         method: String,
     ) -> Result<Result<Fallback, String>, Error> {
-        let gains = &self.cases.designed.gains;
+        let gains = &self.designed.gains;
         let k_x = gain.clone().resize_horizontally(gains.k_x.ncols(), 0.0);
         let mut design = Fallback { k_x, k_f: None, region, certificate, method };
-        if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &design)? {
+        if let Some((name, rate)) = self.slowest(&design)? {
             let size = rounded(rate.abs());
             let slowest = if rate < 0.0 {
                 format!("the loop of the case \"{name}\" is unstable and grows with {size} 1/s")
@@ -270,7 +275,7 @@ impl Search<'_> {
             )));
         }
         design.k_f = Some(gains.k_f.clone());
-        if (self.judge)(&self.cases, &design)?.is_some() {
+        if self.slowest(&design)?.is_some() {
             design.k_f = None;
         }
         Ok(Ok(design))

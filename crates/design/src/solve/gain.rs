@@ -10,7 +10,7 @@ use crate::report::NormReport;
 use plant_file::requirements::Region;
 
 /// A gain and the method that found it.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(crate) struct GainResult {
     pub(crate) gain: DMatrix<f64>,
     /// The method, in a sentence.
@@ -77,15 +77,7 @@ pub(crate) struct FeedbackProblem<'a> {
 
 /// Returns the gain of a method without a choice, without required eigenvalues.
 pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
-    GainResult {
-        gain,
-        method,
-        required: Vec::new(),
-        quality: None,
-        norm: None,
-        noise: None,
-        choice: None,
-    }
+    GainResult { gain, method, ..GainResult::default() }
 }
 
 pub(crate) fn synthesised(

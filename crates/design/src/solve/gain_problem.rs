@@ -15,9 +15,9 @@ use crate::solve::gains::{feedback, observer};
 use crate::solve::loop_shape::{LoopProblem, ShapedGains};
 use crate::solve::names::observer_states;
 use crate::solve::norm_gains::ObserverProblem;
-use crate::solve::pairing::PairProblem;
-use crate::solve::pid::{PidProblem, free_of_observer};
+use crate::solve::pid::{PidProblem, entries_besides};
 use crate::solve::refusal::{States, feedback_refused, refused};
+use crate::solve::tracking::LoopModel;
 
 /// What the gains of feedback and observer are computed for.
 pub(crate) struct GainProblem<'a> {
@@ -116,12 +116,12 @@ impl GainProblem<'_> {
         gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync,
     ) -> Result<(GainResult, GainResult, Option<PlaceError>), crate::Error> {
         let Self { file, linear, plant, domain, .. } = *self;
+        let model = LoopModel { linear, plant, filter, domain };
         if let Some(shape) = &file.loop_shape {
             let Search { starts, free } = self.search(shape)?;
             let references =
                 file.references.as_ref().filter(|one| one.integral && !one.feedforward);
-            let problem =
-                LoopProblem { shape, linear, plant, filter, domain, references, free, gains };
+            let problem = LoopProblem { shape, model, references, free, gains };
             let ShapedGains { feedback, observer, warning } = problem.tuned(&starts)?;
             return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
         }
@@ -130,8 +130,7 @@ impl GainProblem<'_> {
         if file.is_scheduled() {
             return Ok((feedback, observer, None));
         }
-        let problem = PairProblem { linear, plant, filter, domain };
-        let (feedback, observer) = problem.chosen(feedback, observer, gains)?;
+        let (feedback, observer) = model.chosen(feedback, observer, gains)?;
         Ok((feedback, observer, None))
     }
 
@@ -152,14 +151,13 @@ impl GainProblem<'_> {
         let Self { file, linear, pair, domain, .. } = *self;
         let starts = self.starts(shape)?;
         let [of_feedback, of_observer] = starts[0].each_ref().map(DMatrix::shape);
-        let free_of_observer = free_of_observer(&linear.filter_states(file), of_observer);
+        let of_observer = entries_besides(&linear.filter_states(file), of_observer);
         let (Some(pid), Some(references)) = (&shape.pid, &file.references) else {
-            let (rows, columns) = of_feedback;
-            let all = (0..columns).flat_map(|column| (0..rows).map(move |row| (row, column)));
-            return Ok(Search { starts, free: [all.collect(), free_of_observer] });
+            let of_feedback = entries_besides(&(0..0), of_feedback);
+            return Ok(Search { starts, free: [of_feedback, of_observer] });
         };
         let problem = PidProblem { pid, shape, linear, references, pair, domain };
-        let free = [problem.free(), free_of_observer];
+        let free = [problem.free(), of_observer];
         Ok(Search { starts: problem.starts(file, &starts)?, free })
     }
 }

@@ -58,8 +58,7 @@ pub(crate) fn feedback(
         }
         Requirement::HInfinity { bound, region, channel } => {
             require(*region, &uncontrollable_modes(a, b)?, domain)?;
-            let required = NormRequirement { bound: *bound, region: *region, channel };
-            problem.by_norm(required, domain)
+            problem.by_norm(NormRequirement { bound: *bound, region: *region, channel, domain })
         }
     }
 }
@@ -116,19 +115,17 @@ pub(crate) fn observer(
         Requirement::Region(region) => {
             let part = controllable_part(&a_dual, &b_dual)?;
             require(*region, &part.fixed, domain)?;
-            if part.fixed.is_empty() {
-                let outcome = lmi::observer_gain(a_0, &output, &region.stated(), None, domain)?;
-                return synthesised(outcome, IN_REGION);
-            }
+            let whole = part.fixed.is_empty();
             let (a_1, c_1) = (part.a.transpose(), part.b.transpose());
-            let outcome = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
+            let (a_1, c_1) = if whole { (a_0, &output) } else { (&a_1, &c_1) };
+            let outcome = lmi::observer_gain(a_1, c_1, &region.stated(), None, domain)?;
             let result = synthesised(outcome, IN_REGION)?;
-            Ok(result.mapped(|gain| part.gain(&gain.transpose()).transpose()))
+            let complete = |gain: &DMatrix<f64>| part.gain(&gain.transpose()).transpose();
+            Ok(if whole { result } else { result.mapped(complete) })
         }
         Requirement::HInfinity { bound, region, channel } => {
             require(*region, &uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
-            let required = NormRequirement { bound: *bound, region: *region, channel };
-            problem.by_norm(required, domain)
+            problem.by_norm(NormRequirement { bound: *bound, region: *region, channel, domain })
         }
     }
 }

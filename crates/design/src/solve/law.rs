@@ -238,10 +238,7 @@ impl LawProblem<'_> {
             return Err(format!("its error dynamics would not be stable, by {excess:.3e}"));
         }
         let linear = if design.injection.is_some() { " within the boundary layer" } else { "" };
-        let margin = match self.domain {
-            Domain::Continuous => "largest real part of the eigenvalues, 1/s",
-            Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
-        };
+        let margin = measure(self.domain);
         design.conditions.push(check(
             "the estimation errors decay",
             Some(excess),
@@ -259,6 +256,14 @@ impl LawProblem<'_> {
             value: *value,
         };
         faults.map(one).collect()
+    }
+}
+
+/// Returns what an instability is, in words.
+pub(crate) fn measure(domain: Domain) -> &'static str {
+    match domain {
+        Domain::Continuous => "largest real part of the eigenvalues, 1/s",
+        Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
     }
 }
 

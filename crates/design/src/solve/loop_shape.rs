@@ -1,6 +1,6 @@
 //! Gains of feedback and observer that give the loop the shape of the plant file.
 
-use control::aso::{FaultyPlant, Gains};
+use control::aso::Gains;
 use control::bandwidth::NaturalUnits;
 use control::controller::complete_controller;
 use control::faults::FaultEntry;
@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use crate::solve::gain::{GainResult, unique};
+use crate::solve::tracking::LoopModel;
 use plant_file::loop_shape::LoopShape;
 use plant_file::references::References;
 use plant_file::signals::same_unit;
@@ -38,11 +39,7 @@ const BELOW_NYQUIST: f64 = 0.8;
 /// What the gains are tuned for.
 pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> {
     pub(crate) shape: &'a LoopShape,
-    pub(crate) linear: &'a LinearPlant,
-    /// The model in the observer.
-    pub(crate) plant: &'a FaultyPlant,
-    pub(crate) filter: Option<&'a [f64]>,
-    pub(crate) domain: Domain,
+    pub(crate) model: LoopModel<'a>,
     /// References that are integrated and do not act on the commands directly.
     pub(crate) references: Option<&'a References>,
     /// The rows and columns of the entries of feedback and observer that are tuned.
@@ -85,7 +82,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             };
             let of_estimates = |[feedback, observer]: &[DMatrix<f64>; 2]| {
                 let gains = (self.gains)(feedback, observer);
-                instability(&gains.error_dynamics(self.plant), self.domain)
+                instability(&gains.error_dynamics(self.model.plant), self.model.domain)
             };
             let slowest = DECAY_OF_ESTIMATES * of_estimates(start)?;
             let is_allowed = |parameters: &DVector<f64>| {
@@ -103,7 +100,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
                 rate: self.shape.bandwidth,
                 is_over: &is_over,
             };
-            let excess = instability(&tuning.dynamics(start)?, self.domain)?;
+            let excess = instability(&tuning.dynamics(start)?, self.model.domain)?;
             tuning.instability = decay * excess.min(0.0);
             if is_start {
                 let peak = tuning.peak(start)?;
@@ -182,15 +179,14 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         observer: &DMatrix<f64>,
     ) -> Result<StateSpace, Error> {
         let gains = (self.gains)(feedback, observer);
-        let controller =
-            complete_controller(self.plant, &gains, self.filter, self.domain)?.commands;
+        let LoopModel { plant, filter, domain, .. } = self.model;
+        let controller = complete_controller(plant, &gains, filter, domain)?.commands;
         let (to, from) = (inverse(&units.commands), inverse(&units.measurements));
         let (p, t) = (from.ncols(), units.references.ncols());
         // The integrals are the last states: T r enters them.
         let mut b = (&controller.b * &from).resize_horizontally(p + t, 0.0);
         let first = b.nrows() - t;
-        b.view_mut((first, p), (t, t))
-            .copy_from(&(inverse(&units.references) * self.domain.step()));
+        b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * domain.step()));
         Ok(StateSpace {
             b,
             c: &to * &controller.c,
@@ -210,8 +206,8 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     /// Returns the plant of the verdict, sampled for a sampled design, in units in which its channels are comparable:
     /// those of the file if all commands have one unit and all measurements have one, otherwise natural ones.
     fn scaled_plant(&self) -> Result<(Units, StateSpace), Error> {
-        let plant = self.linear.judged()?;
-        let LinearPlant { actuators, measurements, .. } = self.linear;
+        let plant = self.model.linear.judged()?;
+        let LinearPlant { actuators, measurements, .. } = self.model.linear;
         let (m, p) = (actuators.len(), measurements.len());
         let (commands, measurements) = if same_unit(actuators) && same_unit(measurements) {
             (DMatrix::identity(m, m), DMatrix::identity(p, p))
@@ -228,7 +224,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             },
         );
         let units = Units { commands, measurements, references };
-        let plant = match self.domain {
+        let plant = match self.model.domain {
             Domain::Continuous => plant,
             Domain::Sampled { period } => held_plant(&plant, period)?,
         };
@@ -240,17 +236,17 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     /// are integrated, with their weights.
     fn terms(&self) -> Result<Vec<Term>, Error> {
         let LoopShape { bandwidth, set_point, peak, roll_off, effort, .. } = *self.shape;
-        let LinearPlant { actuators, measurements, models, .. } = self.linear;
+        let LinearPlant { actuators, measurements, models, .. } = self.model.linear;
         let (m, p) = (actuators.len(), measurements.len());
         let integrals =
             models.iter().filter(|model| !matches!(model.entry, FaultEntry::Sensor(_))).count();
         let flat = Weight::constant(1.0 / peak);
-        let mapped = |frequency: f64| bilinear_frequency(frequency, self.domain);
+        let mapped = |frequency: f64| bilinear_frequency(frequency, self.model.domain);
         // (s / peak + w) / (s + FLOOR w), w = bandwidth.
         let crossing = |bandwidth| mapped(bandwidth) * (FLOOR * peak).sqrt();
         let shape = |bandwidth| Weight::lead_lag(1.0 / FLOOR, crossing(bandwidth), 1.0 / peak, 1);
         let shaped = shape(bandwidth)?;
-        let nyquist = match self.domain {
+        let nyquist = match self.model.domain {
             Domain::Continuous => f64::INFINITY,
             Domain::Sampled { period } => std::f64::consts::PI / period,
         };

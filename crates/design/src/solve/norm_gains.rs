@@ -53,6 +53,8 @@ pub(crate) struct NormRequirement<'a> {
     pub(crate) bound: Option<f64>,
     pub(crate) region: Region,
     pub(crate) channel: &'a Channel,
+    /// The time domain of the controller.
+    pub(crate) domain: Domain,
 }
 
 impl ObserverProblem<'_> {
@@ -66,11 +68,11 @@ impl ObserverProblem<'_> {
     /// Without a measurement filter the noise enters through `D_y`, with one through the filter's
     /// states. A current estimator corrects with the newest measurement: `D_y` then has `C_0` B, too.
     /// In sampled time a rate acts for one period.
-    fn performance(&self, required: NormRequirement<'_>, domain: Domain) -> Performance {
+    fn performance(&self, required: NormRequirement<'_>) -> Performance {
         let (order, p, q) = (self.a_0.nrows(), self.c_0.nrows(), self.faults);
         let noises = required.channel.noise.len();
         let mut disturbance = DMatrix::zeros(order, q + noises);
-        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(domain.step());
+        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(required.domain.step());
         let mut feedthrough = DMatrix::zeros(p, q + noises);
         for (at, noise) in required.channel.noise.iter().enumerate() {
             match self.filter {
@@ -95,7 +97,8 @@ impl ObserverProblem<'_> {
     }
 
     /// Returns the weights over frequency of the channel of `performance`; None if all weights are constant.
-    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+    fn weights(&self, required: NormRequirement<'_>) -> Result<Option<ChannelWeights>, Error> {
+        let NormRequirement { channel, domain, .. } = required;
         if !channel.has_states() {
             return Ok(None);
         }
@@ -118,17 +121,13 @@ impl ObserverProblem<'_> {
     /// None without noise, with weights over frequency, and above [`LARGEST_ORDER`] states; if there is no such filter,
     /// as in continuous time with a measurement filter, after which no noise is left; and if rounding errors raise the
     /// norm above [`ROUNDED`] times its bound.
-    fn riccati(
-        &self,
-        required: NormRequirement<'_>,
-        domain: Domain,
-    ) -> Result<Option<DMatrix<f64>>, Error> {
-        let channel = required.channel;
+    fn riccati(&self, required: NormRequirement<'_>) -> Result<Option<DMatrix<f64>>, Error> {
+        let NormRequirement { channel, domain, .. } = required;
         let unsuitable = channel.has_states() || channel.noise.is_empty();
         if unsuitable || self.a_0.nrows() > LARGEST_ORDER {
             return Ok(None);
         }
-        let performance = self.performance(required, domain);
+        let performance = self.performance(required);
         let output = self.estimator.output_matrix(self.a_0, self.c_0);
         let problem = NormFilterProblem {
             a: self.a_0,
@@ -161,17 +160,14 @@ impl ObserverProblem<'_> {
 
     /// Computes a norm below which no gain is: with noise that of filters of any order; without noise the larger one of
     /// that and of the bound for gains with all eigenvalues in the disc of the region. None if no bound is known.
-    fn lower_bound(
-        &self,
-        required: NormRequirement<'_>,
-        domain: Domain,
-    ) -> Result<Option<LowerBound>, Error> {
+    fn lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<LowerBound>, Error> {
         if !required.channel.noise.is_empty() {
-            return Ok(self.noisy_lower_bound(required, domain)?.map(LowerBound::for_filters));
+            return Ok(self.noisy_lower_bound(required)?.map(LowerBound::for_filters));
         }
-        let (a, c, performance) = self.extended(required, domain)?;
+        let (a, c, performance) = self.extended(required)?;
         // A bound whose computation fails is not known; the gain does not depend on it.
-        let of_filters = noiseless_norm_lower_bound(&a, &c, &performance, domain).unwrap_or(None);
+        let of_filters =
+            noiseless_norm_lower_bound(&a, &c, &performance, required.domain).unwrap_or(None);
         let Region { decay, disc, .. } = required.region;
         let of_disc = match disc.filter(|_| !required.channel.has_states()) {
             Some((center, radius)) => {
@@ -192,18 +188,14 @@ impl ObserverProblem<'_> {
     /// [`LARGEST_ORDER`] states.
     ///
     /// With a measurement filter the newest measurement is that of the sample before, as for a prediction estimator.
-    fn noisy_lower_bound(
-        &self,
-        required: NormRequirement<'_>,
-        domain: Domain,
-    ) -> Result<Option<f64>, Error> {
+    fn noisy_lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<f64>, Error> {
         let order = self.a_0.nrows();
         if order > LARGEST_ORDER {
             return Ok(None);
         }
         let Some(filter) = self.filter else {
-            let (a, c, performance) = self.extended(required, domain)?;
-            return observer_norm_lower_bound(&a, &c, &performance, domain);
+            let (a, c, performance) = self.extended(required)?;
+            return observer_norm_lower_bound(&a, &c, &performance, required.domain);
         };
         let first = order - self.faults - filter.len();
         let states: Vec<_> =
@@ -219,7 +211,7 @@ impl ObserverProblem<'_> {
             filter: None,
             estimator: Estimator::Prediction,
         };
-        unfiltered.noisy_lower_bound(required, domain)
+        unfiltered.noisy_lower_bound(required)
     }
 
     /// Returns the error dynamics with a `gain` for `output`, from w to z of a performance.
@@ -244,26 +236,22 @@ impl ObserverProblem<'_> {
     fn extended(
         &self,
         required: NormRequirement<'_>,
-        domain: Domain,
     ) -> Result<(DMatrix<f64>, DMatrix<f64>, Performance), Error> {
         let output = self.estimator.output_matrix(self.a_0, self.c_0);
-        let performance = self.performance(required, domain);
-        Ok(match self.weights(required.channel, domain)? {
+        let performance = self.performance(required);
+        Ok(match self.weights(required)? {
             None => (self.a_0.clone(), output, performance),
             Some(weights) => weights.extend(self.a_0, &output, &performance),
         })
     }
 
     /// Computes L; for a current estimator the gain of the correction.
-    pub(crate) fn by_norm(
-        &self,
-        required: NormRequirement<'_>,
-        domain: Domain,
-    ) -> Result<GainResult, Refusal> {
+    pub(crate) fn by_norm(&self, required: NormRequirement<'_>) -> Result<GainResult, Refusal> {
         let output = self.estimator.output_matrix(self.a_0, self.c_0);
+        let domain = required.domain;
         let plain = NormRequirement { channel: &Channel::default(), ..required };
-        let unweighted = self.performance(plain, domain);
-        let weights = self.weights(required.channel, domain)?;
+        let unweighted = self.performance(plain);
+        let weights = self.weights(required)?;
         let search = Search {
             synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
                 None => lmi::observer_gain(self.a_0, &output, region, performance, domain),
@@ -273,12 +261,11 @@ impl ObserverProblem<'_> {
             },
             weights: weights.as_ref(),
             system: &|gain, performance| self.closed(gain, &output, performance, domain),
-            performance: self.performance(required, domain),
+            performance: self.performance(required),
             unweighted,
             required,
-            domain,
-            filter: self.riccati(required, domain)?,
-            lower_bound: self.lower_bound(required, domain)?,
+            filter: self.riccati(required)?,
+            lower_bound: self.lower_bound(required)?,
         };
         let noise = if required.channel.noise.is_empty() { "" } else { " and measurement noise" };
         search.result(&format!(
@@ -303,7 +290,8 @@ impl FeedbackProblem<'_> {
     }
 
     /// Returns the weights over frequency of measurements and commands; None if all weights are constant.
-    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+    fn weights(&self, required: NormRequirement<'_>) -> Result<Option<ChannelWeights>, Error> {
+        let NormRequirement { channel, domain, .. } = required;
         if !channel.has_states() {
             return Ok(None);
         }
@@ -334,14 +322,11 @@ impl FeedbackProblem<'_> {
     }
 
     /// Computes K of u = K x.
-    pub(crate) fn by_norm(
-        &self,
-        required: NormRequirement<'_>,
-        domain: Domain,
-    ) -> Result<GainResult, Refusal> {
+    pub(crate) fn by_norm(&self, required: NormRequirement<'_>) -> Result<GainResult, Refusal> {
+        let domain = required.domain;
         let plain = NormRequirement { channel: &Channel::default(), ..required };
         let performance = self.performance(required);
-        let weights = self.weights(required.channel, domain)?;
+        let weights = self.weights(required)?;
         let lower_bound = self.lower_bound(&performance, weights.as_ref(), domain)?;
         let search = Search {
             synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
@@ -361,7 +346,6 @@ impl FeedbackProblem<'_> {
             performance,
             unweighted: self.performance(plain),
             required,
-            domain,
             filter: None,
             lower_bound: lower_bound.map(LowerBound::for_filters),
         };

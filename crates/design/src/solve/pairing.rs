@@ -1,31 +1,21 @@
 //! The choice of feedback and observer together, among the placements that were found for each.
 
-use control::aso::{FaultyPlant, Gains, pairs};
+use control::Error;
+use control::aso::{Gains, pairs};
 use control::robustness::{Loop, least_sensitive};
-use control::{Domain, Error};
 use nalgebra::DMatrix;
 
-use crate::plant::linear::LinearPlant;
 use crate::solve::gain::GainResult;
-use crate::solve::tracking::{DesignLoop, commanded};
+use crate::solve::tracking::{DesignLoop, LoopModel, commanded};
 
-/// The plant of a pair of gains.
-pub(crate) struct PairProblem<'a> {
-    pub(crate) linear: &'a LinearPlant,
-    /// The model in the observer.
-    pub(crate) plant: &'a FaultyPlant,
-    pub(crate) filter: Option<&'a [f64]>,
-    pub(crate) domain: Domain,
-}
-
-impl PairProblem<'_> {
+impl LoopModel<'_> {
     /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`]; a single pair is
     /// returned without an examination.
     ///
     /// `gains`: computes those of the controller from the gains of feedback and observer. A measurement filter belongs
     /// to the plant, with integral action to the controller.
     pub(crate) fn chosen(
-        &self,
+        self,
         feedback: GainResult,
         observer: GainResult,
         gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains,
@@ -49,10 +39,8 @@ impl PairProblem<'_> {
         Ok(chosen(*first.iter().chain(&second).nth(best).unwrap_or(&first[0])))
     }
 
-    fn closed(&self, gains: &Gains) -> Result<Loop, Error> {
-        let Self { linear, plant, filter, domain } = *self;
-        let DesignLoop { plant, controller } =
-            DesignLoop::of(linear, plant, gains, filter, domain)?;
-        Loop::new(commanded(plant, domain), controller)
+    fn closed(self, gains: &Gains) -> Result<Loop, Error> {
+        let DesignLoop { plant, controller } = self.design_loop(gains)?;
+        Loop::new(commanded(plant, self.domain), controller)
     }
 }

@@ -142,12 +142,12 @@ pub(crate) fn reference(References { h, .. }: &References, measurement: usize) -
     h.column(measurement).iter().position(|weight| *weight != 0.0).unwrap_or_default()
 }
 
-/// Returns the entries of an observer gain of this shape that are tuned: all but the rows `filters`.
-pub(crate) fn free_of_observer(
-    filters: &Range<usize>,
+/// Returns the entries of a gain of this shape besides the rows `fixed`.
+pub(crate) fn entries_besides(
+    fixed: &Range<usize>,
     (rows, columns): (usize, usize),
 ) -> Vec<(usize, usize)> {
-    let is_free = |row: &usize| !filters.contains(row);
+    let is_free = |row: &usize| !fixed.contains(row);
     (0..columns)
         .flat_map(|column| (0..rows).filter(is_free).map(move |row| (row, column)))
         .collect()

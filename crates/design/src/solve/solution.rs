@@ -1,7 +1,7 @@
 //! Computes the gains for the plant of a plant file.
 
 use control::aso::{FaultyPlant, Gains};
-use control::controller::{CompleteController, closed_loop, complete_controller, with_feedthrough};
+use control::controller::{CompleteController, closed_loop};
 use control::detectability::{Detectability, detectability};
 use control::distance::Distance;
 use control::faults::ExtendedPlant;
@@ -27,7 +27,8 @@ use crate::solve::gain_problem::GainProblem;
 use crate::solve::law::{DesignedLaw, LawProblem};
 use crate::solve::refusal::feedback_refused;
 use crate::solve::tracking::{
-    DesignLoop, Tracking, TrackingProblem, check_references, decay, feedback_pair, integral_action,
+    DesignLoop, LoopModel, Tracking, TrackingProblem, check_references, decay, feedback_pair,
+    integral_action,
 };
 
 /// The controller of one plant, with the intermediate results.
@@ -140,8 +141,9 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<SolveResult, crat
     let required_error_dynamics = gains.error_dynamics(&plant);
     let (gains, own_model) = (designed.gains.clone(), designed.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
-    let whole = DesignLoop::of(&linear, &plant, &gains, filter.as_deref(), domain)?;
-    let instability = instability_of(&linear, &plant, &gains, filter.as_deref(), &whole)?;
+    let model = LoopModel { linear: &linear, plant: &plant, filter: filter.as_deref(), domain };
+    let whole = model.design_loop(&gains)?;
+    let instability = instability_of(model, &gains, &whole)?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let problem = TrackingProblem {
         file,
@@ -199,21 +201,14 @@ fn feedback_of_family(
 
 /// Returns the instability of plant and controller; with delays the larger one of the loops with the plants of the
 /// design and of the judgement, which approximates delays better.
-fn instability_of(
-    linear: &LinearPlant,
-    plant: &FaultyPlant,
-    gains: &Gains,
-    filter: Option<&[f64]>,
-    whole: &DesignLoop,
-) -> Result<f64, Error> {
-    let domain = whole.controller.domain;
+fn instability_of(model: LoopModel<'_>, gains: &Gains, whole: &DesignLoop) -> Result<f64, Error> {
+    let LoopModel { linear, plant, domain, .. } = model;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let of_design = instability(&dynamics, domain)?;
     if !linear.delays.any() {
         return Ok(of_design);
     }
-    let controller = complete(linear, plant, gains, filter, domain)?.commands;
-    let closed = looped(&linear.judged()?, &controller)?;
+    let closed = looped(&linear.judged()?, &model.complete(gains)?.commands)?;
     Ok(of_design.max(instability(&closed.dynamics(), domain)?))
 }
 
@@ -281,26 +276,6 @@ fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
     Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
 }
 
-/// Returns the controller with `gains`, its filter and its integrals. With direct feedthrough it subtracts D u from the
-/// measurements.
-fn complete(
-    linear: &LinearPlant,
-    plant: &FaultyPlant,
-    gains: &Gains,
-    filter: Option<&[f64]>,
-    domain: Domain,
-) -> Result<CompleteController, Error> {
-    let controller = complete_controller(plant, gains, filter, domain)?;
-    if !linear.has_feedthrough() {
-        return Ok(controller);
-    }
-    let complete = |system| with_feedthrough(system, &controller.commands.c, &linear.d);
-    Ok(CompleteController {
-        commands: complete(&controller.commands)?,
-        estimates: complete(&controller.estimates)?,
-    })
-}
-
 /// Returns the loop of a plant and a controller, in the time domain of the controller.
 pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
     let plant = match controller.domain {
@@ -313,7 +288,13 @@ pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop
 impl Solution {
     /// Returns the controller with other gains, its filter and its integrals.
     pub(crate) fn complete(&self, gains: &Gains) -> Result<CompleteController, Error> {
-        complete(&self.linear, &self.plant, gains, self.filter.as_deref(), self.domain)
+        self.model().complete(gains)
+    }
+
+    /// Returns what the loop is computed for.
+    pub(crate) fn model(&self) -> LoopModel<'_> {
+        let Self { linear, plant, filter, domain, .. } = self;
+        LoopModel { linear, plant, filter: filter.as_deref(), domain: *domain }
     }
 
     /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of

@@ -2,7 +2,7 @@
 //! conditions for both.
 
 use control::aso::{FaultyPlant, Gains};
-use control::controller::complete_controller;
+use control::controller::{CompleteController, complete_controller, with_feedthrough};
 use control::faults::{ExtendedPlant, FaultEntry};
 use control::stability::instability;
 use control::tracking::{
@@ -128,9 +128,7 @@ pub(crate) fn check_member(
     variant: &Variant,
     linear: &LinearPlant,
 ) -> Result<(), PlaceError> {
-    let Some(References { h, .. }) = &file.references else {
-        return Ok(());
-    };
+    let Some(References { h, .. }) = &file.references else { return Ok(()) };
     let rank = tracking_rank(&linear.a_at_rest(), &linear.b, &(h * &linear.c))
         .map_err(|error| file.error_at(&variant.place, error.to_string()))?;
     if rank.is_full() {
@@ -200,9 +198,7 @@ impl TrackingProblem<'_> {
     /// Returns the references of the file and how they act; None if it has none.
     pub(crate) fn solve(&self) -> Result<Option<Tracking>, PlaceError> {
         let Self { file, linear, a, b, gains, feedback, domain } = *self;
-        let Some(references) = &file.references else {
-            return Ok(None);
-        };
+        let Some(references) = &file.references else { return Ok(None) };
         let refuse = |error: Error| file.error(&["reference"], error.to_string());
         let output = &references.h * &linear.c;
         let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
@@ -285,19 +281,25 @@ pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
     StateSpace { a, b, c, d, domain }
 }
 
-impl DesignLoop {
-    /// Returns the loop of the model `plant` in the observer and the controller with `gains`; `linear`: the plant
-    /// without measurement filter.
-    pub(crate) fn of(
-        linear: &LinearPlant,
-        plant: &FaultyPlant,
-        gains: &Gains,
-        filter: Option<&[f64]>,
-        domain: Domain,
-    ) -> Result<Self, Error> {
+/// What a loop is computed for.
+#[derive(Clone, Copy)]
+pub(crate) struct LoopModel<'a> {
+    /// The plant without measurement filter.
+    pub(crate) linear: &'a LinearPlant,
+    /// The model in the observer.
+    pub(crate) plant: &'a FaultyPlant,
+    /// The coefficients of the measurement filter.
+    pub(crate) filter: Option<&'a [f64]>,
+    pub(crate) domain: Domain,
+}
+
+impl LoopModel<'_> {
+    /// Returns the loop of the model in the observer and the controller with `gains`.
+    pub(crate) fn design_loop(self, gains: &Gains) -> Result<DesignLoop, Error> {
+        let Self { linear, plant, filter, domain } = self;
         if gains.integral.is_none() {
             let controller = control::controller::controller(plant, gains, domain)?;
-            return Ok(Self { plant: plant.clone(), controller });
+            return Ok(DesignLoop { plant: plant.clone(), controller });
         }
         let n = linear.a.nrows();
         let faulty = FaultyPlant {
@@ -308,7 +310,21 @@ impl DesignLoop {
             a_f: plant.a_f.clone(),
         };
         let whole = complete_controller(plant, gains, filter, domain)?;
-        Ok(Self { plant: faulty, controller: whole.commands })
+        Ok(DesignLoop { plant: faulty, controller: whole.commands })
+    }
+
+    /// Returns the controller with `gains`, its filter and its integrals. With direct feedthrough it subtracts D u from
+    /// the measurements.
+    pub(crate) fn complete(self, gains: &Gains) -> Result<CompleteController, Error> {
+        let controller = complete_controller(self.plant, gains, self.filter, self.domain)?;
+        if !self.linear.has_feedthrough() {
+            return Ok(controller);
+        }
+        let complete = |system| with_feedthrough(system, &controller.commands.c, &self.linear.d);
+        Ok(CompleteController {
+            commands: complete(&controller.commands)?,
+            estimates: complete(&controller.estimates)?,
+        })
     }
 }
 

@@ -34,7 +34,6 @@ pub(crate) struct Search<'a> {
     /// The performance without weights and noise.
     pub(crate) unweighted: Performance,
     pub(crate) required: NormRequirement<'a>,
-    pub(crate) domain: Domain,
     /// The gain of a filter by a Riccati equation, if there is one.
     pub(crate) filter: Option<DMatrix<f64>>,
     /// A norm below which no gain is.
@@ -139,7 +138,7 @@ impl Search<'_> {
     /// Whether the eigenvalues with a gain are in the region and its norm keeps the bound.
     fn is_usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
         let all = eigenvalues(&(self.system)(gain, &self.performance).a)?;
-        let inside = |value| self.required.region.contains(value, self.domain);
+        let inside = |value| self.required.region.contains(value, self.required.domain);
         let bound = self.required.bound.unwrap_or(f64::INFINITY);
         Ok(all.into_iter().all(inside) && self.weighted_norm(gain)? <= bound)
     }
@@ -169,7 +168,7 @@ impl Search<'_> {
             gap: positive.map(|least| norm / least.norm - 1.0),
             unweighted: if plain { None } else { Some(unweighted()?) },
             gain: gain.norm(),
-            weights: weights_over_frequency(self.required.channel, self.domain),
+            weights: weights_over_frequency(self.required.channel, self.required.domain),
         })
     }
 
