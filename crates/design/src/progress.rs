@@ -30,36 +30,19 @@ pub(crate) enum Step {
     Remedies,
 }
 
-impl Step {
-    const ALL: [Self; 10] = [
-        Self::Gains,
-        Self::Detection,
-        Self::Reconfiguration,
-        Self::Margins,
-        Self::Comparison,
-        Self::Tolerances,
-        Self::Certificates,
-        Self::Bounds,
-        Self::Responses,
-        Self::Remedies,
-    ];
-
-    /// Returns the name of the step, and its part of the time of a design with 100 states, relative to the other steps.
-    fn name_and_weight(self) -> (&'static str, u32) {
-        match self {
-            Self::Gains => ("gains", 5),
-            Self::Detection => ("detection", 2),
-            Self::Reconfiguration => ("reconfiguration", 2),
-            Self::Margins => ("margins", 45),
-            Self::Comparison => ("comparison", 10),
-            Self::Tolerances => ("parameter tolerances", 20),
-            Self::Certificates => ("certificates", 2),
-            Self::Bounds => ("bounds", 20),
-            Self::Responses => ("responses", 13),
-            Self::Remedies => ("remedies", 5),
-        }
-    }
-}
+/// The name of each step, and its part of the time of a design with 100 states, relative to the other steps.
+const STEPS: [(&str, u32); 10] = [
+    ("gains", 5),
+    ("detection", 2),
+    ("reconfiguration", 2),
+    ("margins", 45),
+    ("comparison", 10),
+    ("parameter tolerances", 20),
+    ("certificates", 2),
+    ("bounds", 20),
+    ("responses", 13),
+    ("remedies", 5),
+];
 
 /// Counts the steps of one design that are done.
 pub(crate) struct Steps<'a> {
@@ -74,8 +57,8 @@ impl<'a> Steps<'a> {
 
     /// Tells the observer that `step` begins, and runs `compute`.
     pub(crate) fn run<T>(&self, step: Step, compute: impl FnOnce() -> T) -> T {
-        let all: u32 = Step::ALL.into_iter().map(|step| step.name_and_weight().1).sum();
-        let (name, weight) = step.name_and_weight();
+        let all: u32 = STEPS.iter().map(|(_, weight)| weight).sum();
+        let (name, weight) = STEPS[step as usize];
         let done = f64::from(self.done.load(Ordering::Relaxed)) / f64::from(all);
         (self.observer)(Progress { step: name, done });
         let computed = compute();

@@ -21,32 +21,32 @@ const POINTS_PER_DECADE: u32 = 20;
 /// Number of outputs that each thread computes between two checks of the time limit.
 const OUTPUTS_AT_ONCE: usize = 64;
 
-/// The outputs of the loop: states, state estimation errors, fault estimation errors.
-pub(crate) struct Outputs {
-    pub(crate) names: Vec<String>,
-    pub(crate) units: Vec<Option<String>>,
-    /// The position of each output in [x; e; eps], which also has states of filters and delays, and rates of faults.
-    pub(crate) positions: Vec<usize>,
+/// An output of the loop.
+pub(crate) struct Output {
+    pub(crate) name: String,
+    pub(crate) unit: Option<String>,
+    /// Its position among the outputs of a system.
+    pub(crate) row: usize,
 }
 
-impl Outputs {
-    pub(crate) fn of(designed: &Solution) -> Self {
-        let (all, states) = (designed.plant.a.nrows(), designed.linear.plant_states());
-        let (mut names, mut units, mut positions) = (Vec::new(), Vec::new(), Vec::new());
-        for (offset, prefix) in [(0, ""), (all, "error of ")] {
-            for (at, state) in states.iter().enumerate() {
-                names.push(format!("{prefix}{}", state.name));
-                units.push(state.unit.clone());
-                positions.push(offset + at);
-            }
-        }
-        for (fault, channel) in designed.linear.faults.iter().zip(&designed.extended.channels) {
-            names.push(format!("error of {}", fault.name));
-            units.push(fault.unit.clone());
-            positions.push(2 * all + channel.estimate);
-        }
-        Self { names, units, positions }
-    }
+/// Returns the outputs of the loop: states, state estimation errors, fault estimation errors. Their rows are those of
+/// [x; e; eps], which also has states of filters and delays, and rates of faults.
+pub(crate) fn outputs(designed: &Solution) -> Vec<Output> {
+    let (all, states) = (designed.plant.a.nrows(), designed.linear.plant_states());
+    let of_state = |first: usize, prefix: &'static str| {
+        states.iter().enumerate().map(move |(at, state)| Output {
+            name: format!("{prefix}{}", state.name),
+            unit: state.unit.clone(),
+            row: first + at,
+        })
+    };
+    let faults = designed.linear.faults.iter().zip(&designed.extended.channels);
+    let of_faults = faults.map(|(fault, channel)| Output {
+        name: format!("error of {}", fault.name),
+        unit: fault.unit.clone(),
+        row: 2 * all + channel.estimate,
+    });
+    of_state(0, "").chain(of_state(all, "error of ")).chain(of_faults).collect()
 }
 
 /// Returns the H-infinity norm, and how it was computed. If the level sets do not converge, as with a zero of the
@@ -62,6 +62,18 @@ pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), E
         }
         Err(error) => Err(error),
     }
+}
+
+/// Returns the singular values of a system at these `frequencies`.
+pub(crate) fn frequency(
+    name: String,
+    system: &StateSpace,
+    frequencies: Vec<f64>,
+) -> Result<Frequency, Error> {
+    let points = frequency_response(system, &frequencies)?;
+    let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
+    let singular_values = (0..system.d.nrows()).map(values).collect();
+    Ok(Frequency { name, frequencies, singular_values })
 }
 
 /// The peak gains of an output from the faults, from their rates, and from the part of the faults that the
@@ -80,7 +92,7 @@ enum Missing {
 /// The transfer functions from the faults, and from their rates, to [x; e; eps].
 pub(crate) struct Loops<'a> {
     designed: &'a Solution,
-    outputs: Outputs,
+    outputs: Vec<Output>,
     of_faults: StateSpace,
     of_rates: StateSpace,
 }
@@ -92,7 +104,7 @@ impl<'a> Loops<'a> {
         // The change of a fault per sample is its rate times the sample time.
         of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(domain.step());
         let of_faults = fault_system(plant, gains, *domain)?;
-        Ok(Self { designed, outputs: Outputs::of(designed), of_faults, of_rates })
+        Ok(Self { designed, outputs: outputs(designed), of_faults, of_rates })
     }
 
     fn faults(&self) -> impl Iterator<Item = (usize, &'a Fault)> + use<'a> {
@@ -107,7 +119,7 @@ impl<'a> Loops<'a> {
     /// The errors of the faults are computed first, then those of the states, then the states. Outputs that are left
     /// when the time of `budget` is over are [`Missing::Time`].
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
-        let positions = &self.outputs.positions;
+        let positions: Vec<_> = self.outputs.iter().map(|output| output.row).collect();
         let mut peaks = vec![Err(Missing::Time); positions.len()];
         // The errors are those of a smaller system.
         let states = self.designed.linear.plant_states().len();
@@ -167,7 +179,7 @@ impl<'a> Loops<'a> {
         let gains = self.peak_gains(budget)?;
         let mut bounds = Vec::new();
         for (column, fault) in self.faults() {
-            for (at, gains) in gains.iter().enumerate() {
+            for (output, gains) in self.outputs.iter().zip(&gains) {
                 let Ok([from_faults, from_rates, from_rest]) = gains else { continue };
                 let of_fault = from_faults[column];
                 // A constant fault that leaves a lasting error has no bound by its rate.
@@ -182,8 +194,8 @@ impl<'a> Loops<'a> {
                 let by_size = fault.bound.map(|bound| of_fault * bound);
                 bounds.push(Bound {
                     fault: fault.name.clone(),
-                    error: self.outputs.names[at].clone(),
-                    unit: self.outputs.units[at].clone(),
+                    error: output.name.clone(),
+                    unit: output.unit.clone(),
                     gain_of_fault: of_fault,
                     gain_of_rate: of_rate,
                     largest: by_rate.into_iter().chain(by_size).reduce(f64::min),
@@ -225,20 +237,11 @@ impl<'a> Loops<'a> {
     /// fault leaves a lasting error, also those from the rates of the faults to these errors.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
         let errors = self.to_fault_errors(&self.of_faults);
-        let count = errors.d.ncols();
-        let identity = DMatrix::identity(count, count);
-        let estimates = StateSpace { d: &errors.d + identity, ..errors.clone() };
+        let mut estimates = errors.clone();
+        estimates.d += DMatrix::identity(errors.d.nrows(), errors.d.ncols());
         let rates = self.to_fault_errors(&self.of_rates);
         let grid = frequency_grid(&self.of_faults, POINTS_PER_DECADE)?;
-        let curve = |name: &str, system: &StateSpace| {
-            let points = frequency_response(system, &grid)?;
-            let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
-            Ok(Frequency {
-                name: name.to_owned(),
-                frequencies: grid.clone(),
-                singular_values: (0..count).map(values).collect(),
-            })
-        };
+        let curve = |name: &str, system| self::frequency(name.to_owned(), system, grid.clone());
         let mut curves = vec![
             curve("faults to their estimates", &estimates)?,
             curve("faults to the errors of their estimates", &errors)?,

@@ -49,16 +49,16 @@ fn fault_bound(designed: &Solution) -> Result<f64, String> {
 
 /// Checks that the theorem applies: an augmented observer of constant faults in continuous time.
 fn applies(designed: &Solution) -> Result<(), String> {
-    if designed.law.law != Law::Augmented {
-        return Err("the theorem is about the augmented observer".to_owned());
-    }
-    if designed.domain != Domain::Continuous {
-        return Err("the theorem is about a controller in continuous time".to_owned());
-    }
-    if designed.plant.a_f.amax() > 0.0 {
-        return Err("the theorem is about constant faults".to_owned());
-    }
-    Ok(())
+    let subject = if designed.law.law != Law::Augmented {
+        "the augmented observer"
+    } else if designed.domain != Domain::Continuous {
+        "a controller in continuous time"
+    } else if designed.plant.a_f.amax() > 0.0 {
+        "constant faults"
+    } else {
+        return Ok(());
+    };
+    Err(format!("the theorem is about {subject}"))
 }
 
 /// Checks that the theorem applies, and that the observer is small enough for linear matrix inequalities.

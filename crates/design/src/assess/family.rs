@@ -36,7 +36,7 @@ pub(crate) fn family(
     };
     let members = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
     let closed = |(_, linear): &(String, &LinearPlant)| {
-        let physical = Physical::with(solution, linear)?;
+        let physical = Physical::of_gains(solution, linear, &solution.gains)?;
         Ok(physical.closed(&physical.controller)?.dynamics())
     };
     let loops = all.iter().map(closed).collect::<Result<Vec<_>, Error>>()?;
@@ -56,7 +56,7 @@ pub(crate) fn member(
     name: String,
     limits: &RobustnessLimits,
 ) -> Result<MemberReport, crate::Error> {
-    let physical = Physical::with(designed, linear)?;
+    let physical = Physical::of_gains(designed, linear, &designed.gains)?;
     let closed_loop = physical.closed(&physical.controller)?;
     let instability = instability(&closed_loop.dynamics(), designed.domain)?;
     if instability >= 0.0 {

@@ -26,7 +26,8 @@ pub(crate) struct Names {
 
 impl Names {
     pub(crate) fn of(designed: &Solution) -> Self {
-        let linear = &designed.linear;
+        let Solution { linear, tracking, .. } = designed;
+        let tracking = tracking.as_ref();
         let (states, measurements) = (names(&linear.states), names(&linear.measurements));
         let mut extended = states.clone();
         if designed.filter.is_some() {
@@ -35,10 +36,7 @@ impl Names {
         Self {
             actuators: names(&linear.actuators),
             faults: fault_names(linear, &designed.extended),
-            references: designed
-                .tracking
-                .as_ref()
-                .map_or(Vec::new(), |tracking| names(&tracking.signals)),
+            references: tracking.map_or(Vec::new(), |tracking| names(&tracking.signals)),
             states,
             extended,
             measurements,
@@ -102,9 +100,7 @@ impl Names {
             let diagonal = DMatrix::from_diagonal(&filter.clone().into());
             all.push(matrix("W", "measurement filter", &diagonal, measurements, measurements));
         }
-        let Some(tracking) = &designed.tracking else {
-            return all;
-        };
+        let Some(tracking) = &designed.tracking else { return all };
         let h = matrix("H", "outputs of the references", &tracking.h, references, measurements);
         all.push(h);
         if let Some(integral) = &gains.integral {

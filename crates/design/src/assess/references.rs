@@ -11,15 +11,14 @@ use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::solve::solution::Solution;
 use crate::solve::tracking::{REACHED, Tracking, TrackingAction};
+use plant_file::signals::Signal;
 
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];
 
 /// Returns the response to a step of each reference.
 pub(crate) fn reference_steps(designed: &Solution) -> Result<Vec<ReferenceStep>, Error> {
-    let Some(tracking) = &designed.tracking else {
-        return Ok(Vec::new());
-    };
+    let Some(tracking) = &designed.tracking else { return Ok(Vec::new()) };
     let reference_loop = ReferenceLoop::of(designed, tracking)?;
     (0..tracking.signals.len()).map(|at| reference_loop.step(at)).collect()
 }
@@ -57,18 +56,12 @@ pub(crate) fn beyond_limits(step: &ReferenceStep) -> Option<String> {
     ))
 }
 
-/// An output that the responses show.
-struct Output {
-    name: String,
-    unit: Option<String>,
-}
-
 /// The loop from the references to what the responses show.
 struct ReferenceLoop<'a> {
     designed: &'a Solution,
     tracking: &'a Tracking,
     /// The measurements, then the combinations of measurements that references set.
-    outputs: Vec<Output>,
+    outputs: Vec<Signal>,
     /// The output that each reference sets.
     tracked: Vec<usize>,
     /// Outputs, commands, and for a sampled loop the outputs at each time between samples.
@@ -78,9 +71,7 @@ struct ReferenceLoop<'a> {
 impl<'a> ReferenceLoop<'a> {
     fn of(designed: &'a Solution, tracking: &'a Tracking) -> Result<Self, Error> {
         let linear = &designed.linear;
-        let signal = |name: String, unit: &Option<String>| Output { name, unit: unit.clone() };
-        let mut outputs: Vec<_> =
-            linear.measurements.iter().map(|one| signal(one.name.clone(), &one.unit)).collect();
+        let mut outputs = linear.measurements.clone();
         let mut rows = linear.c.clone();
         let mut tracked = Vec::new();
         for (at, reference) in tracking.signals.iter().enumerate() {
@@ -92,7 +83,8 @@ impl<'a> ReferenceLoop<'a> {
                 let count = rows.nrows();
                 rows = rows.insert_row(count, 0.0);
                 rows.row_mut(count).copy_from(&tracking.output.row(at));
-                outputs.push(signal(format!("output of {}", reference.name), &reference.unit));
+                let name = format!("output of {}", reference.name);
+                outputs.push(Signal { name, ..reference.clone() });
             }
         }
         Ok(Self {
@@ -126,9 +118,8 @@ impl<'a> ReferenceLoop<'a> {
         for (row, output) in self.outputs.iter().enumerate() {
             let curve = self.curve(&trace, row, size, output);
             if row != tracked {
-                let Output { name, unit } = output;
-                let value = curve.peak.abs();
-                others.push(Number { name: name.clone(), unit: unit.clone(), value });
+                let (name, unit) = (output.name.clone(), output.unit.clone());
+                others.push(Number { name, unit, value: curve.peak.abs() });
             }
             curves.push(curve);
         }
@@ -138,8 +129,7 @@ impl<'a> ReferenceLoop<'a> {
         for (k, actuator) in linear.actuators.iter().enumerate() {
             let row = self.outputs.len() + k;
             let name = format!("command {}", actuator.name);
-            let output = Output { name, unit: actuator.unit.clone() };
-            let curve = self.curve(&trace, row, size, &output);
+            let curve = self.curve(&trace, row, size, &Signal { name, ..actuator.clone() });
             let values = curve.values.iter().chain([&curve.peak]);
             let range =
                 values.fold([0.0_f64; 2], |[low, high], value| [low.min(*value), high.max(*value)]);
@@ -171,7 +161,7 @@ impl<'a> ReferenceLoop<'a> {
 
     /// Returns the response to a step of `size` from `trace`, the response to a step of 1. `row`: a row of `system`, an
     /// output (of a sampled loop also between samples) or a command. `output`: its name and unit.
-    fn curve(&self, trace: &TimeResponse, row: usize, size: f64, output: &Output) -> Curve {
+    fn curve(&self, trace: &TimeResponse, row: usize, size: f64, output: &Signal) -> Curve {
         let points = if row < self.outputs.len() {
             self.points(trace, row)
         } else {
@@ -242,22 +232,16 @@ fn rise_time(points: &[(f64, f64)]) -> Option<f64> {
 fn reaches(points: &[(f64, f64)], level: f64) -> Option<f64> {
     let at = points.iter().position(|point| point.1 >= level)?;
     let (time, value) = points[at];
-    let Some((before, low)) = at.checked_sub(1).map(|at| points[at]) else {
-        return Some(time);
-    };
+    let Some((before, low)) = at.checked_sub(1).map(|at| points[at]) else { return Some(time) };
     Some(before + (level - low) / (value - low) * (time - before))
 }
 
 /// Returns the time after which the points stay within the band around one; infinite if the last point is outside.
 fn settled(points: &[(f64, f64)]) -> f64 {
     let outside = |point: &(f64, f64)| (point.1 - 1.0).abs() > SETTLED;
-    let Some(last) = points.iter().rposition(outside) else {
-        return 0.0;
-    };
+    let Some(last) = points.iter().rposition(outside) else { return 0.0 };
     let (time, value) = points[last];
-    let Some((after, inside)) = points.get(last + 1) else {
-        return f64::INFINITY;
-    };
+    let Some((after, inside)) = points.get(last + 1) else { return f64::INFINITY };
     let edge = if value > 1.0 { 1.0 + SETTLED } else { 1.0 - SETTLED };
     time + ((edge - value) / (inside - value)).clamp(0.0, 1.0) * (after - time)
 }
@@ -283,13 +267,7 @@ mod tests {
 
     #[test]
     fn the_largest_steps_take_the_first_command_to_its_limit() {
-        let command = |range, limits| CommandPeak {
-            name: "u".to_owned(),
-            unit: None,
-            range,
-            limits,
-            final_value: 0.0,
-        };
+        let command = |range, limits| CommandPeak { range, limits, ..CommandPeak::default() };
         let limits = |command, size| largest_step(&[command], size).map(|limit| format!("{limit}"));
         let free = command([-9.0, 9.0], None);
         assert_eq!(limits(free, 2.0), ["-inf", "inf"]);
@@ -308,14 +286,8 @@ mod tests {
             unit: Some("m".to_owned()),
             size: 2.5e-5,
             stated: true,
-            rise_time: None,
-            overshoot: 0.0,
-            settling_time: 0.0,
-            steady_state_error: 0.0,
-            commands: Vec::new(),
-            others: Vec::new(),
             largest_step: [-1.25e-5, 1.25e-5],
-            curves: Vec::new(),
+            ..ReferenceStep::default()
         };
         let warning = beyond_limits(&step).unwrap();
         assert!(warning.contains("steps from -1.25e-5 m to 1.25e-5 m stay"), "{warning}");

@@ -140,7 +140,7 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
 fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
     // The line of the plant file has these digits.
     let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);
-    match requirement {
+    let (requirement, line, words) = match requirement {
         Requirement::Eigenvalues(all) => {
             let all: Vec<_> = all
                 .iter()
@@ -150,12 +150,9 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
                 let (re, im) = (rounded(value.re), rounded(value.im));
                 if value.im == 0.0 { re } else { format!("{{ re = {re}, im = {im} }}") }
             });
-            let shown = shown.collect::<Vec<_>>().join(", ");
-            Some(Scaled {
-                requirement: Requirement::Eigenvalues(all),
-                line: format!("{name}.eigenvalues = [{shown}]"),
-                words: format!("{name} eigenvalues {factor} times as fast"),
-            })
+            let line = format!(".eigenvalues = [{}]", shown.collect::<Vec<_>>().join(", "));
+            let words = format!(" eigenvalues {factor} times as fast");
+            (Requirement::Eigenvalues(all), line, words)
         }
         Requirement::Weights { states, channels } => {
             let size = short(factor.powi(WEIGHT_POWER));
@@ -164,25 +161,21 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
                 let entries: Vec<_> = row.iter().map(|entry| rounded(*entry)).collect();
                 format!("[{}]", entries.join(", "))
             });
-            let rows = rows.collect::<Vec<_>>().join(", ");
-            let larger = rounded(size);
-            Some(Scaled {
-                requirement: Requirement::Weights { states: states.clone(), channels },
-                line: format!("{name}.{weight} = [{rows}]"),
-                words: format!("{name}.{weight} {larger} times as large"),
-            })
+            let line = format!(".{weight} = [{}]", rows.collect::<Vec<_>>().join(", "));
+            let words = format!(".{weight} {} times as large", rounded(size));
+            (Requirement::Weights { states: states.clone(), channels }, line, words)
         }
         Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => {
             let rate = short(factor * rate);
             let bandwidth = Bandwidth { rate: Some(rate), is_stated: true };
-            Some(Scaled {
-                requirement: Requirement::Bandwidth(bandwidth),
-                line: format!("{name}.bandwidth = {}", rounded(rate)),
-                words: format!("{name}.bandwidth {factor} times as large"),
-            })
+            let line = format!(".bandwidth = {}", rounded(rate));
+            let words = format!(".bandwidth {factor} times as large");
+            (Requirement::Bandwidth(bandwidth), line, words)
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    let [line, words] = [line, words].map(|text| format!("{name}{text}"));
+    Some(Scaled { requirement, line, words })
 }
 
 impl Variant {
@@ -270,12 +263,12 @@ impl Reason {
             }
             (None, _) if !is_complete => return None,
             (None, Some(trial)) => {
-                let peaks = trial.peaks();
                 let change = format!(
                     "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, meets the limit; \
-                     with {}, the peak of S is {peaks}{untried}",
+                     with {}, the peak of S is {}{untried}",
                     trials.len(),
-                    trial.words
+                    trial.words,
+                    trial.peaks()
                 );
                 (trial, change)
             }

@@ -9,7 +9,7 @@ use control::placement::Quality;
 use control::{Domain, Error};
 use fmu_description::documentation::texts;
 use fmu_description::{ModelDescription, ScalarVariable};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
 use crate::assess::analysis::Loops;
 use crate::assess::certificate::certificate;
@@ -90,17 +90,8 @@ impl<'a> Assessment<'a> {
 
 /// Returns the report on a design.
 pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error> {
-    let Assessment {
-        file,
-        parameters,
-        designed,
-        description,
-        detection,
-        reconfiguration,
-        fallback,
-        limits,
-        steps,
-    } = assessment;
+    let Assessment { file, parameters, designed, limits, steps, .. } = assessment;
+    let Assessment { description, detection, reconfiguration, fallback, .. } = assessment;
     let nominal = &designed.nominal;
     let loops = Loops::of(nominal)?;
     let Solution { plant, gains, .. } = nominal;
@@ -172,7 +163,10 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
             Some(&file.observer.requirement).filter(|_| nominal.law.keeps_error_dynamics()),
         )?,
         estimation: estimation::estimation(nominal, errors),
-        sampling: sampling(file, nominal),
+        sampling: file.sampling.map(|sampling| Sampled {
+            sample_time: sampling.period,
+            estimator: estimator(gains.estimator).to_owned(),
+        }),
         family: family_report,
         schedule,
         detection,
@@ -187,14 +181,6 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         fallback,
         assumptions: assumptions(file, designed),
         interface: Vec::new(),
-    })
-}
-
-/// Returns the sampling of the controller; none in continuous time.
-fn sampling(file: &PlantFile<'_>, solution: &Solution) -> Option<Sampled> {
-    file.sampling.map(|sampling| Sampled {
-        sample_time: sampling.period,
-        estimator: estimator(solution.gains.estimator).to_owned(),
     })
 }
 
@@ -251,10 +237,7 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
         faults: linear.faults.iter().map(fault).collect(),
         matrices: names.plant_matrices(designed),
         eigenvalues: pairs(&eigenvalues(&linear.undelayed.a)?),
-        sample_time: match linear.domain {
-            Domain::Continuous => None,
-            Domain::Sampled { period } => Some(period),
-        },
+        sample_time: (linear.domain != Domain::Continuous).then(|| linear.domain.step()),
     })
 }
 
@@ -299,7 +282,8 @@ fn closed(
         _ => None,
     };
     let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
-    let required = pairs(&sorted(&result.required));
+    let mut required = pairs(&result.required);
+    required.sort_by(|[x, u], [y, v]| x.total_cmp(y).then(u.total_cmp(v)));
     Ok(Loop {
         matrix: name.to_owned(),
         method: result.method.clone(),
@@ -319,12 +303,6 @@ fn closed(
         }),
         norm: result.norm.clone(),
     })
-}
-
-fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
-    let mut all = eigenvalues.to_vec();
-    all.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
-    all
 }
 
 /// Returns the largest stable loss of effectiveness of each actuator that has a fault of this kind.
@@ -373,15 +351,11 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     let is_constant = |fault: &Fault| fault.dynamics == FaultDynamics::Constant;
     let lagging = "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
                    causes the errors.";
-    if nominal.linear.faults.iter().any(is_constant) {
-        all.push(lagging.to_owned());
-    }
+    all.extend(nominal.linear.faults.iter().any(is_constant).then(|| lagging.to_owned()));
     let linearised = "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
                       those of its linearisation within the boundary layer, for faults and noise small against \
                       rho; larger faults leave rho / (rho - |f|) times the lasting error.";
-    if nominal.law.injection.is_some() {
-        all.push(linearised.to_owned());
-    }
+    all.extend(nominal.law.injection.is_some().then(|| linearised.to_owned()));
     if let Domain::Sampled { period } = nominal.domain {
         all.push(if file.model.only_samples().is_some() {
             format!(
@@ -398,22 +372,16 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     }
     let of_nominal = "Responses, bounds and certificates of the estimation errors are those of the nominal \
                       plant; the estimation error of another member also depends on its states.";
-    if family.is_some() {
-        all.push(of_nominal.to_owned());
-    }
+    all.extend(family.is_some().then(|| of_nominal.to_owned()));
     let of_file = "Gains, responses and bounds are those of the plant of the file; between the points of the \
                    schedule, plant and controller are interpolated linearly. A change of the operating point \
                    acts like a disturbance.";
-    if schedule.is_some() {
-        all.push(of_file.to_owned());
-    }
+    all.extend(schedule.is_some().then(|| of_file.to_owned()));
     let loses =
         |model: &control::faults::Fault| matches!(model.entry, FaultEntry::LossOfEffectiveness(_));
     let lost = "The loss of effectiveness is constant; it is estimated only while the command is well \
                 above its threshold.";
-    if nominal.linear.models.iter().any(loses) {
-        all.push(lost.to_owned());
-    }
+    all.extend(nominal.linear.models.iter().any(loses).then(|| lost.to_owned()));
     all
 }
 

@@ -5,7 +5,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::assess::analysis::Outputs;
+use crate::assess::analysis::{Output, outputs};
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
 use crate::solve::solution::Solution;
@@ -76,18 +76,10 @@ fn part(fault: &Fault) -> Number {
     Number { name: fault.name.clone(), unit: fault.unit.clone(), value: size(fault) }
 }
 
-/// A signal that a response shows.
-struct ShownSignal {
-    name: String,
-    unit: Option<String>,
-    /// Its position among the outputs of the system.
-    row: usize,
-}
-
 /// The loop from the faults to all that the responses show.
 struct ShownLoop<'a> {
     designed: &'a Solution,
-    outputs: Outputs,
+    outputs: Vec<Output>,
     /// Outputs: [x; e; eps], the commands, and for a sampled loop the states at each time between
     /// samples.
     system: StateSpace,
@@ -125,7 +117,7 @@ impl<'a> ShownLoop<'a> {
                 add_outputs(&mut system, &states, &gamma.columns(m, q).into_owned());
             }
         }
-        Ok(Self { designed, outputs: Outputs::of(designed), system })
+        Ok(Self { designed, outputs: outputs(designed), system })
     }
 
     /// Returns the loop with one input that changes all faults by their sizes.
@@ -144,38 +136,35 @@ impl<'a> ShownLoop<'a> {
         let Solution { plant, linear, extended, .. } = self.designed;
         let first_command = 2 * plant.a.nrows() + plant.f_a.ncols();
         let first_between = first_command + plant.b.ncols();
-        let signals = self.outputs.names.iter().zip(&self.outputs.units);
-        let signals = signals.zip(&self.outputs.positions);
         let mut curves = Vec::new();
-        for (at, ((name, unit), &row)) in signals.enumerate() {
+        for (at, output) in self.outputs.iter().enumerate() {
             let between = |part: usize| first_between + part * extended.states + at;
             let is_state = at < linear.plant_states().len();
             let times = points(self.designed, trace, |k, part| match part {
-                None => Some(trace.output[(row, k)]),
+                None => Some(trace.output[(output.row, k)]),
                 Some(part) if is_state => Some(trace.output[(between(part), k)]),
                 Some(_) => None,
             });
-            let shown = ShownSignal { name: name.clone(), unit: unit.clone(), row };
-            curves.push(self.curve(shown, trace, factor, &times));
+            curves.push(self.curve(output, trace, factor, &times));
         }
         for (at, actuator) in linear.actuators.iter().enumerate() {
             let row = first_command + at;
             let times = points(self.designed, trace, |k, _| Some(trace.output[(row, k)]));
             let name = format!("command {}", actuator.name);
-            let shown = ShownSignal { name, unit: actuator.unit.clone(), row };
-            curves.push(self.curve(shown, trace, factor, &times));
+            let output = Output { name, unit: actuator.unit.clone(), row };
+            curves.push(self.curve(&output, trace, factor, &times));
         }
         curves
     }
 
     fn curve(
         &self,
-        shown: ShownSignal,
+        output: &Output,
         trace: &TimeResponse,
         factor: f64,
         points: &[(f64, f64)],
     ) -> Curve {
-        let ShownSignal { name, unit, row } = shown;
+        let row = output.row;
         let at_points = trace.transient(row, SETTLED);
         let (peak, peak_time, settling_time) = match self.designed.domain {
             Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),
@@ -183,8 +172,8 @@ impl<'a> ShownLoop<'a> {
         };
         let shown = thinned(points, MOST[usize::from(self.system.a.nrows() >= LARGE)]);
         Curve {
-            name,
-            unit,
+            name: output.name.clone(),
+            unit: output.unit.clone(),
             peak: factor * peak,
             peak_time,
             settling_time,
@@ -262,8 +251,7 @@ fn transient(points: &[(f64, f64)], final_value: f64) -> (f64, f64, f64) {
     let band = SETTLED * points.iter().map(distance).fold(0.0, f64::max);
     let outside = points.iter().rposition(|point| distance(point) > band);
     let inside = |at: usize| points.get(at + 1).map_or(f64::INFINITY, |point| point.0);
-    let settled = outside.map_or(0.0, inside);
-    (peak, peak_time, settled)
+    (peak, peak_time, outside.map_or(0.0, inside))
 }
 
 #[cfg(test)]

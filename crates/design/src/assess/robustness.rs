@@ -11,7 +11,7 @@ pub(crate) use tolerances::by_entries;
 
 use control::aso::Gains;
 use control::controller::CompleteController;
-use control::response::{frequency_grid, frequency_response, h_infinity};
+use control::response::{frequency_grid, h_infinity};
 use control::robustness::{
     DiskMargin, Loop, OpenedLoop, Point, SensitivityPeak, Tolerances, longest_hold, longest_period,
     peak_derivatives, regulator_of_same_speed,
@@ -21,6 +21,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::assess::analysis::frequency;
 use crate::assess::matrices::of_plant;
 use crate::budget::{Budget, TimeLimits};
 use crate::plant::linear::LinearPlant;
@@ -172,12 +173,7 @@ pub(crate) struct Physical {
 
 impl Physical {
     pub(crate) fn of(designed: &Solution) -> Result<Self, Error> {
-        Self::with(designed, &designed.linear)
-    }
-
-    /// Returns the plant `linear` and the controller of `designed`.
-    pub(crate) fn with(designed: &Solution, linear: &LinearPlant) -> Result<Self, Error> {
-        Self::of_gains(designed, linear, &designed.gains)
+        Self::of_gains(designed, &designed.linear, &designed.gains)
     }
 
     /// Returns the plant `linear` and the controller of `designed` with `gains` in place of its own gains.
@@ -369,13 +365,7 @@ fn curves(closed_loop: &Loop) -> Result<Vec<Frequency>, Error> {
     });
     let one = |(symbol, system, name): &(&str, StateSpace, &str)| {
         let grid = frequency_grid(system, POINTS_PER_DECADE)?;
-        let points = frequency_response(system, &grid)?;
-        let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
-        Ok(Frequency {
-            name: format!("{symbol} at the {name}"),
-            singular_values: (0..system.d.nrows()).map(values).collect(),
-            frequencies: grid,
-        })
+        frequency(format!("{symbol} at the {name}"), system, grid)
     };
     systems.collect::<Vec<_>>().par_iter().map(one).collect()
 }

@@ -16,28 +16,21 @@ pub(crate) fn verdict(
     remedies: Vec<Remedy>,
 ) -> Verdict {
     let RobustnessLimits { amber, red, tolerance, .. } = *limits;
-    let stated = Limits { amber, red, tolerance };
-    let mut level = Level::Green;
-    let mut reasons = Vec::new();
+    let limits_of_levels = Limits { amber, red, tolerance };
+    let (level, reasons) = (Level::Green, Vec::new());
+    let mut verdict = Verdict { level, reasons, remedies, limits: limits_of_levels };
     for check in checks.iter().filter(|check| !check.holds) {
-        level = Level::Red;
-        reasons.push(format!("does not hold: {}", check.condition));
+        verdict.add(Level::Red, format!("does not hold: {}", check.condition));
     }
-    for point in robustness.iter().flat_map(|figures| &figures.points) {
-        let Some((reached, reason)) = peak_reason(point, limits) else { continue };
-        level = level.max(reached);
-        reasons.push(reason);
-    }
+    let points = robustness.iter().flat_map(|figures| &figures.points);
+    let of_peaks = points.filter_map(|point| peak_reason(point, limits));
     let tolerance = robustness.map(|figures| &figures.tolerance);
-    if let Some(unstable) = tolerance.filter(|test| test.is_unstable()) {
-        level = Level::Red;
-        reasons.push(instability(unstable));
+    let unstable = tolerance.filter(|test| test.is_unstable());
+    let of_tolerances = unstable.map(|test| (Level::Red, instability(test)));
+    for (level, reason) in of_peaks.chain(of_tolerances).chain(further) {
+        verdict.add(level, reason);
     }
-    for (reached, reason) in further {
-        level = level.max(reached);
-        reasons.push(reason);
-    }
-    Verdict { level, reasons, remedies, limits: stated }
+    verdict
 }
 
 /// Returns the sentence about a peak of S above a limit, with the level of the verdict; None if it is within the
@@ -88,17 +81,7 @@ mod tests {
 
     #[test]
     fn a_small_part_of_the_tolerances_keeps_its_digits() {
-        let test = ToleranceResult {
-            entries: 1,
-            varying: Vec::new(),
-            parameters: Vec::new(),
-            cases: 0,
-            seed: 1,
-            stable: None,
-            worst_instability: 1.0,
-            first_unstable: 0.00025,
-            worst: Vec::new(),
-        };
+        let test = ToleranceResult { first_unstable: 0.00025, ..ToleranceResult::default() };
         let expected = "the worst case found, from 0.00025 of the tolerances on";
         assert_eq!(unstable_cases(&test), expected);
     }

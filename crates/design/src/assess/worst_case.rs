@@ -22,9 +22,7 @@ pub(crate) fn plant_file(
     designed: &Solution,
     report: &Report,
 ) -> Result<Option<String>, crate::Error> {
-    let Some(robustness) = &report.robustness else {
-        return Ok(None);
-    };
+    let Some(robustness) = &report.robustness else { return Ok(None) };
     let unwritable = |error: &dyn std::fmt::Display| crate::Error::Invalid(error.to_string());
     let mut table: Table = file.text().parse().map_err(|error| unwritable(&error))?;
     for matrix in &robustness.tolerance.worst {

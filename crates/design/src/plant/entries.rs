@@ -6,19 +6,6 @@ use crate::plant::delays::placed;
 use crate::plant::linear::LinearPlant;
 use plant_file::robustness::RobustnessLimits;
 
-/// Returns the tolerances that a plant file states, for the plant without its delays: those of whole matrices for the
-/// entries that are not structural, and those of named entries.
-fn of_plant(linear: &LinearPlant, limits: &RobustnessLimits) -> Tolerances {
-    let mut tolerances = Tolerances::unless_structural(&linear.undelayed, limits.tolerance);
-    for named in &limits.entries {
-        for &PlantEntry { matrix, row, column } in &named.entries {
-            tolerances.of[matrix][(row, column)] = named.relative;
-        }
-        tolerances.common.push(named.entries.clone());
-    }
-    tolerances
-}
-
 /// The tolerances of a plant file.
 pub(crate) struct EntryTolerances {
     /// In the plant without its delays.
@@ -27,13 +14,20 @@ pub(crate) struct EntryTolerances {
     pub(crate) placed: Tolerances,
 }
 
-/// Returns the tolerances that a plant file states; `order`: the number of states of each delay.
+/// Returns the tolerances that a plant file states: those of whole matrices for the entries that are not structural, and
+/// those of named entries. `order`: the number of states of each delay.
 pub(crate) fn tolerances(
     linear: &LinearPlant,
     order: usize,
     limits: &RobustnessLimits,
 ) -> EntryTolerances {
-    let stated = of_plant(linear, limits);
+    let mut stated = Tolerances::unless_structural(&linear.undelayed, limits.tolerance);
+    for named in &limits.entries {
+        for &PlantEntry { matrix, row, column } in &named.entries {
+            stated.of[matrix][(row, column)] = named.relative;
+        }
+        stated.common.push(named.entries.clone());
+    }
     let placed = placed(&linear.delays, order, stated.clone());
     EntryTolerances { stated, placed }
 }

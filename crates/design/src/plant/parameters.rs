@@ -39,9 +39,7 @@ impl<'a> ParameterFamily<'a> {
     /// Returns the family that the plant file asks for; None without an FMU, or without `parameters`.
     pub(crate) fn of(file: &'a PlantFile<'a>) -> Result<Option<Self>, crate::Error> {
         let tolerances = &file.robustness.parameters;
-        let plant_file::Model::Fmu(table) = &file.model else {
-            return Ok(None);
-        };
+        let plant_file::Model::Fmu(table) = &file.model else { return Ok(None) };
         if tolerances.is_empty() {
             return Ok(None);
         }
@@ -152,11 +150,10 @@ fn resolve(
     })?;
     let limits = match *tolerance {
         Tolerance::Relative(_) if nominal.abs() <= 0.0 => {
-            let message = format!(
+            return Err(refused(format!(
                 "{name} is 0, of which a fraction is nothing: expected the lowest and the highest \
                  value, {name} = [low, high]"
-            );
-            return Err(refused(message));
+            )));
         }
         Tolerance::Relative(fraction) => {
             let half_width = fraction * nominal.abs();
@@ -166,19 +163,18 @@ fn resolve(
     };
     let [low, high] = limits;
     if !(low <= nominal && nominal <= high && low < high) {
-        let message =
-            format!("{name}: expected limits around its value {nominal}, found {low} and {high}");
-        return Err(refused(message));
+        return Err(refused(format!(
+            "{name}: expected limits around its value {nominal}, found {low} and {high}"
+        )));
     }
     let allowed = real.min.is_none_or(|min| min <= low) && real.max.is_none_or(|max| high <= max);
     if !allowed {
         let end = |end: Option<f64>| end.map_or_else(|| "none".to_owned(), |end| end.to_string());
-        let message = format!(
+        return Err(refused(format!(
             "{name}: {low} to {high} is not within `min` ({}) and `max` ({}) of the FMU",
             end(real.min),
             end(real.max)
-        );
-        return Err(refused(message));
+        )));
     }
     Ok(FmuParameter { name: name.clone(), unit: real.unit.clone(), nominal, limits })
 }

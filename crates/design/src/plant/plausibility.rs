@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, DVector};
 use crate::plant::linear::{INACCURATE, LinearPlant};
 use crate::report::number::rounded;
 use control::faults::ExtendedPlant;
-use plant_file::signals::Signal;
 use plant_file::signals::{joined, signal_names};
 use plant_file::{FAULTS, PlantFile};
 
@@ -36,40 +35,30 @@ pub(crate) fn check_limits(
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, PlaceError> {
     let mut warnings = Vec::new();
-    let operating_point = |what: &str, signal: &Signal, value: f64| {
-        let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-        format!("the operating point of the {what} `{}`, {value}{unit}", signal.name)
-    };
-    for actuator in &linear.actuators {
-        let (Some([low, high]), [_, Some(place), _]) = (actuator.limits, &actuator.places) else {
-            continue;
-        };
-        let value = actuator.operating.unwrap_or(0.0);
-        let point = operating_point("actuator", actuator, value);
-        if value < low || value > high {
-            let message = format!(
-                "{point}, is outside of its limits {low} and {high}; expected limits around it, or \
-                 another `operating` or `operating_point`"
-            );
-            return Err(file.error_at(place, message));
-        }
-        if value <= low || value >= high {
-            let effect = "is at a limit, so that the controller acts in one direction only";
-            warnings.push(file.error_at(place, format!("{point}, {effect}")));
-        }
-    }
-    for signal in &linear.measurements {
+    let actuators = linear.actuators.iter().map(|signal| ("actuator", signal));
+    let measurements = linear.measurements.iter().map(|signal| ("measurement", signal));
+    for (what, signal) in actuators.chain(measurements) {
         let (Some([low, high]), [_, Some(place), _]) = (signal.limits, &signal.places) else {
             continue;
         };
         let value = signal.operating.unwrap_or(0.0);
-        if !(low..=high).contains(&value) {
+        let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        let point = format!("the operating point of the {what} `{}`, {value}{unit}", signal.name);
+        let is_actuator = what == "actuator";
+        if value < low || value > high {
+            let (limits, expected) = if is_actuator {
+                (format!("limits {low} and {high}"), "limits around it")
+            } else {
+                (format!("range from {low} to {high}"), "a range that contains it")
+            };
             let message = format!(
-                "{}, is outside of its range from {low} to {high}; expected a range that contains it, or another \
-                 `operating` or `operating_point`",
-                operating_point("measurement", signal, value)
+                "{point}, is outside of its {limits}; expected {expected}, or another `operating` or `operating_point`"
             );
             return Err(file.error_at(place, message));
+        }
+        if is_actuator && (value <= low || value >= high) {
+            let effect = "is at a limit, so that the controller acts in one direction only";
+            warnings.push(file.error_at(place, format!("{point}, {effect}")));
         }
     }
     Ok(warnings)

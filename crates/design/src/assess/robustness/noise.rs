@@ -34,15 +34,13 @@ pub(super) fn noise(
     let estimated = linear.faults.iter();
     let estimated =
         estimated.map(|fault| (format!("estimate of {}", fault.name), fault.unit.clone()));
-    let affected: Vec<_> = named.chain(estimated).collect();
-    let all = commands.row_iter().chain(faults.row_iter());
-    let together = affected.iter().zip(all).map(|((name, unit), row)| Number {
-        name: name.clone(),
-        unit: unit.clone(),
-        value: row.norm(),
-    });
-    let together: Vec<_> = together.collect();
-    let affected: Vec<_> = affected.into_iter().map(|(name, _)| name).collect();
+    let rows = commands.row_iter().chain(faults.row_iter());
+    let together: Vec<_> = named
+        .chain(estimated)
+        .zip(rows)
+        .map(|((name, unit), row)| Number { name, unit, value: row.norm() })
+        .collect();
+    let affected: Vec<_> = together.iter().map(|number| number.name.clone()).collect();
     let meaning = "root-mean-square values under the noise of each measurement";
     let (values, measurements) = (stacked(&commands, &faults), names(&linear.measurements));
     Ok((matrix("noise", meaning, &values, &affected, &measurements), together))

@@ -85,14 +85,12 @@ fn tolerance_result(
     let StateSpace { a, b, c, d, .. } = test.worst.clone();
     let worst = linear.of_plant(&[a, b, c, d]);
     ToleranceResult {
-        entries: 0,
-        varying: Vec::new(),
-        parameters: Vec::new(),
         cases: test.cases,
         seed: limits.seed,
         stable: stable(test),
         worst_instability: test.worst_instability,
         first_unstable: test.first_unstable.unwrap_or(f64::INFINITY),
         worst: of_plant(linear, "worst plant within the tolerances", &worst),
+        ..ToleranceResult::default()
     }
 }
