@@ -118,7 +118,7 @@ fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) ->
         Version::V1 if !interfaces.contains(&InterfaceType::CoSimulation) => Vec::new(),
         Version::V1 => abi1::FUNCTIONS.map(|name| format!("{identifier}_{name}")).to_vec(),
         Version::V2 => required_functions(interfaces).map(str::to_owned).collect(),
-        Version::V3 => abi3::FUNCTIONS.map(str::to_owned).to_vec(),
+        Version::V3 => abi3::functions().map(str::to_owned).collect(),
     }
 }
 

@@ -1,15 +1,7 @@
 //! The C types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`.
-#![expect(non_camel_case_types, reason = "the names of the C headers")]
+#![expect(non_camel_case_types, missing_docs, reason = "the names of the C headers")]
 
 use std::ffi::{c_char, c_int, c_void};
-
-/// Declares types of a header, documented by their names.
-macro_rules! c_types {
-    ($($name:ident = $type:ty;)*) => {
-        $(#[doc = concat!("`", stringify!($name), "`.")] pub type $name = $type;)*
-    };
-}
-pub(crate) use c_types;
 
 /// Declares an enumeration of a header: without `$prefix`, with which the names of its values start in C.
 macro_rules! c_enumeration {
@@ -43,15 +35,13 @@ macro_rules! c_enumeration {
 }
 pub(crate) use c_enumeration;
 
-c_types! {
-    fmi2Component = *mut c_void;
-    fmi2ComponentEnvironment = *mut c_void;
-    fmi2FMUstate = *mut c_void;
-    fmi2ValueReference = u32;
-    fmi2Real = f64;
-    fmi2Integer = c_int;
-    fmi2Byte = c_char;
-}
+pub type fmi2Component = *mut c_void;
+pub type fmi2ComponentEnvironment = *mut c_void;
+pub type fmi2FMUstate = *mut c_void;
+pub type fmi2ValueReference = u32;
+pub type fmi2Real = f64;
+pub type fmi2Integer = c_int;
+pub type fmi2Byte = c_char;
 /// `fmi2Boolean`: zero is false, anything else true.
 pub type fmi2Boolean = c_int;
 /// `fmi2String`: zero-terminated UTF-8.
@@ -84,19 +74,13 @@ c_enumeration! {
     }
 }
 
-/// `fmi2EventInfo`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct fmi2EventInfo {
-    /// `newDiscreteStatesNeeded`.
     pub new_discrete_states_needed: fmi2Boolean,
-    /// `terminateSimulation`.
     pub terminate_simulation: fmi2Boolean,
-    /// `nominalsOfContinuousStatesChanged`.
     pub nominals_of_continuous_states_changed: fmi2Boolean,
-    /// `valuesOfContinuousStatesChanged`.
     pub values_of_continuous_states_changed: fmi2Boolean,
-    /// `nextEventTimeDefined`.
     pub next_event_time_defined: fmi2Boolean,
     /// `nextEventTime` in s.
     pub next_event_time: fmi2Real,
@@ -111,24 +95,17 @@ pub type fmi2CallbackLogger = unsafe extern "C" fn(
     fmi2String,
     ...
 );
-/// `fmi2CallbackAllocateMemory`.
 pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(usize, usize) -> *mut c_void;
-/// `fmi2CallbackFreeMemory`.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(*mut c_void);
-/// `fmi2StepFinished`.
 pub type fmi2StepFinished = unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2Status);
 
-/// `fmi2CallbackFunctions`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct fmi2CallbackFunctions {
     /// `logger`; may be null.
     pub logger: Option<fmi2CallbackLogger>,
-    /// `allocateMemory`.
     pub allocate_memory: Option<fmi2CallbackAllocateMemory>,
-    /// `freeMemory`.
     pub free_memory: Option<fmi2CallbackFreeMemory>,
-    /// `stepFinished`.
     pub step_finished: Option<fmi2StepFinished>,
     /// `componentEnvironment`, passed back with every callback.
     pub component_environment: fmi2ComponentEnvironment,

@@ -2,30 +2,29 @@
 //!
 //! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here, because the other side may pass a byte that
 //! is neither 0 nor 1, which is no valid `bool`. The C ABIs of all platforms pass both types in the same way.
-#![expect(non_camel_case_types, reason = "the names of the C headers")]
+#![expect(non_camel_case_types, missing_docs, reason = "the names of the C headers")]
 
 use std::ffi::{c_char, c_int, c_void};
 
-use crate::abi::{c_enumeration, c_types};
+use crate::abi::c_enumeration;
+use crate::call_order3::Function;
 
-c_types! {
-    fmi3Instance = *mut c_void;
-    fmi3InstanceEnvironment = *mut c_void;
-    fmi3FMUState = *mut c_void;
-    fmi3ValueReference = u32;
-    fmi3Float32 = f32;
-    fmi3Float64 = f64;
-    fmi3Int8 = i8;
-    fmi3UInt8 = u8;
-    fmi3Int16 = i16;
-    fmi3UInt16 = u16;
-    fmi3Int32 = i32;
-    fmi3UInt32 = u32;
-    fmi3Int64 = i64;
-    fmi3UInt64 = u64;
-    fmi3Char = c_char;
-    fmi3Byte = u8;
-}
+pub type fmi3Instance = *mut c_void;
+pub type fmi3InstanceEnvironment = *mut c_void;
+pub type fmi3FMUState = *mut c_void;
+pub type fmi3ValueReference = u32;
+pub type fmi3Float32 = f32;
+pub type fmi3Float64 = f64;
+pub type fmi3Int8 = i8;
+pub type fmi3UInt8 = u8;
+pub type fmi3Int16 = i16;
+pub type fmi3UInt16 = u16;
+pub type fmi3Int32 = i32;
+pub type fmi3UInt32 = u32;
+pub type fmi3Int64 = i64;
+pub type fmi3UInt64 = u64;
+pub type fmi3Char = c_char;
+pub type fmi3Byte = u8;
 /// `fmi3Boolean`: 0 is false, 1 is true.
 pub type fmi3Boolean = u8;
 /// `fmi3String`: zero-terminated UTF-8.
@@ -44,84 +43,18 @@ pub type fmi3IntervalQualifier = c_int;
 /// The result of `fmi3GetVersion`, for every 3.0.x.
 pub const VERSION: &std::ffi::CStr = c"3.0";
 
-/// The names of all functions of `fmi3Functions.h`; a library exports all of them (section 2.5).
-pub const FUNCTIONS: [&str; 75] = [
-    "fmi3GetVersion",
-    "fmi3SetDebugLogging",
-    "fmi3InstantiateModelExchange",
-    "fmi3InstantiateCoSimulation",
-    "fmi3InstantiateScheduledExecution",
-    "fmi3FreeInstance",
-    "fmi3EnterInitializationMode",
-    "fmi3ExitInitializationMode",
-    "fmi3EnterEventMode",
-    "fmi3Terminate",
-    "fmi3Reset",
-    "fmi3GetFloat32",
-    "fmi3GetFloat64",
-    "fmi3GetInt8",
-    "fmi3GetUInt8",
-    "fmi3GetInt16",
-    "fmi3GetUInt16",
-    "fmi3GetInt32",
-    "fmi3GetUInt32",
-    "fmi3GetInt64",
-    "fmi3GetUInt64",
-    "fmi3GetBoolean",
-    "fmi3GetString",
-    "fmi3GetBinary",
-    "fmi3GetClock",
-    "fmi3SetFloat32",
-    "fmi3SetFloat64",
-    "fmi3SetInt8",
-    "fmi3SetUInt8",
-    "fmi3SetInt16",
-    "fmi3SetUInt16",
-    "fmi3SetInt32",
-    "fmi3SetUInt32",
-    "fmi3SetInt64",
-    "fmi3SetUInt64",
-    "fmi3SetBoolean",
-    "fmi3SetString",
-    "fmi3SetBinary",
-    "fmi3SetClock",
-    "fmi3GetNumberOfVariableDependencies",
-    "fmi3GetVariableDependencies",
-    "fmi3GetFMUState",
-    "fmi3SetFMUState",
-    "fmi3FreeFMUState",
-    "fmi3SerializedFMUStateSize",
-    "fmi3SerializeFMUState",
-    "fmi3DeserializeFMUState",
-    "fmi3GetDirectionalDerivative",
-    "fmi3GetAdjointDerivative",
-    "fmi3EnterConfigurationMode",
-    "fmi3ExitConfigurationMode",
-    "fmi3GetIntervalDecimal",
-    "fmi3GetIntervalFraction",
-    "fmi3GetShiftDecimal",
-    "fmi3GetShiftFraction",
-    "fmi3SetIntervalDecimal",
-    "fmi3SetIntervalFraction",
-    "fmi3SetShiftDecimal",
-    "fmi3SetShiftFraction",
-    "fmi3EvaluateDiscreteStates",
-    "fmi3UpdateDiscreteStates",
-    "fmi3EnterContinuousTimeMode",
-    "fmi3CompletedIntegratorStep",
-    "fmi3SetTime",
-    "fmi3SetContinuousStates",
-    "fmi3GetContinuousStateDerivatives",
-    "fmi3GetEventIndicators",
-    "fmi3GetContinuousStates",
-    "fmi3GetNominalsOfContinuousStates",
-    "fmi3GetNumberOfEventIndicators",
-    "fmi3GetNumberOfContinuousStates",
-    "fmi3EnterStepMode",
-    "fmi3GetOutputDerivatives",
-    "fmi3DoStep",
-    "fmi3ActivateModelPartition",
-];
+/// Returns the names of all functions of `fmi3Functions.h`, in its order; a library exports all of them (section 2.5).
+pub fn functions() -> impl Iterator<Item = &'static str> {
+    let first = [
+        "fmi3GetVersion",
+        "fmi3SetDebugLogging",
+        "fmi3InstantiateModelExchange",
+        "fmi3InstantiateCoSimulation",
+        "fmi3InstantiateScheduledExecution",
+    ];
+    let others = Function::EVERY.iter().map(|function| function.name());
+    first.into_iter().chain(others.filter(|name| *name != "fmi3SetDebugLogging"))
+}
 
 c_enumeration! {
     /// The values of `fmi3Status` (section 2.2.4).
@@ -142,10 +75,8 @@ c_enumeration! {
     }
 }
 
-/// `fmi3LogMessageCallback`.
 pub type fmi3LogMessageCallback =
     unsafe extern "C" fn(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
-/// `fmi3ClockUpdateCallback`.
 pub type fmi3ClockUpdateCallback = unsafe extern "C" fn(fmi3InstanceEnvironment);
 /// `fmi3IntermediateUpdateCallback`: environment, `intermediateUpdateTime`,
 /// `intermediateVariableSetRequested`, `intermediateVariableGetAllowed`, `intermediateStepFinished`,
@@ -160,9 +91,7 @@ pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
     *mut fmi3Boolean,
     *mut fmi3Float64,
 );
-/// `fmi3LockPreemptionCallback`.
 pub type fmi3LockPreemptionCallback = unsafe extern "C" fn();
-/// `fmi3UnlockPreemptionCallback`.
 pub type fmi3UnlockPreemptionCallback = unsafe extern "C" fn();
 
 #[cfg(test)]

@@ -63,24 +63,28 @@ states! {
     IntermediateUpdateMode,
 }
 
-const I: u16 = State::Instantiated.bit();
-const M: u16 = State::InitializationMode.bit();
-const V: u16 = State::EventMode.bit();
-const N: u16 = State::ContinuousTimeMode.bit();
-const C: u16 = State::StepComplete.bit();
+pub(crate) const I: u16 = State::Instantiated.bit();
+pub(crate) const M: u16 = State::InitializationMode.bit();
+pub(crate) const V: u16 = State::EventMode.bit();
+pub(crate) const N: u16 = State::ContinuousTimeMode.bit();
+pub(crate) const C: u16 = State::StepComplete.bit();
 const P: u16 = State::StepInProgress.bit();
 const F: u16 = State::StepFailed.bit();
 const K: u16 = State::StepCanceled.bit();
-const T: u16 = State::Terminated.bit();
+pub(crate) const T: u16 = State::Terminated.bit();
 const E: u16 = State::Error.bit();
 /// Every state of FMI 2.0 except during a step and after `fmi2Fatal`.
 const ALL: u16 = I | M | V | N | C | F | K | T | E;
 /// The states in which values may be read.
 const READ: u16 = ALL & !I;
 
-/// Declares the functions of a version of FMI, and the states in which each may be called.
+/// Declares the functions of a version of FMI, the states in which each may be called, and those that may return
+/// `Discard`: always, in model exchange, in co-simulation.
 macro_rules! functions {
-    ($prefix:literal, $(#[$meta:meta])* { $($($name:ident)+: $exchange:expr, $simulation:expr;)* }) => {
+    (
+        $prefix:literal, $(#[$meta:meta])* { $($($name:ident)+: $exchange:expr, $simulation:expr;)* }
+        $(#[$discards_meta:meta])* { $($always:ident)+; $($in_exchange:ident)+; $($in_simulation:ident)+; }
+    ) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function {
@@ -113,6 +117,17 @@ macro_rules! functions {
         #[must_use]
         pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
             function.states(interface) & state.bit() != 0
+        }
+
+        $(#[$discards_meta])*
+        #[must_use]
+        pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
+            match function {
+                $(Function::$always)|+ => true,
+                $(Function::$in_exchange)|+ => interface == InterfaceType::ModelExchange,
+                $(Function::$in_simulation)|+ => interface == InterfaceType::CoSimulation,
+                _ => false,
+            }
         }
     };
 }
@@ -148,26 +163,11 @@ functions! {
         CancelStep: 0, P;
         GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus: 0, C | P | F | T;
     }
-}
-
-/// Whether `function` may return `fmi2Discard` (section 2.1.3).
-#[must_use]
-pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
-    use Function as F;
-    match function {
-        F::SetReal | F::SetInteger | F::SetBoolean | F::SetString => true,
-        F::SetContinuousStates
-        | F::GetReal
-        | F::GetDerivatives
-        | F::GetContinuousStates
-        | F::GetEventIndicators => interface == InterfaceType::ModelExchange,
-        F::DoStep
-        | F::GetStatus
-        | F::GetRealStatus
-        | F::GetIntegerStatus
-        | F::GetBooleanStatus
-        | F::GetStringStatus => interface == InterfaceType::CoSimulation,
-        _ => false,
+    /// Whether `function` may return `fmi2Discard` (section 2.1.3).
+    {
+        SetReal SetInteger SetBoolean SetString;
+        SetContinuousStates GetReal GetDerivatives GetContinuousStates GetEventIndicators;
+        DoStep GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus;
     }
 }
 

@@ -4,18 +4,12 @@
 //! The states are those of [`call_order`](crate::call_order): [`State::StepComplete`] is Step Mode. After
 //! `fmi3Error` an instance is in state [`State::Terminated`] (section 2.3.1), so no state `Error` exists.
 
-use crate::call_order::{InterfaceType, State, functions};
+use crate::call_order::{self, C, I, InterfaceType, M, N, State, T, V, functions};
 use crate::{Causality, Initial, Variability};
 
-const I: u16 = State::Instantiated.bit();
 const G: u16 = State::ConfigurationMode.bit();
-const M: u16 = State::InitializationMode.bit();
-const V: u16 = State::EventMode.bit();
-const N: u16 = State::ContinuousTimeMode.bit();
-const C: u16 = State::StepComplete.bit();
 const U: u16 = State::IntermediateUpdateMode.bit();
 const R: u16 = State::ReconfigurationMode.bit();
-const T: u16 = State::Terminated.bit();
 /// The super state "FMU State Settable" in model exchange, and as `CS` in co-simulation.
 const ME: u16 = I | G | M | V | N | R | T;
 const CS: u16 = I | G | M | V | C | R | T;
@@ -70,35 +64,14 @@ functions! {
         DoStep: 0, C;
         ActivateModelPartition: 0, 0;
     }
-}
-
-/// Whether `function` may return `fmi3Discard`, which leaves the instance unchanged (section 2.2.4, "handling
-/// of min/max violation" and "numerical problems during model evaluation").
-#[must_use]
-pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
-    use Function as F;
-    match function {
-        F::SetFloat32
-        | F::SetFloat64
-        | F::SetInt8
-        | F::SetUInt8
-        | F::SetInt16
-        | F::SetUInt16
-        | F::SetInt32
-        | F::SetUInt32
-        | F::SetInt64
-        | F::SetUInt64
-        | F::SetBoolean
-        | F::SetString
-        | F::SetBinary => true,
-        F::SetContinuousStates
-        | F::GetFloat32
-        | F::GetFloat64
-        | F::GetContinuousStateDerivatives
-        | F::GetContinuousStates
-        | F::GetEventIndicators => interface == InterfaceType::ModelExchange,
-        F::DoStep => interface == InterfaceType::CoSimulation,
-        _ => false,
+    /// Whether `function` may return `fmi3Discard`, which leaves the instance unchanged (section 2.2.4, "handling
+    /// of min/max violation" and "numerical problems during model evaluation").
+    {
+        SetFloat32 SetFloat64 SetInt8 SetUInt8 SetInt16 SetUInt16 SetInt32 SetUInt32 SetInt64 SetUInt64
+            SetBoolean SetString SetBinary;
+        SetContinuousStates GetFloat32 GetFloat64 GetContinuousStateDerivatives GetContinuousStates
+            GetEventIndicators;
+        DoStep;
     }
 }
 
@@ -114,23 +87,10 @@ pub fn settable(
     if causality == Causality::StructuralParameter {
         return if variability == Variability::Tunable { G | R } else { G };
     }
-    let at_the_start = match initial {
-        Some(Initial::Exact) if variability != Variability::Constant => I | M,
-        Some(Initial::Approx) => I,
-        _ => 0,
-    };
-    let at_points = match (causality, variability) {
-        (Causality::Input, Variability::Continuous) => I | M | V | N | C | U,
-        (Causality::Input, _) => I | M | V | C,
-        (Causality::Parameter, Variability::Tunable) => V | C,
-        _ => 0,
-    };
-    let as_state = match reinit {
-        Some(true) => N,
-        Some(false) => N | V,
-        None => 0,
-    };
-    at_the_start | at_points | as_state
+    let in_callback = (causality, variability) == (Causality::Input, Variability::Continuous);
+    call_order::settable(causality, variability, initial, reinit.is_some())
+        | if in_callback { U } else { 0 }
+        | if reinit == Some(false) { V } else { 0 }
 }
 
 #[cfg(test)]
