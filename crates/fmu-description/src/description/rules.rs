@@ -67,12 +67,14 @@ const SECTIONS_OF_3: Sections = Sections {
 };
 
 /// Collects problems of a description.
-struct Problems {
+struct Problems<'a> {
+    description: &'a ModelDescription,
+    version: Version,
     sections: &'static Sections,
     list: Vec<Problem>,
 }
 
-impl Problems {
+impl Problems<'_> {
     fn add(&mut self, section: &'static str, text: String) {
         self.list.push(Problem { section, text });
     }
@@ -134,47 +136,43 @@ impl ModelDescription {
     /// Cost: linear in the size of the description.
     #[must_use]
     pub fn problems(&self) -> Vec<Problem> {
-        let sections = match self.version() {
-            Version::V1 => return Vec::new(),
-            Version::V2 => &SECTIONS_OF_2,
-            Version::V3 => &SECTIONS_OF_3,
-        };
-        let mut problems = Problems { sections, list: Vec::new() };
-        if self.version() == Version::V3 {
-            fmi3::check_identity(self, &mut problems);
-        } else {
-            check_identity(self, &mut problems);
-        }
-        check_texts(self, &mut problems);
+        let version = self.version();
+        let (sections, [identity, variables, structure]): (_, [fn(&mut Problems<'_>); 3]) =
+            match version {
+                Version::V1 => return Vec::new(),
+                Version::V2 => {
+                    (&SECTIONS_OF_2, [check_identity, variables::check, structure::check])
+                }
+                Version::V3 => (
+                    &SECTIONS_OF_3,
+                    [fmi3::check_identity, fmi3::check_variables, fmi3::check_structure],
+                ),
+            };
+        let mut problems = Problems { description: self, version, sections, list: Vec::new() };
+        identity(&mut problems);
+        check_texts(&mut problems);
         let categories = self.log_categories.iter().map(|category| category.name.as_str());
         problems.unique(sections.categories, "log category", categories);
         if let Some(experiment) = &self.default_experiment {
-            check_experiment(experiment, self.version(), &mut problems);
+            check_experiment(experiment, &mut problems);
         }
-        definitions::check(self, &mut problems);
-        if self.version() == Version::V3 {
-            fmi3::check_variables(self, &mut problems);
-        } else {
-            variables::check(self, &mut problems);
-        }
-        names::check(self, &mut problems);
-        if self.version() == Version::V3 {
-            fmi3::check_structure(self, &mut problems);
-        } else {
-            structure::check(self, &mut problems);
-        }
+        definitions::check(&mut problems);
+        variables(&mut problems);
+        names::check(&mut problems);
+        structure(&mut problems);
         problems.list
     }
 }
 
 /// Checks version, GUID, date and interfaces by the rules of FMI 2.0.
-fn check_identity(description: &ModelDescription, problems: &mut Problems) {
+fn check_identity(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let version = &description.fmi_version;
     problems.demand(version == "2.0", "2.2.1", || {
         format!("fmiVersion is {version:?}, it must be \"2.0\" for every 2.0.x")
     });
     problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
-    check_date(description, problems);
+    check_date(problems);
     let interfaces: Vec<_> = interfaces(description)
         .filter_map(|interface| Some((interface.section?, interface)))
         .collect();
@@ -226,8 +224,8 @@ fn interfaces(description: &ModelDescription) -> impl Iterator<Item = Interface<
     interfaces.into_iter().flatten()
 }
 
-fn check_date(description: &ModelDescription, problems: &mut Problems) {
-    if let Some(date) = &description.generation_date_and_time {
+fn check_date(problems: &mut Problems<'_>) {
+    if let Some(date) = &problems.description.generation_date_and_time {
         problems.demand(is_date_and_time(date), problems.sections.root, || {
             format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
         });
@@ -235,10 +233,11 @@ fn check_date(description: &ModelDescription, problems: &mut Problems) {
 }
 
 /// Checks the texts of the root element and of the log categories.
-fn check_texts(description: &ModelDescription, problems: &mut Problems) {
+fn check_texts(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let Sections { root, categories, .. } = problems.sections;
     problems.text(root, "modelName", &description.model_name);
-    let token = if description.version() == Version::V3 { "instantiationToken" } else { "guid" };
+    let token = if problems.version == Version::V3 { "instantiationToken" } else { "guid" };
     problems.line(root, token, &description.guid);
     for (name, value) in [
         ("description", &description.description),
@@ -260,7 +259,7 @@ fn check_texts(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-fn check_experiment(experiment: &DefaultExperiment, version: Version, problems: &mut Problems) {
+fn check_experiment(experiment: &DefaultExperiment, problems: &mut Problems<'_>) {
     let DefaultExperiment { start_time, stop_time, tolerance, step_size } = *experiment;
     let section = problems.sections.experiment;
     for (name, value) in [
@@ -280,7 +279,7 @@ fn check_experiment(experiment: &DefaultExperiment, version: Version, problems: 
     problems.demand(stop > start, section, || {
         format!("stopTime {stop:?} is not after startTime {start:?}")
     });
-    if let Some(step) = step_size.filter(|_| version == Version::V2) {
+    if let Some(step) = step_size.filter(|_| problems.version == Version::V2) {
         problems.demand(step < stop - start, section, || {
             format!("stepSize {step:?} is not shorter than the experiment")
         });

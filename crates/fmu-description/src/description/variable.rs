@@ -143,7 +143,7 @@ impl Elements {
     }
 
     /// Returns the start value of `kind`, `count` times; `None` if it has none.
-    fn repeated(kind: &Kind, count: usize) -> Option<Self> {
+    pub(super) fn repeated(kind: &Kind, count: usize) -> Option<Self> {
         Some(match kind {
             Kind::Boolean(start) => Elements::Boolean(vec![(*start)?; count]),
             Kind::String(start) => Elements::String(vec![start.clone()?; count]),

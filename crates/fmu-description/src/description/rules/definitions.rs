@@ -4,10 +4,11 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{Problems, Sections};
-use crate::description::{Kind, ModelDescription, RealType, SimpleType};
+use crate::description::{Kind, RealType, SimpleType};
 use crate::unit::Unit;
 
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let Sections { units: in_units, types: in_types, .. } = problems.sections;
     problems.unique(in_units, "unit", description.units.iter().map(|unit| unit.name.as_str()));
     for unit in &description.units {
@@ -34,7 +35,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-fn check_unit(unit: &Unit, problems: &mut Problems) {
+fn check_unit(unit: &Unit, problems: &mut Problems<'_>) {
     let Sections { units: in_units, .. } = problems.sections;
     let name = &unit.name;
     problems.line(in_units, "unit", name);
@@ -57,7 +58,12 @@ fn check_unit(unit: &Unit, problems: &mut Problems) {
 }
 
 /// Checks that the unit of a variable or type, called `who`, is defined and lists its display unit.
-fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems: &mut Problems) {
+fn check_use(
+    who: &str,
+    real: &RealType,
+    units: &HashMap<&str, &Unit>,
+    problems: &mut Problems<'_>,
+) {
     let Sections { units: in_units, types: in_types, .. } = problems.sections;
     let unit = real.unit.as_deref();
     let defined = unit.and_then(|name| units.get(name));
@@ -78,7 +84,7 @@ fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems:
     }
 }
 
-fn check_type(declared: &SimpleType, problems: &mut Problems) {
+fn check_type(declared: &SimpleType, problems: &mut Problems<'_>) {
     let Sections { types: in_types, .. } = problems.sections;
     let name = &declared.name;
     problems.demand(!name.is_empty(), in_types, || "a type has no name".to_owned());

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 
 use super::Problems;
-use crate::description::{ModelDescription, Version};
+use crate::description::Version;
 
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let section = problems.sections.names;
     let names = || description.variables.iter().map(|variable| variable.name.as_str());
     problems.unique(problems.sections.variables, "variable", names());
@@ -27,7 +28,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
         });
     }
     // Arrays of FMI 3.0 are variables, not names.
-    if description.version() == Version::V2 {
+    if problems.version == Version::V2 {
         for (_, text) in misplaced_elements(names()) {
             problems.add(section, text);
         }
@@ -122,8 +123,7 @@ fn after_name(text: &str) -> Option<&str> {
     None
 }
 
-/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`; `None` for other content in
-/// brackets.
+/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`; `None` for others.
 fn after_indices(text: &str) -> Option<&str> {
     let Some(inner) = text.strip_prefix('[') else {
         return Some(text);

@@ -24,71 +24,74 @@ impl ModelDescription {
 }
 
 /// Checks the lists of `ModelStructure`: members, dependencies and their kinds.
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let structure = &description.structure;
-    let states = states(["Derivatives", "attribute derivative"], description, problems);
+    let states = states(["Derivatives", "attribute derivative"], problems);
     let outputs = description.indices_of(|variable| variable.causality == Causality::Output);
-    check_members("Outputs", &structure.outputs, &outputs, description, problems);
+    check_members("Outputs", &structure.outputs, &outputs, problems);
     let unknowns = initial_unknowns(description, &states);
     let rows = &structure.initial_unknowns;
-    check_members("InitialUnknowns", rows, &unknowns, description, problems);
+    check_members("InitialUnknowns", rows, &unknowns, problems);
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
     problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
-    let is_external = |variable: &ScalarVariable| {
-        matches!(variable.causality, Causality::Input | Causality::Independent)
-    };
     let known =
         |index: u32, variable: &ScalarVariable| is_external(variable) || states.contains(&index);
     for (list, rows) in [("Outputs", &structure.outputs), ("Derivatives", &structure.derivatives)] {
         for row in rows {
-            check_dependencies(list, row, description, known, problems);
+            check_dependencies(list, row, known, problems);
         }
     }
-    let known_at_start = |_: u32, variable: &ScalarVariable| {
+    check_initial_rows("InitialUnknowns", problems);
+}
+
+/// Whether the importer's environment determines the variable: an input, the independent variable or a clock.
+pub(super) fn is_external(variable: &ScalarVariable) -> bool {
+    matches!(variable.causality, Causality::Input | Causality::Independent)
+        || matches!(variable.kind, Kind::Clock(_))
+}
+
+/// Whether the variable is a clock or belongs to one.
+pub(super) fn is_clocked(variable: &ScalarVariable) -> bool {
+    !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_))
+}
+
+/// Checks the dependencies of the initial unknowns, the rows of `list`: all are known at initialization and of the kind
+/// `dependent` or `constant`.
+pub(super) fn check_initial_rows(list: &str, problems: &mut Problems<'_>) {
+    let description = problems.description;
+    let is_known = |_: u32, variable: &ScalarVariable| {
         is_external(variable) || variable.initial_in_force() == Some(Initial::Exact)
     };
-    for row in rows {
-        check_dependencies("InitialUnknowns", row, description, known_at_start, problems);
-        check_initial_kinds("InitialUnknowns", row, description, problems);
+    let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
+    for row in &description.structure.initial_unknowns {
+        check_dependencies(list, row, is_known, problems);
+        let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
+        problems.demand(holds, problems.sections.structure, || {
+            let name = description.name_of(row.index);
+            format!("{list}, {name}: dependenciesKind may be dependent or constant only")
+        });
     }
 }
 
-/// Checks that each dependency at initialization is of the kind `dependent` or `constant`.
-pub(super) fn check_initial_kinds(
-    list: &str,
-    row: &Unknown,
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
-    let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
-    let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
-    problems.demand(holds, problems.sections.structure, || {
-        let name = description.name_of(row.index);
-        format!("{list}, {name}: dependenciesKind may be dependent or constant only")
-    });
-}
-
-/// Whether the variable is of a floating-point type of its version.
-fn is_real(variable: &ScalarVariable, description: &ModelDescription) -> bool {
+/// Whether the variable is of a floating-point type of this version.
+pub(super) fn is_real(variable: &ScalarVariable, version: Version) -> bool {
     match variable.kind {
-        Kind::Float32(_) => description.version() == Version::V3,
+        Kind::Float32(_) => version == Version::V3,
         _ => variable.kind.as_real().is_some(),
     }
 }
 
 /// Returns the indices of the continuous states. Their derivatives are the rows of `list`; a row without `needed`,
 /// the attribute that names its state, is a problem.
-pub(super) fn states(
-    [list, needed]: [&str; 2],
-    description: &ModelDescription,
-    problems: &mut Problems,
-) -> HashSet<u32> {
+pub(super) fn states([list, needed]: [&str; 2], problems: &mut Problems<'_>) -> HashSet<u32> {
+    let (description, version) = (problems.description, problems.version);
     let section = problems.sections.structure;
     let mut states = HashSet::new();
     for row in &description.structure.derivatives {
         let name = description.name_of(row.index);
-        let variable = description.at(row.index).filter(|variable| is_real(variable, description));
+        let variable = description.at(row.index).filter(|variable| is_real(variable, version));
         let derivative = variable.and_then(|variable| variable.kind.as_real()?.derivative);
         let Some(state) = derivative else {
             problems.add(section, format!("{list}, {name}: it has no {needed}"));
@@ -109,19 +112,25 @@ pub(super) fn states(
     states
 }
 
-/// Returns the indices that `InitialUnknowns` must have.
-fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BTreeSet<u32> {
+/// Returns the indices that the initial unknowns must have, not those of clocks and clocked variables.
+pub(super) fn initial_unknowns(
+    description: &ModelDescription,
+    states: &HashSet<u32>,
+) -> BTreeSet<u32> {
     let derivatives = description.structure.derivatives.iter().map(|row| row.index);
-    let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
+    let exposed = states.iter().copied().chain(derivatives);
     let computed = |variable: &ScalarVariable| {
         matches!(variable.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
     };
-    let mut indices = description.indices_of(|variable| match variable.causality {
-        Causality::CalculatedParameter => true,
-        Causality::Output => computed(variable),
-        _ => false,
+    let mut indices = description.indices_of(|variable| {
+        variable.alias_of.is_none()
+            && match variable.causality {
+                Causality::CalculatedParameter => true,
+                Causality::Output => !is_clocked(variable) && computed(variable),
+                _ => false,
+            }
     });
-    indices.extend(exposed.iter().filter(|index| description.at(**index).is_some_and(computed)));
+    indices.extend(exposed.filter(|index| description.at(*index).is_some_and(computed)));
     indices
 }
 
@@ -130,10 +139,9 @@ pub(super) fn check_members(
     list: &str,
     rows: &[Unknown],
     required: &BTreeSet<u32>,
-    description: &ModelDescription,
-    problems: &mut Problems,
+    problems: &mut Problems<'_>,
 ) {
-    let section = problems.sections.structure;
+    let (description, section) = (problems.description, problems.sections.structure);
     let mut members = BTreeSet::new();
     for row in rows {
         problems.demand(members.insert(row.index), section, || {
@@ -154,12 +162,12 @@ pub(super) fn check_members(
 pub(super) fn check_dependencies(
     list: &str,
     row: &Unknown,
-    description: &ModelDescription,
     is_known: impl Fn(u32, &ScalarVariable) -> bool,
-    problems: &mut Problems,
+    problems: &mut Problems<'_>,
 ) {
+    let (description, version) = (problems.description, problems.version);
     let section = problems.sections.structure;
-    let third = description.version() == Version::V3;
+    let third = version == Version::V3;
     let name = description.name_of(row.index);
     let dependencies = row.dependencies.as_deref().unwrap_or_default();
     if third {
@@ -184,7 +192,7 @@ pub(super) fn check_dependencies(
     problems.demand(paired, section, || {
         format!("{list}, {name}: dependenciesKind is not as long as dependencies")
     });
-    let real = description.at(row.index).is_some_and(|variable| is_real(variable, description));
+    let real = description.at(row.index).is_some_and(|variable| is_real(variable, version));
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
     problems.demand(real || plain, section, || {
         let kind = if third { "float" } else { "Real" };

@@ -144,7 +144,6 @@ fn causality_and_variability_follow_the_table() {
     for causality in [Parameter, CalculatedParameter, Input, Output, Local, Independent] {
         for variability in [Constant, Fixed, Tunable, Discrete, Continuous] {
             let pair = (causality, variability);
-            let mut problems = Problems { sections: &SECTIONS_OF_2, list: Vec::new() };
             let description = ModelDescription {
                 variables: vec![ScalarVariable {
                     initial: None,
@@ -152,7 +151,9 @@ fn causality_and_variability_follow_the_table() {
                 }],
                 ..ModelDescription::default()
             };
-            variables::check(&description, &mut problems);
+            let (version, sections, list) = (Version::V2, &SECTIONS_OF_2, Vec::new());
+            let mut problems = Problems { description: &description, version, sections, list };
+            variables::check(&mut problems);
             assert_eq!(
                 problems.list.is_empty(),
                 allowed.contains(&pair),

@@ -2,15 +2,17 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::Problems;
+use super::structure::is_real;
+use super::{Problems, Sections};
 use crate::description::{
-    Causality, Initial, IntegerType, Kind, ModelDescription, RealType, ScalarVariable, SimpleType,
-    Variability,
+    Causality, Elements, Initial, IntegerType, Kind, RealType, ScalarVariable, SimpleType,
+    Variability, Version,
 };
 
 const SECTION: &str = "2.2.7";
 
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     problems.demand(!description.variables.is_empty(), SECTION, || {
         "ModelVariables has no variable".to_owned()
     });
@@ -19,8 +21,10 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     for variable in &description.variables {
         check_table(variable, problems);
         check_start(variable, false, problems);
-        check_declared_type(variable, &types, problems);
-        check_derivative(variable, description, problems);
+        if let Some(declared) = check_declared_type(variable, &types, problems) {
+            check_limits(variable, declared, problems);
+        }
+        check_derivative(variable, problems);
         let who = format!("variable {}", variable.name);
         let text = variable.description.as_deref().unwrap_or_default();
         problems.text(SECTION, &format!("description of {who}"), text);
@@ -48,45 +52,59 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(independent <= 1, SECTION, || {
         format!("{independent} variables are independent, at most one may be")
     });
-    check_aliases(description, problems);
+    check_aliases(problems);
 }
 
 /// Checks the tables of causality, variability and initial.
-fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
-    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter};
+pub(super) fn check_table(variable: &ScalarVariable, problems: &mut Problems<'_>) {
+    use Causality::{
+        CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter,
+    };
     use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+    let Sections { variables: section, limits, .. } = problems.sections;
+    let version = problems.version;
+    let third = version == Version::V3;
     let name = &variable.name;
+    let (causality, variability) = (variable.causality.as_str(), variable.variability.as_str());
     let allowed: &[Initial] = match (variable.causality, variable.variability) {
+        (StructuralParameter, Fixed | Tunable) | (Input, Discrete | Continuous) if third => {
+            &[Initial::Exact]
+        }
         (Parameter, Fixed | Tunable) | (Output | Local, Constant) => &[Initial::Exact],
         (CalculatedParameter | Local, Fixed | Tunable) => &[Initial::Calculated, Initial::Approx],
         (Output | Local, Discrete | Continuous) => {
             &[Initial::Calculated, Initial::Exact, Initial::Approx]
         }
         (Input, Discrete | Continuous) | (Independent, Continuous) => &[],
-        (causality, variability) => {
-            let (causality, variability) = (causality.as_str(), variability.as_str());
+        _ => {
             let text = format!("variable {name}: a {causality} cannot be {variability}");
-            return problems.add(SECTION, text);
+            return problems.add(section, text);
         }
     };
+    let allowed = if matches!(variable.kind, Kind::Clock(_)) { &[] } else { allowed };
     if let Some(initial) = variable.initial {
-        problems.demand(allowed.contains(&initial), SECTION, || {
-            let (causality, variability) =
-                (variable.causality.as_str(), variable.variability.as_str());
-            let initial = initial.as_str();
+        problems.demand(allowed.contains(&initial), limits, || {
+            let (initial, kind) = (initial.as_str(), variable.kind.element_in(version));
+            let of_type = if third { format!(" of type {kind}") } else { String::new() };
             format!(
-                "variable {name}: initial {initial} is not allowed for {variability} {causality}"
+                "variable {name}: initial {initial} is not allowed for {variability} \
+                 {causality}{of_type}"
             )
         });
     }
-    let real = matches!(variable.kind, Kind::Real(_));
-    problems.demand(real || variable.variability != Continuous, SECTION, || {
-        format!("variable {name}: only a Real can be continuous, which is the default")
+    let real = is_real(variable, version);
+    problems.demand(real || variable.variability != Continuous, section, || {
+        let rule = if third {
+            "only a Float32 or Float64 can be continuous"
+        } else {
+            "only a Real can be continuous, which is the default"
+        };
+        format!("variable {name}: {rule}")
     });
 }
 
 /// Checks that the variable has a start value if, and only if, it needs one. A clock of FMI 3.0 needs none.
-pub(super) fn check_start(variable: &ScalarVariable, is_clock: bool, problems: &mut Problems) {
+pub(super) fn check_start(variable: &ScalarVariable, is_clock: bool, problems: &mut Problems<'_>) {
     let name = &variable.name;
     let section = problems.sections.limits;
     let needed = match (variable.causality, variable.initial_in_force()) {
@@ -106,7 +124,7 @@ pub(super) fn check_start(variable: &ScalarVariable, is_clock: bool, problems: &
 }
 
 /// Checks limits and start of a Real variable or type, called `who`.
-pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
+pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems<'_>) {
     let section = problems.sections.limits;
     for (name, value) in
         [("start", real.start), ("min", real.min), ("max", real.max), ("nominal", real.nominal)]
@@ -122,7 +140,7 @@ pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
 }
 
 /// Checks limits and start of an Integer or Enumeration variable or type, called `who`.
-pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Problems) {
+pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Problems<'_>) {
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
 
@@ -132,7 +150,7 @@ pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     min: Option<T>,
     start: Option<T>,
     max: Option<T>,
-    problems: &mut Problems,
+    problems: &mut Problems<'_>,
 ) {
     let section = problems.sections.limits;
     for ((low, lower), (high, upper)) in [
@@ -148,52 +166,55 @@ pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     }
 }
 
-/// Checks that a declared type exists and has the variable's kind, and that min and max of a number are within those of
-/// the type. An Enumeration must have a declared type, and an item of it as its start value.
-fn check_declared_type(
+/// Checks that a declared type exists and has the variable's kind, and that an Enumeration has a declared type and an
+/// item of it as its start value. Returns the type if it has the kind.
+pub(super) fn check_declared_type<'a>(
     variable: &ScalarVariable,
-    types: &HashMap<&str, &SimpleType>,
-    problems: &mut Problems,
-) {
+    types: &HashMap<&str, &'a SimpleType>,
+    problems: &mut Problems<'_>,
+) -> Option<&'a SimpleType> {
+    let (section, version) = (problems.sections.limits, problems.version);
     let name = &variable.name;
-    let declared = match &variable.kind {
-        Kind::Real(real) => real.declared_type.as_deref(),
-        Kind::Integer(integer) | Kind::Enumeration(integer) => integer.declared_type.as_deref(),
-        _ => None,
-    };
-    let Some(declared) = declared else {
+    let Some(declared) = variable.kind.declared_type() else {
         let needed = matches!(variable.kind, Kind::Enumeration(_));
-        return problems.demand(!needed, SECTION, || {
+        problems.demand(!needed, section, || {
             format!("variable {name} is an Enumeration and has no declared type")
         });
+        return None;
     };
     let Some(declared_type) = types.get(declared) else {
-        return problems.add(SECTION, format!("variable {name}: there is no type {declared:?}"));
+        problems.add(section, format!("variable {name}: there is no type {declared:?}"));
+        return None;
     };
-    let inside = match (&variable.kind, &declared_type.kind) {
+    let [kind, other] = [&variable.kind, &declared_type.kind].map(|kind| kind.element_in(version));
+    if kind != other {
+        let text = format!("variable {name} is {kind}, its declared type {declared} is {other}");
+        problems.add(section, text);
+        return None;
+    }
+    if let Kind::Enumeration(integer) = &variable.kind {
+        let is_item =
+            |start| declared_type.items.iter().any(|(_, value)| i128::from(*value) == start);
+        problems.demand(integer.start.is_none_or(is_item), section, || {
+            format!("variable {name}: the start value is no item of type {declared}")
+        });
+    }
+    Some(declared_type)
+}
+
+/// Checks that min and max of a Real or Integer are within those of its declared type.
+fn check_limits(variable: &ScalarVariable, declared: &SimpleType, problems: &mut Problems<'_>) {
+    let inside = match (&variable.kind, &declared.kind) {
         (Kind::Real(inner), Kind::Real(outer)) => {
             within((inner.min, inner.max), (outer.min, outer.max))
         }
         (Kind::Integer(inner), Kind::Integer(outer)) => {
             within((inner.min, inner.max), (outer.min, outer.max))
         }
-        (Kind::Enumeration(inner), Kind::Enumeration(_)) => {
-            let is_item =
-                |start| declared_type.items.iter().any(|(_, value)| i128::from(*value) == start);
-            problems.demand(inner.start.is_none_or(is_item), SECTION, || {
-                format!("variable {name}: the start value is no item of type {declared}")
-            });
-            true
-        }
-        _ => {
-            let (kind, other) = (variable.kind.element(), declared_type.kind.element());
-            return problems.add(
-                SECTION,
-                format!("variable {name} is {kind}, its declared type {declared} is {other}"),
-            );
-        }
+        _ => true,
     };
     problems.demand(inside, SECTION, || {
+        let (name, declared) = (&variable.name, &declared.name);
         format!("variable {name}: min and max are not inside those of its type {declared}")
     });
 }
@@ -209,11 +230,7 @@ fn within<T: Copy + PartialOrd>(
 }
 
 /// Checks that `derivative` connects two different continuous Reals.
-fn check_derivative(
-    variable: &ScalarVariable,
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+fn check_derivative(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     let Kind::Real(RealType { derivative: Some(index), .. }) = variable.kind else {
         return;
     };
@@ -221,7 +238,7 @@ fn check_derivative(
     let is_continuous = |variable: &ScalarVariable| {
         matches!(variable.kind, Kind::Real(_)) && variable.variability == Variability::Continuous
     };
-    let Some(state) = description.at(index) else {
+    let Some(state) = problems.description.at(index) else {
         let text = format!("variable {name}: derivative {index} is the index of no variable");
         return problems.add(SECTION, text);
     };
@@ -236,9 +253,9 @@ fn check_derivative(
 }
 
 /// Checks the sets of variables with one base type and one value reference.
-fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
+fn check_aliases(problems: &mut Problems<'_>) {
     let mut sets: BTreeMap<(u8, u32), Vec<&ScalarVariable>> = BTreeMap::new();
-    for variable in &description.variables {
+    for variable in &problems.description.variables {
         let base = match variable.kind {
             Kind::Real(_) => 0,
             Kind::Integer(_) | Kind::Enumeration(_) => 1,
@@ -254,7 +271,7 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
 
 /// Checks that aliases have one unit, and that either all are constants of one value, or none is a constant, at most
 /// one can be set and at most one has a start value.
-fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
+fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems<'_>) {
     let names = set.iter().map(|variable| variable.name.as_str()).collect::<Vec<_>>().join(", ");
     let is_constant = |variable: &&&ScalarVariable| variable.variability == Variability::Constant;
     let constants = set.iter().filter(is_constant).count();
@@ -274,27 +291,14 @@ fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
     problems.demand(constants > 0 || starts <= 1, SECTION, || {
         format!("aliases {names}: more than one has a start value")
     });
-    let unit = |variable: &ScalarVariable| match &variable.kind {
-        Kind::Real(real) => real.unit.clone(),
-        _ => None,
-    };
-    let same_unit = set.windows(2).all(|pair| unit(pair[0]) == unit(pair[1]));
+    let unit = |at: usize| set[at].kind.as_real().and_then(|real| real.unit.as_ref());
+    let same_unit = (1..set.len()).all(|at| unit(at) == unit(0));
     problems.demand(same_unit, SECTION, || format!("aliases {names}: their units differ"));
     if constants == set.len() {
-        let same = set.windows(2).all(|pair| same_start(&pair[0].kind, &pair[1].kind));
+        let start = |at: usize| Elements::repeated(&set[at].kind, 1);
+        let same = (1..set.len()).all(|at| start(at) == start(0));
         problems.demand(same, SECTION, || {
             format!("aliases {names}: the values of these constants differ")
         });
-    }
-}
-
-fn same_start(left: &Kind, right: &Kind) -> bool {
-    match (left, right) {
-        (Kind::Real(left), Kind::Real(right)) => left.start == right.start,
-        (
-            Kind::Integer(left) | Kind::Enumeration(left),
-            Kind::Integer(right) | Kind::Enumeration(right),
-        ) => left.start == right.start,
-        (left, right) => left == right,
     }
 }

@@ -3,14 +3,13 @@
 use std::collections::HashMap;
 
 use crate::description::rules::Problems;
-use crate::description::{
-    Causality, Dimension, Kind, ModelDescription, ScalarVariable, Variability,
-};
+use crate::description::{Causality, Dimension, Kind, ScalarVariable, Variability};
 
 const SECTION: &str = "2.4.7.2";
 
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
-    let variables = description.variables.iter().filter(|variable| variable.alias_of.is_none());
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let variables =
+        problems.description.variables.iter().filter(|variable| variable.alias_of.is_none());
     let references: HashMap<u32, &ScalarVariable> =
         variables.clone().map(|variable| (variable.value_reference, variable)).collect();
     for variable in variables {
@@ -44,7 +43,7 @@ fn extent(
     name: &str,
     dimension: &Dimension,
     references: &HashMap<u32, &ScalarVariable>,
-    problems: &mut Problems,
+    problems: &mut Problems<'_>,
 ) -> Option<u64> {
     let extent = match *dimension {
         Dimension::Fixed(extent) => extent,

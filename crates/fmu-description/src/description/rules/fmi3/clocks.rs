@@ -4,13 +4,14 @@ use std::collections::HashSet;
 
 use crate::description::rules::Problems;
 use crate::description::{
-    Causality, ClockType, IntervalVariability, Kind, ModelDescription, ScalarVariable, Variability,
+    Causality, ClockType, IntervalVariability, Kind, ScalarVariable, Variability,
 };
 
 const TYPES: &str = "2.4.4";
 const VARIABLES: &str = "2.4.7.4";
 
-pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+pub(super) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let mut previous = HashSet::new();
     for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none()) {
         if let Kind::Clock(clock) = &variable.kind {
@@ -26,19 +27,19 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
                 format!("clock {}: only input clocks have a priority", variable.name)
             });
         }
-        check_clocks(variable, description, problems);
+        check_clocks(variable, problems);
         if let Some(index) = variable.previous {
             problems.demand(previous.insert(index), VARIABLES, || {
                 let name = &variable.name;
                 format!("variable {name}: another variable has the same previous")
             });
-            check_previous(variable, index, description, problems);
+            check_previous(variable, index, problems);
         }
     }
 }
 
 /// Checks the causality and the variability of a clock.
-fn check_clock(variable: &ScalarVariable, problems: &mut Problems) {
+fn check_clock(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     use Causality::{Input, Local, Output};
     let name = &variable.name;
     let role = matches!(variable.causality, Input | Output | Local);
@@ -51,7 +52,7 @@ fn check_clock(variable: &ScalarVariable, problems: &mut Problems) {
 }
 
 /// Checks the attributes of the interval and the shift of a clock.
-fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut Problems) {
+fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut Problems<'_>) {
     use IntervalVariability::{Constant, Fixed, Tunable};
     let name = &variable.name;
     let periodic = matches!(clock.interval_variability, Constant | Fixed | Tunable);
@@ -82,11 +83,8 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
 }
 
 /// Checks the attribute `clocks`: it refers to clocks, and only a discrete or tunable variable has it.
-fn check_clocks(
-    variable: &ScalarVariable,
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+fn check_clocks(variable: &ScalarVariable, problems: &mut Problems<'_>) {
+    let description = problems.description;
     let name = &variable.name;
     for index in &variable.clocks {
         let clock = description.at(*index);
@@ -106,12 +104,8 @@ fn check_clocks(
 }
 
 /// Checks the attribute `previous`, the 1-based index `index`, of a clocked variable.
-fn check_previous(
-    variable: &ScalarVariable,
-    index: u32,
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+fn check_previous(variable: &ScalarVariable, index: u32, problems: &mut Problems<'_>) {
+    let description = problems.description;
     let name = &variable.name;
     let is_allowed = !variable.clocks.is_empty()
         && variable.variability == Variability::Discrete

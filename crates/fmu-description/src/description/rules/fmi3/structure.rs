@@ -4,28 +4,27 @@ use std::collections::{BTreeSet, HashSet};
 
 use crate::description::rules::Problems;
 use crate::description::rules::structure::{
-    check_dependencies, check_initial_kinds, check_members, states,
+    check_dependencies, check_initial_rows, check_members, initial_unknowns, is_clocked,
+    is_external, states,
 };
-use crate::description::{Causality, Initial, Kind, ModelDescription, ScalarVariable, Variability};
+use crate::description::{Causality, ScalarVariable, Variability};
 
 const SECTION: &str = "2.4.8";
 
-pub(in crate::description::rules) fn check(
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+pub(in crate::description::rules) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let structure = &description.structure;
-    let states = states(["ContinuousStateDerivative", "derivative"], description, problems);
-    check_reinit(&states, description, problems);
+    let states = states(["ContinuousStateDerivative", "derivative"], problems);
+    check_reinit(&states, problems);
     let outputs = description.indices_of(|variable| {
         variable.causality == Causality::Output && variable.alias_of.is_none()
     });
-    check_members("Output", &structure.outputs, &outputs, description, problems);
-    check_initial_unknowns(description, &states, problems);
-    check_indicators(description, problems);
+    check_members("Output", &structure.outputs, &outputs, problems);
+    check_initial_unknowns(&states, problems);
+    check_indicators(problems);
     let clocked = description
         .indices_of(|variable| variable.previous.is_some() && variable.alias_of.is_none());
-    check_members("ClockedState", &structure.clocked_states, &clocked, description, problems);
+    check_members("ClockedState", &structure.clocked_states, &clocked, problems);
 
     let known = |index: u32, variable: &ScalarVariable| {
         is_external(variable)
@@ -43,27 +42,15 @@ pub(in crate::description::rules) fn check(
         ("EventIndicator", &structure.event_indicators),
     ] {
         for row in rows {
-            check_dependencies(list, row, description, known, problems);
+            check_dependencies(list, row, known, problems);
         }
     }
-    let known_at_start = |_: u32, variable: &ScalarVariable| {
-        is_external(variable) || variable.initial_in_force() == Some(Initial::Exact)
-    };
-    for row in &structure.initial_unknowns {
-        check_dependencies("InitialUnknown", row, description, known_at_start, problems);
-        check_initial_kinds("InitialUnknown", row, description, problems);
-    }
-}
-
-/// Whether the importer's environment determines the variable: an input, the independent variable or a clock.
-fn is_external(variable: &ScalarVariable) -> bool {
-    matches!(variable.causality, Causality::Input | Causality::Independent)
-        || matches!(variable.kind, Kind::Clock(_))
+    check_initial_rows("InitialUnknown", problems);
 }
 
 /// Checks that only continuous states have `reinit`.
-fn check_reinit(states: &HashSet<u32>, description: &ModelDescription, problems: &mut Problems) {
-    for (index, variable) in (1..).zip(&description.variables) {
+fn check_reinit(states: &HashSet<u32>, problems: &mut Problems<'_>) {
+    for (index, variable) in (1..).zip(&problems.description.variables) {
         let reinit = variable.kind.as_real().is_some_and(|real| real.reinit);
         let reinit = reinit && variable.alias_of.is_none();
         problems.demand(!reinit || states.contains(&index), "2.4.7.5", || {
@@ -73,39 +60,19 @@ fn check_reinit(states: &HashSet<u32>, description: &ModelDescription, problems:
 }
 
 /// Checks that `InitialUnknown` has all required variables and no others, except clocks and clocked variables.
-fn check_initial_unknowns(
-    description: &ModelDescription,
-    states: &HashSet<u32>,
-    problems: &mut Problems,
-) {
-    let derivatives = description.structure.derivatives.iter().map(|row| row.index);
-    let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
-    let computed = |variable: &ScalarVariable| {
-        matches!(variable.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
-    };
-    let mut required = description.indices_of(|variable| {
-        let clocked = !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_));
-        variable.alias_of.is_none()
-            && match variable.causality {
-                Causality::CalculatedParameter => true,
-                Causality::Output => !clocked && computed(variable),
-                _ => false,
-            }
-    });
-    required.extend(exposed.iter().filter(|index| description.at(**index).is_some_and(computed)));
+fn check_initial_unknowns(states: &HashSet<u32>, problems: &mut Problems<'_>) {
+    let description = problems.description;
+    let required = initial_unknowns(description, states);
     let rows = &description.structure.initial_unknowns;
     let listed: BTreeSet<u32> = rows.iter().map(|row| row.index).collect();
-    let optional = listed.iter().filter(|index| {
-        description.at(**index).is_some_and(|variable| {
-            !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_))
-        })
-    });
+    let optional = listed.iter().filter(|index| description.at(**index).is_some_and(is_clocked));
     let allowed: BTreeSet<u32> = required.iter().chain(optional).copied().collect();
-    check_members("InitialUnknown", rows, &allowed, description, problems);
+    check_members("InitialUnknown", rows, &allowed, problems);
 }
 
 /// Checks that event indicators are continuous local or output floats, each once.
-fn check_indicators(description: &ModelDescription, problems: &mut Problems) {
+fn check_indicators(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let mut earlier = HashSet::new();
     for row in &description.structure.event_indicators {
         let name = description.name_of(row.index);

@@ -4,20 +4,17 @@ use std::collections::HashMap;
 
 use super::{arrays, clocks};
 use crate::description::rules::Problems;
-use crate::description::rules::variables::{check_integer, check_order, check_real, check_start};
-use crate::description::{
-    Causality, Elements, Initial, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
-    Version,
+use crate::description::rules::variables::{
+    check_declared_type, check_integer, check_order, check_real, check_start, check_table,
 };
+use crate::description::{Causality, Elements, Kind, ScalarVariable, Variability, Version};
 
 const ALIASES: &str = "2.4.7.3";
 const ATTRIBUTES: &str = "2.4.7.4";
 const TYPED: &str = "2.4.7.5";
 
-pub(in crate::description::rules) fn check(
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+pub(in crate::description::rules) fn check(problems: &mut Problems<'_>) {
+    let description = problems.description;
     problems.demand(!description.variables.is_empty(), "2.4.7.1", || {
         "ModelVariables has no variable".to_owned()
     });
@@ -32,7 +29,7 @@ pub(in crate::description::rules) fn check(
             check_start(variable, matches!(variable.kind, Kind::Clock(_)), problems);
             check_numbers(variable, problems);
             check_declared_type(variable, &types, problems);
-            check_derivative(variable, description, problems);
+            check_derivative(variable, problems);
         }
     }
     let independent: Vec<&ScalarVariable> = description
@@ -51,54 +48,13 @@ pub(in crate::description::rules) fn check(
             format!("variable {}: the independent variable must be a scalar Float", variable.name)
         });
     }
-    check_references(description, problems);
-    arrays::check(description, problems);
-    clocks::check(description, problems);
-}
-
-/// Checks the tables of causality, variability and initial.
-fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
-    use Causality::{
-        CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter,
-    };
-    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
-    let name = &variable.name;
-    let (causality, variability) = (variable.causality, variable.variability);
-    let allowed: &[Initial] = match (causality, variability) {
-        (StructuralParameter | Parameter, Fixed | Tunable)
-        | (Output | Local, Constant)
-        | (Input, Discrete | Continuous) => &[Initial::Exact],
-        (CalculatedParameter | Local, Fixed | Tunable) => &[Initial::Calculated, Initial::Approx],
-        (Output | Local, Discrete | Continuous) => {
-            &[Initial::Calculated, Initial::Exact, Initial::Approx]
-        }
-        (Independent, Continuous) => &[],
-        _ => {
-            let (causality, variability) = (causality.as_str(), variability.as_str());
-            let text = format!("variable {name}: a {causality} cannot be {variability}");
-            return problems.add(ATTRIBUTES, text);
-        }
-    };
-    let allowed = if matches!(variable.kind, Kind::Clock(_)) { &[] } else { allowed };
-    if let Some(initial) = variable.initial {
-        problems.demand(allowed.contains(&initial), TYPED, || {
-            let kind = variable.kind.element_in(Version::V3);
-            let (causality, variability) = (causality.as_str(), variability.as_str());
-            let initial = initial.as_str();
-            format!(
-                "variable {name}: initial {initial} is not allowed for {variability} {causality} \
-                 of type {kind}"
-            )
-        });
-    }
-    let float = variable.kind.as_real().is_some();
-    problems.demand(float || variability != Continuous, ATTRIBUTES, || {
-        format!("variable {name}: only a Float32 or Float64 can be continuous")
-    });
+    check_references(problems);
+    arrays::check(problems);
+    clocks::check(problems);
 }
 
 /// Checks attributes that only some variables may have.
-fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
+fn check_flags(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     let name = &variable.name;
     let input = variable.causality == Causality::Input;
     let multiple_set = variable.can_handle_multiple_set_per_time_instant.is_some();
@@ -112,7 +68,7 @@ fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
 }
 
 /// Checks limits and start values: their order, the range of the type, characters of texts, `maxSize` of a Binary.
-fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
+fn check_numbers(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     let who = format!("variable {}", variable.name);
     let kind = &variable.kind;
     if let Some(real) = kind.as_real() {
@@ -172,46 +128,11 @@ fn inside<T: Copy + PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> boo
     min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
 }
 
-/// Checks that a declared type exists and has the variable's kind, and that an Enumeration has a declared type
-/// and an item of it as its start value.
-fn check_declared_type(
-    variable: &ScalarVariable,
-    types: &HashMap<&str, &SimpleType>,
-    problems: &mut Problems,
-) {
-    let name = &variable.name;
-    let Some(declared) = variable.kind.declared_type() else {
-        let needed = matches!(variable.kind, Kind::Enumeration(_));
-        return problems.demand(!needed, TYPED, || {
-            format!("variable {name} is an Enumeration and has no declared type")
-        });
-    };
-    let Some(declared_type) = types.get(declared) else {
-        return problems.add(TYPED, format!("variable {name}: there is no type {declared:?}"));
-    };
-    let (kind, other) =
-        (variable.kind.element_in(Version::V3), declared_type.kind.element_in(Version::V3));
-    problems.demand(kind == other, TYPED, || {
-        format!("variable {name} is {kind}, its declared type {declared} is {other}")
-    });
-    if let Kind::Enumeration(integer) = &variable.kind {
-        let is_item =
-            |start| declared_type.items.iter().any(|(_, value)| i128::from(*value) == start);
-        problems.demand(integer.start.is_none_or(is_item), TYPED, || {
-            format!("variable {name}: the start value is no item of type {declared}")
-        });
-    }
-}
-
 /// Checks that `derivative` connects two different continuous floats of equal dimensions.
-fn check_derivative(
-    variable: &ScalarVariable,
-    description: &ModelDescription,
-    problems: &mut Problems,
-) {
+fn check_derivative(variable: &ScalarVariable, problems: &mut Problems<'_>) {
     let Some(index) = variable.kind.as_real().and_then(|real| real.derivative) else { return };
     let name = &variable.name;
-    let Some(state) = description.at(index) else {
+    let Some(state) = problems.description.at(index) else {
         let text = format!("variable {name}: derivative is the reference of no variable");
         return problems.add(TYPED, text);
     };
@@ -230,7 +151,8 @@ fn check_derivative(
 
 /// Checks that only aliases share a value reference, and that each names a variable with its value reference and
 /// type.
-fn check_references(description: &ModelDescription, problems: &mut Problems) {
+fn check_references(problems: &mut Problems<'_>) {
+    let description = problems.description;
     let mut variables: HashMap<u32, &ScalarVariable> = HashMap::new();
     for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none()) {
         if let Some(first) = variables.insert(variable.value_reference, variable) {
