@@ -15,7 +15,7 @@ use crate::description::{ParseError, Version};
 
 pub use read::{Unpacked, unpack_archive};
 pub use temporary::{TemporaryFolder, remove_abandoned_folders, remove_temporary_folders};
-pub use write::Package;
+pub use write::{Package, pack, write_archive};
 
 /// Name of the model description at the root of the archive.
 pub const DESCRIPTION: &str = "modelDescription.xml";
@@ -23,61 +23,37 @@ pub const DESCRIPTION: &str = "modelDescription.xml";
 /// The error of writing or reading an archive.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum PackageError {
     /// An operation of the file system failed.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// The operation.
         action: &'static str,
-        /// The file.
         path: PathBuf,
         /// The reason given by the system.
         source: io::Error,
     },
     /// The file is not a ZIP archive, or an archive with invalid, overlapping or encrypted entries.
     #[error("{} is no ZIP archive that can be used", path.display())]
-    Archive {
-        /// The archive.
-        path: PathBuf,
-        /// The reason.
-        source: io::Error,
-    },
+    Archive { path: PathBuf, source: io::Error },
     /// An entry has a path, a type or a compression that an FMU must not have.
     #[error("entry {entry:?}: expected {expected}")]
-    Entry {
-        /// The path of the entry.
-        entry: String,
-        /// The rule.
-        expected: &'static str,
-    },
+    Entry { entry: String, expected: &'static str },
     /// The FMU lacks a required part.
     #[error("expected {expected}, found {actual}")]
-    Missing {
-        /// The missing part.
-        expected: String,
-        /// The parts that exist instead.
-        actual: String,
-    },
+    Missing { expected: String, actual: String },
     /// The archive exceeds a limit of this crate.
     #[error("{}: expected at most {limit} {unit}, found more{help}", path.display())]
     Limit {
-        /// The archive.
         path: PathBuf,
-        /// The limit.
         limit: u64,
-        /// The limited quantity.
         unit: &'static str,
         /// [`crate::limits::HELP`] if the limit can be lifted, otherwise empty.
         help: &'static str,
     },
     /// The model description cannot be read.
     #[error("modelDescription.xml of {}", path.display())]
-    Description {
-        /// The archive or folder.
-        path: PathBuf,
-        /// The reason.
-        source: ParseError,
-    },
+    Description { path: PathBuf, source: ParseError },
 }
 
 /// Returns a function that wraps an error of the file system.

@@ -14,28 +14,6 @@ use crate::{terminals, xml};
 /// The manifest of FMI-LS-BUS, the layered standard for networks.
 const BUS_MANIFEST: &str = "extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml";
 
-/// The folders of `binaries` that the standard defines.
-const PLATFORMS: [&str; 18] = [
-    "win32",
-    "win64",
-    "linux32",
-    "linux64",
-    "darwin32",
-    "darwin64",
-    "x86-windows",
-    "x86_64-windows",
-    "aarch64-windows",
-    "x86-linux",
-    "x86_64-linux",
-    "aarch64-linux",
-    "x86-darwin",
-    "x86_64-darwin",
-    "aarch64-darwin",
-    "aarch32-linux",
-    "aarch32-windows",
-    "aarch32-darwin",
-];
-
 /// An unpacked FMU with its model description.
 #[derive(Debug)]
 pub struct Unpacked {
@@ -220,8 +198,7 @@ impl Unpacked {
             || self.folder().join("sources").is_dir()
     }
 
-    /// The paths of the files in the folders of platforms in `binaries`, whose name may be in another case; sorted, at
-    /// most 20.
+    /// The paths of the files in the folders of platforms in `binaries`, in upper or lower case; sorted, at most 20.
     fn libraries(&self) -> Vec<String> {
         let mut libraries = if self.temporary.is_some() {
             self.names.clone()
@@ -262,10 +239,20 @@ fn is_needed(name: &str) -> bool {
         (Some("binaries"), Some(platform)) => {
             platforms().contains(&platform)
                 || platforms_of(Version::V3).contains(&platform)
-                || !PLATFORMS.contains(&platform)
+                || !is_platform(platform)
         }
         _ => true,
     }
+}
+
+/// Whether the standard defines this folder of `binaries`.
+fn is_platform(folder: &str) -> bool {
+    let is_tuple = |(processor, system): (&str, &str)| {
+        ["x86", "x86_64", "aarch32", "aarch64"].contains(&processor)
+            && ["linux", "windows", "darwin"].contains(&system)
+    };
+    ["linux32", "linux64", "win32", "win64", "darwin32", "darwin64"].contains(&folder)
+        || folder.split_once('-').is_some_and(is_tuple)
 }
 
 /// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.

@@ -22,8 +22,7 @@ static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 #[derive(Debug)]
 pub struct TemporaryFolder {
     folder: TempDir,
-    /// The lock by which other processes see that the folder is in use; released after the folder is
-    /// removed. `None` if there are no locks.
+    /// The lock by which other processes see that the folder is in use; `None` if there are no locks. Released last.
     _lock: Option<File>,
 }
 
@@ -85,8 +84,7 @@ pub fn remove_abandoned_folders() {
     remove_abandoned(&std::env::temp_dir());
 }
 
-/// Locks the folder at `path`; `None` if the file system has no locks, an error if another process has locked or
-/// removed the folder.
+/// Locks the folder at `path`; `None` without locks, an error if another process has locked or removed it.
 #[cfg(unix)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     use std::os::unix::fs::MetadataExt as _;

@@ -5,8 +5,9 @@ use std::fs;
 use std::io::{Cursor, Write as _};
 use std::path::Path;
 
+use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, System, ZipWriter};
+use zip::{CompressionMethod as Method, DateTime, System, ZipWriter};
 
 use super::{DESCRIPTION, PackageError, archive_error, file_error, paths};
 use crate::description::Version;
@@ -78,39 +79,23 @@ impl Package {
         Ok(())
     }
 
-    /// Writes the archive to `target`, whose extension must be `fmu`, and creates its folder.
-    /// The file is replaced as a whole or not at all.
+    /// Writes the archive to `target`, as a whole or not at all, and creates its folder. The extension must be `fmu`.
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if `target` has another extension, if the FMU breaks a rule of section 2.3, in FMI 3.0
-    /// of section 2.5 (paths, duplicates ignoring case, neither `binaries` nor `sources`, `documentation`
-    /// without `index.html`, in FMI 3.0 `sources` without `buildDescription.xml`, `documentation/licenses`
-    /// without a license and `icon.svg` without `icon.png`), is larger than 2 GiB or has more than 65,000
-    /// files, or if the file cannot be written.
+    /// [`PackageError`] if `target` has another extension, if the FMU breaks a rule of section 2.3, in FMI 3.0 of
+    /// section 2.5 (paths, duplicates ignoring case, neither `binaries` nor `sources`, `documentation` without
+    /// `index.html`, in FMI 3.0 `sources` without `buildDescription.xml`, `documentation/licenses` without a license
+    /// and `icon.svg` without `icon.png`), has more than 2 GiB or 65,000 files, or cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
         let is_named = target.extension().is_some_and(|extension| extension == "fmu");
         demand(is_named, "a file name ending in .fmu", &target.display().to_string())?;
         self.check(target)?;
-        let bytes = self.archive().map_err(archive_error(target))?;
-        let folder = match target.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(folder).map_err(file_error("create", folder))?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".packing-").suffix(".fmu");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        let mut file =
-            builder.tempfile_in(folder).map_err(file_error("create a file in", folder))?;
-        file.write_all(&bytes).map_err(file_error("write", file.path()))?;
-        let persisted = file.persist(target);
-        persisted.map_err(|failure| file_error("write", target)(failure.error))?;
-        Ok(())
+        let mut entries: Vec<(&str, &[u8])> =
+            self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
+        entries.sort_unstable();
+        entries.insert(0, (DESCRIPTION, self.description.as_bytes()));
+        write_archive(target, &pack(target, entries, |_| false)?)
     }
 
     /// Checks the rules on files, and the limits.
@@ -165,27 +150,60 @@ impl Package {
         let pictured = !has("terminalsAndIcons/icon.svg") || has("terminalsAndIcons/icon.png");
         demand(pictured, "terminalsAndIcons/icon.png", "icon.svg without it")
     }
+}
 
-    /// Returns the bytes of the archive.
-    fn archive(&self) -> zip::result::ZipResult<Vec<u8>> {
-        let mut entries: Vec<(&str, &[u8])> =
-            self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
-        entries.sort_unstable();
-        entries.insert(0, (DESCRIPTION, self.description.as_bytes()));
-        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-        for (path, bytes) in entries {
-            let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
-            let options = SimpleFileOptions::default()
-                .compression_method(CompressionMethod::Deflated)
-                .last_modified_time(DateTime::default())
-                .system(System::Unix)
-                .unix_permissions(mode)
-                .large_file(false);
-            archive.start_file(path, options)?;
-            archive.write_all(bytes)?;
-        }
-        Ok(archive.finish()?.into_inner())
+/// Returns the bytes of a ZIP archive with these entries, pairs of path and content, in this order: dated 1980-01-01,
+/// deflated unless `is_stored`, with mode 0644 (0755 in `binaries`), without directory entries, data descriptors and
+/// Zip64 records. Errors name `target`, the path of the archive.
+///
+/// # Errors
+///
+/// [`PackageError::Archive`] if an entry is too large or has a path that another one has.
+pub fn pack<'a>(
+    target: &Path,
+    entries: impl IntoIterator<Item = (&'a str, &'a [u8])>,
+    is_stored: impl Fn(&str) -> bool,
+) -> Result<Vec<u8>, PackageError> {
+    let failed = || archive_error(target);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (path, bytes) in entries {
+        let stored = is_stored(path);
+        let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
+        let options = SimpleFileOptions::default()
+            .compression_method(if stored { Method::Stored } else { Method::Deflated })
+            .last_modified_time(DateTime::default())
+            .system(System::Unix)
+            .unix_permissions(mode)
+            .large_file(false);
+        archive.start_file(path, options).map_err(failed())?;
+        archive.write_all(bytes).map_err(ZipError::from).map_err(failed())?;
     }
+    Ok(archive.finish().map_err(failed())?.into_inner())
+}
+
+/// Writes the bytes of an archive to `target`, as a whole or not at all, and creates its folder.
+///
+/// # Errors
+///
+/// [`PackageError::File`] if the folder or the file cannot be written.
+pub fn write_archive(target: &Path, bytes: &[u8]) -> Result<(), PackageError> {
+    let folder = match target.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(file_error("create", folder))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".packing-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(file_error("create a file in", folder))?;
+    file.write_all(bytes).map_err(file_error("write", file.path()))?;
+    let persisted = file.persist(target);
+    persisted.map_err(|failure| file_error("write", target)(failure.error))?;
+    Ok(())
 }
 
 /// Returns [`PackageError::Missing`] unless the rule `holds`.

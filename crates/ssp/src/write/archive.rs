@@ -2,13 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, Cursor, Write as _};
+use std::io;
 use std::path::Path;
 
-use fmu_description::package::{PackageError, Unpacked};
-use zip::result::ZipError;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, System, ZipWriter};
+use fmu_description::package::{Unpacked, pack, write_archive};
 
 use crate::error::SspError;
 
@@ -58,23 +55,7 @@ impl Archive {
     pub(super) fn write(&self, ssd: &str, target: &Path) -> Result<(), SspError> {
         let ssd = std::iter::once(("SystemStructure.ssd", ssd.as_bytes()));
         let bytes = zip(target, ssd.chain(slices(&self.entries)))?;
-        let folder = match target.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(folder).map_err(failed("create", folder))?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".packing-").suffix(".ssp");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        let mut file = builder.tempfile_in(folder).map_err(failed("create a file in", folder))?;
-        file.write_all(&bytes).map_err(failed("write", file.path()))?;
-        let persisted = file.persist(target);
-        persisted.map_err(|failure| failed("write", target)(failure.error))?;
-        Ok(())
+        Ok(write_archive(target, &bytes)?)
     }
 }
 
@@ -107,8 +88,7 @@ fn slices(entries: &BTreeMap<String, Vec<u8>>) -> impl Iterator<Item = (&str, &[
     entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
 }
 
-/// Packs the entries in the given order, dated 1980-01-01. FMUs are stored uncompressed, because
-/// they are compressed already.
+/// Packs the entries in the given order. FMUs are stored, because they are compressed already.
 fn zip<'a>(
     target: &Path,
     entries: impl Iterator<Item = (&'a str, &'a [u8])> + Clone,
@@ -118,22 +98,7 @@ fn zip<'a>(
     if total > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive", help: "" });
     }
-    let wrong = |error: ZipError| {
-        SspError::from(PackageError::Archive { path: target.to_owned(), source: error.into() })
-    };
-    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    for (path, bytes) in entries {
-        let is_fmu = Path::new(path).extension().is_some_and(|extension| extension == "fmu");
-        let method = if is_fmu { CompressionMethod::Stored } else { CompressionMethod::Deflated };
-        let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
-        let options = SimpleFileOptions::default()
-            .compression_method(method)
-            .last_modified_time(DateTime::default())
-            .system(System::Unix)
-            .unix_permissions(mode)
-            .large_file(false);
-        archive.start_file(path, options).map_err(wrong)?;
-        archive.write_all(bytes).map_err(|error| wrong(error.into()))?;
-    }
-    Ok(archive.finish().map_err(wrong)?.into_inner())
+    let is_fmu =
+        |path: &str| Path::new(path).extension().is_some_and(|extension| extension == "fmu");
+    Ok(pack(target, entries, is_fmu)?)
 }
