@@ -17,6 +17,7 @@ mod words;
 
 pub use crate::defect::{ParseError, Position, Warning};
 pub use guid::Guid;
+pub(crate) use interface::attributes;
 pub use interface::{CoSimulation, ModelExchange, ScheduledExecution};
 pub use kind::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType,
@@ -38,27 +39,22 @@ use crate::unit::Unit;
 
 /// `fmiModelDescription`, the root element.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub struct ModelDescription {
     /// `fmiVersion`: `"1.0"`, `"2.0"` for every 2.0.x, `"3.0"` for every 3.x.
     pub fmi_version: String,
-    /// `modelName`.
     pub model_name: String,
     /// `guid`, in FMI 3.0 `instantiationToken`: the string that must be equal in the XML and in the
     /// binary. The crate `fmu` sets it to [`ModelDescription::content_guid`], which is why the serialised
     /// form does not contain it.
     #[serde(skip)]
     pub guid: String,
-    /// `description`.
     pub description: Option<String>,
-    /// `author`.
     pub author: Option<String>,
     /// `version` of the model.
     pub version: Option<String>,
-    /// `copyright`.
     pub copyright: Option<String>,
-    /// `license`.
     pub license: Option<String>,
-    /// `generationTool`.
     pub generation_tool: Option<String>,
     /// `generationDateAndTime`, `YYYY-MM-DDThh:mm:ssZ`.
     pub generation_date_and_time: Option<String>,
@@ -75,9 +71,7 @@ pub struct ModelDescription {
     pub units: Vec<Unit>,
     /// `TypeDefinitions`.
     pub types: Vec<SimpleType>,
-    /// `LogCategories`.
     pub log_categories: Vec<LogCategory>,
-    /// `DefaultExperiment`.
     pub default_experiment: Option<DefaultExperiment>,
     /// `ModelVariables`, in order: position + 1 is the index used by `structure`.
     pub variables: Vec<ScalarVariable>,
@@ -133,10 +127,9 @@ impl ModelDescription {
 
 /// `Category` of `LogCategories`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub struct LogCategory {
-    /// `name`.
     pub name: String,
-    /// `description`.
     pub description: Option<String>,
 }
 

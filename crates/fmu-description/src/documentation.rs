@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::description::{
     CoSimulation, DefaultExperiment, Dimension, Elements, IntegerType, Kind, ModelDescription,
-    ModelExchange, ScalarVariable, SimpleType, Unknown, Version, hexadecimal,
+    ModelExchange, ScalarVariable, SimpleType, Unknown, Version, attributes, hexadecimal,
 };
 
 const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
@@ -180,8 +180,7 @@ fn list(elements: &Elements) -> String {
 
 /// Returns the unit, and start, min and max, as texts; an absent value is an empty text.
 ///
-/// `types` are the types of the description, which name the items of enumerations. The start of a Clock is its
-/// interval in s.
+/// `types`, those of the description, name the items of enumerations. The start of a Clock is its interval in s.
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
@@ -213,10 +212,8 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         }
         other => {
             let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
-            let integer = other.as_integer();
-            let text = |value: fn(&IntegerType) -> Option<i128>| number(integer.and_then(value));
-            let (start, min) = (text(|integer| integer.start), text(|integer| integer.min));
-            (none(), [start, min, text(|integer| integer.max)])
+            let numbers = |integer: &IntegerType| [integer.start, integer.min, integer.max];
+            (none(), other.as_integer().map_or([None; 3], numbers).map(number))
         }
     }
 }
@@ -246,40 +243,32 @@ fn experiment(default_experiment: &DefaultExperiment) -> String {
     table(&[], &rows)
 }
 
-fn flag(value: bool) -> &'static str {
-    if value { "yes" } else { "no" }
+/// Returns the text of a flag or a number.
+fn shown(value: &impl ToString) -> String {
+    match value.to_string().as_str() {
+        "true" => "yes".to_owned(),
+        "false" => "no".to_owned(),
+        number => number.to_owned(),
+    }
 }
 
 /// Renders the attributes of an interface, pairs of name and value, as one table.
-fn attributes(parts: &[&[(&str, &str)]]) -> String {
-    let row = |(name, value): &(&str, &str)| vec![code(name), escaped(value).into_owned()];
+fn interface(parts: &[&[(&str, String)]]) -> String {
+    let row = |(name, value): &(&str, String)| vec![code(name), escaped(value).into_owned()];
     table(&[], &parts.iter().copied().flatten().map(row).collect::<Vec<_>>())
 }
 
-/// The flags of an interface, as attributes with `yes` or `no`.
-macro_rules! flags {
-    ($flags:ident: $($name:literal $field:ident,)*) => {
-        &[$(($name, flag($flags.$field)),)*][..]
-    };
-}
-
-/// The flags of both interfaces in FMI 2.0.
-macro_rules! common {
-    ($flags:ident) => {
-        flags! { $flags:
-            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
-            "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
-            "canGetAndSetFMUstate" can_get_and_set_fmu_state,
-            "canSerializeFMUstate" can_serialize_fmu_state,
-            "providesDirectionalDerivative" provides_directional_derivative,
-        }
+/// The attributes of a table of [`attributes`] with their values as text.
+macro_rules! show_attributes {
+    (($flags:ident) $($name:literal $field:ident,)*) => {
+        &[$(($name, shown(&$flags.$field)),)*][..]
     };
 }
 
 /// The flags of both interfaces in FMI 3.0.
 macro_rules! common_3 {
     ($flags:ident) => {
-        flags! { $flags:
+        show_attributes! { ($flags)
             "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
             "canGetAndSetFMUState" can_get_and_set_fmu_state,
             "canSerializeFMUState" can_serialize_fmu_state,
@@ -292,50 +281,37 @@ macro_rules! common_3 {
 }
 
 fn co_simulation(flags: &CoSimulation) -> String {
-    attributes(&[
-        &[("modelIdentifier", flags.model_identifier.as_str())],
-        flags! { flags:
-            "needsExecutionTool" needs_execution_tool,
-            "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
-            "canInterpolateInputs" can_interpolate_inputs,
-        },
-        &[("maxOutputDerivativeOrder", &flags.max_output_derivative_order.to_string())],
-        flags! { flags: "canRunAsynchronuously" can_run_asynchronuously, },
-        common!(flags),
+    interface(&[
+        &[("modelIdentifier", flags.model_identifier.clone())],
+        attributes!(CO_SIMULATION_2, show_attributes!(flags)),
+        attributes!(COMMON_2, show_attributes!(flags)),
     ])
 }
 
 fn model_exchange(flags: &ModelExchange, description: &ModelDescription) -> String {
-    let states = description.structure.derivatives.len().to_string();
-    let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
-    attributes(&[
+    let indicators = description.number_of_event_indicators.unwrap_or_default();
+    interface(&[
         &[
-            ("modelIdentifier", flags.model_identifier.as_str()),
-            ("continuous states", &states),
-            ("numberOfEventIndicators", &indicators),
+            ("modelIdentifier", flags.model_identifier.clone()),
+            ("continuous states", description.structure.derivatives.len().to_string()),
+            ("numberOfEventIndicators", indicators.to_string()),
         ],
-        flags! { flags:
-            "needsExecutionTool" needs_execution_tool,
-            "completedIntegratorStepNotNeeded" completed_integrator_step_not_needed,
-        },
-        common!(flags),
+        attributes!(MODEL_EXCHANGE_2, show_attributes!(flags)),
+        attributes!(COMMON_2, show_attributes!(flags)),
     ])
 }
 
 fn co_simulation_3(flags: &CoSimulation) -> String {
-    let order = flags.max_output_derivative_order.to_string();
     let step = flags.fixed_internal_step_size.map(|step| format!("{step:?} s"));
-    attributes(&[
-        &[("modelIdentifier", flags.model_identifier.as_str())],
-        flags! { flags:
+    interface(&[
+        &[("modelIdentifier", flags.model_identifier.clone())],
+        show_attributes! { (flags)
             "needsExecutionTool" needs_execution_tool,
             "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
         },
-        &[
-            ("fixedInternalStepSize", step.as_deref().unwrap_or("none")),
-            ("maxOutputDerivativeOrder", &order),
-        ],
-        flags! { flags:
+        &[("fixedInternalStepSize", step.unwrap_or_else(|| "none".to_owned()))],
+        show_attributes! { (flags)
+            "maxOutputDerivativeOrder" max_output_derivative_order,
             "hasEventMode" has_event_mode,
             "mightReturnEarlyFromDoStep" might_return_early_from_do_step,
             "canReturnEarlyAfterIntermediateUpdate" can_return_early_after_intermediate_update,
@@ -351,15 +327,13 @@ fn model_exchange_3(flags: &ModelExchange, description: &ModelDescription) -> St
         let sizes = variables.map(|variable| variable.size(description));
         sizes.fold(0, usize::saturating_add).to_string()
     };
-    let states = size(&description.structure.derivatives);
-    let indicators = size(&description.structure.event_indicators);
-    attributes(&[
+    interface(&[
         &[
-            ("modelIdentifier", flags.model_identifier.as_str()),
-            ("continuous states", &states),
-            ("event indicators", &indicators),
+            ("modelIdentifier", flags.model_identifier.clone()),
+            ("continuous states", size(&description.structure.derivatives)),
+            ("event indicators", size(&description.structure.event_indicators)),
         ],
-        flags! { flags:
+        show_attributes! { (flags)
             "needsExecutionTool" needs_execution_tool,
             "needsCompletedIntegratorStep" needs_completed_integrator_step,
         },

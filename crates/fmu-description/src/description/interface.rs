@@ -4,26 +4,79 @@ use serde::Serialize;
 
 use crate::hash_form::{is_default, numbered};
 
+/// Passes a table of attributes of the interfaces to a macro: for each attribute its name and its field, in the order
+/// in which they are written. `modelIdentifier` is in none of the tables.
+macro_rules! attributes {
+    (COMMON_2, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+            "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
+            "canGetAndSetFMUstate" can_get_and_set_fmu_state,
+            "canSerializeFMUstate" can_serialize_fmu_state,
+            "providesDirectionalDerivative" provides_directional_derivative,
+        }
+    };
+    (MODEL_EXCHANGE_2, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "needsExecutionTool" needs_execution_tool,
+            "completedIntegratorStepNotNeeded" completed_integrator_step_not_needed,
+        }
+    };
+    (CO_SIMULATION_2, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "needsExecutionTool" needs_execution_tool,
+            "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+            "canInterpolateInputs" can_interpolate_inputs,
+            "maxOutputDerivativeOrder" max_output_derivative_order,
+            "canRunAsynchronuously" can_run_asynchronuously,
+        }
+    };
+    (COMMON_3, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "needsExecutionTool" needs_execution_tool,
+            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+            "canGetAndSetFMUState" can_get_and_set_fmu_state,
+            "canSerializeFMUState" can_serialize_fmu_state,
+            "providesDirectionalDerivatives" provides_directional_derivative,
+            "providesAdjointDerivatives" provides_adjoint_derivatives,
+            "providesPerElementDependencies" provides_per_element_dependencies,
+        }
+    };
+    (MODEL_EXCHANGE_3, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "needsCompletedIntegratorStep" needs_completed_integrator_step,
+            "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
+        }
+    };
+    (CO_SIMULATION_3, $apply:ident!($($argument:ident),*)) => {
+        $apply! { ($($argument),*)
+            "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+            "fixedInternalStepSize" fixed_internal_step_size,
+            "maxOutputDerivativeOrder" max_output_derivative_order,
+            "recommendedIntermediateInputSmoothness" recommended_intermediate_input_smoothness,
+            "providesIntermediateUpdate" provides_intermediate_update,
+            "mightReturnEarlyFromDoStep" might_return_early_from_do_step,
+            "canReturnEarlyAfterIntermediateUpdate" can_return_early_after_intermediate_update,
+            "hasEventMode" has_event_mode,
+            "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
+        }
+    };
+}
+pub(crate) use attributes;
+
 /// `ModelExchange`: identifier and capability flags (FMI 2.0.5, section 3.3.1;
 /// FMI 3.0.2, section 3.4).
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-#[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
+#[expect(clippy::struct_excessive_bools, missing_docs, reason = "as in the standard")]
 pub struct ModelExchange {
     /// `modelIdentifier`: file name of the library, without extension.
     pub model_identifier: String,
-    /// `needsExecutionTool`.
     pub needs_execution_tool: bool,
-    /// `completedIntegratorStepNotNeeded`.
     pub completed_integrator_step_not_needed: bool,
-    /// `canBeInstantiatedOnlyOncePerProcess`.
     pub can_be_instantiated_only_once_per_process: bool,
-    /// `canNotUseMemoryManagementFunctions`.
     pub can_not_use_memory_management_functions: bool,
-    /// `canGetAndSetFMUstate`.
     pub can_get_and_set_fmu_state: bool,
-    /// `canSerializeFMUstate`.
     pub can_serialize_fmu_state: bool,
-    /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
     /// `SourceFiles`: names of files in `sources`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -49,29 +102,21 @@ pub struct ModelExchange {
 /// `CoSimulation`: identifier and capability flags (FMI 2.0.5, section 4.3.1;
 /// FMI 3.0.2, section 4.4).
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-#[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
+#[expect(clippy::struct_excessive_bools, missing_docs, reason = "as in the standard")]
 pub struct CoSimulation {
     /// `modelIdentifier`: file name of the library, without extension.
     pub model_identifier: String,
-    /// `needsExecutionTool`.
     pub needs_execution_tool: bool,
-    /// `canHandleVariableCommunicationStepSize`.
     pub can_handle_variable_communication_step_size: bool,
     /// `canInterpolateInputs`: `fmi2SetRealInputDerivatives` has an effect.
     pub can_interpolate_inputs: bool,
-    /// `maxOutputDerivativeOrder`.
     pub max_output_derivative_order: u32,
     /// `canRunAsynchronuously` (spelt as in the standard).
     pub can_run_asynchronuously: bool,
-    /// `canBeInstantiatedOnlyOncePerProcess`.
     pub can_be_instantiated_only_once_per_process: bool,
-    /// `canNotUseMemoryManagementFunctions`.
     pub can_not_use_memory_management_functions: bool,
-    /// `canGetAndSetFMUstate`.
     pub can_get_and_set_fmu_state: bool,
-    /// `canSerializeFMUstate`.
     pub can_serialize_fmu_state: bool,
-    /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
     /// `SourceFiles`: names of files in `sources`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -91,8 +136,7 @@ pub struct CoSimulation {
     /// `fixedInternalStepSize` in s (FMI 3.0).
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<5, _, _>")]
     pub fixed_internal_step_size: Option<f64>,
-    /// `recommendedIntermediateInputSmoothness` (FMI 3.0): the order of the derivatives of inputs that
-    /// should be continuous.
+    /// `recommendedIntermediateInputSmoothness` (FMI 3.0): how often inputs should be continuously differentiable.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<6, _, _>")]
     pub recommended_intermediate_input_smoothness: i32,
     /// `providesEvaluateDiscreteStates` (FMI 3.0).
@@ -114,22 +158,16 @@ pub struct CoSimulation {
 
 /// `ScheduledExecution`: identifier and capability flags (FMI 3.0.2, section 5.4).
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-#[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
+#[expect(clippy::struct_excessive_bools, missing_docs, reason = "as in the standard")]
 pub struct ScheduledExecution {
     /// `modelIdentifier`: file name of the library, without extension.
     pub model_identifier: String,
-    /// `needsExecutionTool`.
     pub needs_execution_tool: bool,
-    /// `canBeInstantiatedOnlyOncePerProcess`.
     pub can_be_instantiated_only_once_per_process: bool,
-    /// `canGetAndSetFMUState`.
     pub can_get_and_set_fmu_state: bool,
-    /// `canSerializeFMUState`.
     pub can_serialize_fmu_state: bool,
     /// `providesDirectionalDerivatives`.
     pub provides_directional_derivative: bool,
-    /// `providesAdjointDerivatives`.
     pub provides_adjoint_derivatives: bool,
-    /// `providesPerElementDependencies`.
     pub provides_per_element_dependencies: bool,
 }

@@ -15,8 +15,7 @@ pub struct SimpleType {
     pub name: String,
     /// `description`.
     pub description: Option<String>,
-    /// The type itself; `start`, `derivative` and `declared_type` stay empty. The element of FMI 3.0
-    /// has `Type` at its end.
+    /// The type itself; `start`, `derivative` and `declared_type` stay empty. The element of FMI 3.0 ends in `Type`.
     pub kind: Kind,
     /// Items of an enumeration: name and value.
     pub items: Vec<(String, i64)>,
@@ -30,11 +29,12 @@ macro_rules! kinds {
         /// The types of FMI 1.0 and 2.0 are types of FMI 3.0 too: `Real` is `Float64` there and `Integer` is
         /// `Int32`. An `Enumeration` is an `Int32` in FMI 2.0 and an `Int64` in FMI 3.0.
         #[derive(Clone, Debug, PartialEq, Serialize)]
-        pub enum Kind { $($(#[$doc])* $variant($attributes),)* }
+        pub enum Kind {
+            $(#[doc = concat!("`", $element, "`.")] $(#[$doc])* $variant($attributes),)*
+        }
 
         impl Kind {
-            /// Returns the name of the XML element in FMI 2.0 (`Real`, `Integer`); in FMI 3.0 for a type that
-            /// FMI 2.0 does not have.
+            /// Returns the name of the XML element in FMI 2.0 (`Real`, `Integer`), or in FMI 3.0 for its other types.
             #[must_use]
             pub fn element(&self) -> &'static str {
                 match self { $(Kind::$variant(_) => $element,)* }
@@ -58,35 +58,26 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// `Real`, in FMI 3.0 `Float64`.
+    /// In FMI 3.0 `Float64`.
     Real(RealType): "Real" "Float64" Float64;
-    /// `Integer`, in FMI 3.0 `Int32`.
+    /// In FMI 3.0 `Int32`.
     Integer(IntegerType): "Integer" "Int32" Int32;
-    /// `Boolean` with its `start`.
+    /// With its `start`.
     Boolean(Option<bool>): "Boolean" "Boolean" Boolean;
-    /// `String` with its `start`.
+    /// With its `start`.
     String(Option<String>): "String" "String" String;
-    /// `Enumeration` as an integer; the type `declared_type` names its items.
+    /// An integer; the type `declared_type` names its items.
     Enumeration(IntegerType): "Enumeration" "Enumeration" Int64;
-    /// `Float32`; each number is an `f32`.
+    /// Each number is an `f32`.
     Float32(RealType): "Float32" "Float32" Float32;
-    /// `Int8`.
     Int8(IntegerType): "Int8" "Int8" Int8;
-    /// `UInt8`.
     UInt8(IntegerType): "UInt8" "UInt8" UInt8;
-    /// `Int16`.
     Int16(IntegerType): "Int16" "Int16" Int16;
-    /// `UInt16`.
     UInt16(IntegerType): "UInt16" "UInt16" UInt16;
-    /// `UInt32`.
     UInt32(IntegerType): "UInt32" "UInt32" UInt32;
-    /// `Int64`.
     Int64(IntegerType): "Int64" "Int64" Int64;
-    /// `UInt64`.
     UInt64(IntegerType): "UInt64" "UInt64" UInt64;
-    /// `Binary`.
     Binary(BinaryType): "Binary" "Binary" Binary;
-    /// `Clock`.
     Clock(ClockType): "Clock" "Clock" Clock;
 }
 
@@ -160,8 +151,7 @@ impl Kind {
         }
     }
 
-    /// Returns the range of the integers of the type in a version of FMI; `None` for types
-    /// other than integers and enumerations.
+    /// Returns the range of an integer type or an enumeration in a version of FMI; `None` for other types.
     #[must_use]
     pub fn integer_range(&self, version: Version) -> Option<RangeInclusive<i128>> {
         Some(match self {
@@ -218,22 +208,15 @@ impl Kind {
 
 /// Attributes of a `Real` (`Float64`) or a `Float32`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub struct RealType {
-    /// `declaredType`.
     pub declared_type: Option<String>,
-    /// `quantity`.
     pub quantity: Option<String>,
-    /// `unit`.
     pub unit: Option<String>,
-    /// `displayUnit`.
     pub display_unit: Option<String>,
-    /// `min`.
     pub min: Option<f64>,
-    /// `max`.
     pub max: Option<f64>,
-    /// `nominal`.
     pub nominal: Option<f64>,
-    /// `start`.
     pub start: Option<f64>,
     /// `derivative`: 1-based index of the state of which this variable is the derivative.
     pub derivative: Option<u32>,
@@ -257,16 +240,12 @@ impl RealType {
 /// Attributes of an integer type or an `Enumeration`. The numbers can hold every integer type of
 /// FMI 3.0.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub struct IntegerType {
-    /// `declaredType`.
     pub declared_type: Option<String>,
-    /// `quantity`.
     pub quantity: Option<String>,
-    /// `min`.
     pub min: Option<i128>,
-    /// `max`.
     pub max: Option<i128>,
-    /// `start`.
     pub start: Option<i128>,
 }
 
@@ -305,24 +284,20 @@ spelt! {
 
 /// Attributes of a `Clock` (FMI 3.0.2, section 2.4.7.5, `fmi3ClockAttributes`).
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub struct ClockType {
-    /// `declaredType`.
     pub declared_type: Option<String>,
-    /// `canBeDeactivated`.
     pub can_be_deactivated: bool,
     /// `priority` for Scheduled Execution.
     pub priority: Option<u32>,
-    /// `intervalVariability`.
     pub interval_variability: IntervalVariability,
     /// `intervalDecimal` in s.
     pub interval_decimal: Option<f64>,
     /// `shiftDecimal` in s; `None` means 0.
     pub shift_decimal: Option<f64>,
-    /// `supportsFraction`.
     pub supports_fraction: bool,
     /// `resolution`: the unit of the counters is 1 s divided by this number.
     pub resolution: Option<u64>,
-    /// `intervalCounter`.
     pub interval_counter: Option<u64>,
     /// `shiftCounter`; `None` means 0.
     pub shift_counter: Option<u64>,

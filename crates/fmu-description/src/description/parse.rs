@@ -40,8 +40,7 @@ impl ModelDescription {
         Self::read(xml).map(|(description, _)| description)
     }
 
-    /// Reads `modelDescription.xml` of FMI 1.0, 2.0 or 3.0; returns warnings for content that the
-    /// standard does not allow.
+    /// Reads `modelDescription.xml` of FMI 1.0, 2.0 or 3.0; returns warnings for content that breaks the standard.
     ///
     /// Fills in the defaults of the standard: `causality` local, `variability` by version and type,
     /// and for a variable with `declaredType` the attributes of that type which it does not state

@@ -8,18 +8,18 @@ use quick_xml::writer::Writer;
 
 use super::{
     DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription, ModelStructure, RealType,
-    ScalarVariable, SimpleType, Unknown, Version,
+    ScalarVariable, SimpleType, Unknown, Version, attributes,
 };
 use crate::unit::{BaseUnit, Unit};
 pub(crate) use tag::Tag;
 
-/// Adds flags and numbers of an interface, pairs of attribute and field, to its tag unless they are false or zero.
-macro_rules! flags {
-    ($tag:ident, $flags:ident: $($name:literal $field:ident,)*) => {
+/// Adds the attributes of a table of [`attributes`] to a tag, unless they are false, zero or absent.
+macro_rules! write_attributes {
+    (($tag:ident, $flags:ident) $($name:literal $field:ident,)*) => {
         $tag$(.unless_default($name, &$flags.$field))*
     };
 }
-use flags;
+use write_attributes;
 
 impl ModelDescription {
     /// Renders `modelDescription.xml` in the order of the schema of its version, FMI 2.0.5 or 3.0.2.
@@ -141,31 +141,14 @@ impl Output {
     fn interfaces(&mut self, description: &ModelDescription) {
         if let Some(flags) = &description.model_exchange {
             let tag = Tag::new("ModelExchange").with("modelIdentifier", &flags.model_identifier);
-            let tag = flags! { tag, flags:
-                "needsExecutionTool" needs_execution_tool,
-                "completedIntegratorStepNotNeeded" completed_integrator_step_not_needed,
-                "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
-                "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
-                "canGetAndSetFMUstate" can_get_and_set_fmu_state,
-                "canSerializeFMUstate" can_serialize_fmu_state,
-                "providesDirectionalDerivative" provides_directional_derivative,
-            };
+            let tag = attributes!(MODEL_EXCHANGE_2, write_attributes!(tag, flags));
+            let tag = attributes!(COMMON_2, write_attributes!(tag, flags));
             self.interface(tag, &flags.source_files);
         }
         if let Some(flags) = &description.co_simulation {
             let tag = Tag::new("CoSimulation").with("modelIdentifier", &flags.model_identifier);
-            let tag = flags! { tag, flags:
-                "needsExecutionTool" needs_execution_tool,
-                "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
-                "canInterpolateInputs" can_interpolate_inputs,
-                "maxOutputDerivativeOrder" max_output_derivative_order,
-                "canRunAsynchronuously" can_run_asynchronuously,
-                "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
-                "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
-                "canGetAndSetFMUstate" can_get_and_set_fmu_state,
-                "canSerializeFMUstate" can_serialize_fmu_state,
-                "providesDirectionalDerivative" provides_directional_derivative,
-            };
+            let tag = attributes!(CO_SIMULATION_2, write_attributes!(tag, flags));
+            let tag = attributes!(COMMON_2, write_attributes!(tag, flags));
             self.interface(tag, &flags.source_files);
         }
     }

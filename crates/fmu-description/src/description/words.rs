@@ -10,6 +10,9 @@ macro_rules! spelt {
         pub enum $name { $($(#[$doc])* $variant,)* }
 
         impl $name {
+            /// The spellings of the standard, in the order of the declaration.
+            pub const WORDS: &[&str] = &[$($text),*];
+
             /// Returns the spelling of the standard.
             #[must_use]
             pub fn as_str(self) -> &'static str {

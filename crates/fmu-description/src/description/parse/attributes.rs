@@ -135,8 +135,7 @@ impl<'a> Node<'a> {
         Ok(text.to_owned())
     }
 
-    /// Returns the value of an attribute, unchanged and without white space around it. An empty one gives a
-    /// warning and counts as missing.
+    /// Returns the value of an attribute, unchanged and trimmed. An empty one gives a warning and counts as missing.
     fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);
@@ -277,8 +276,7 @@ impl<'a> Node<'a> {
         self.one_of(name, words)?.parse().ok()
     }
 
-    /// Reads one of `words`. Warns of a word in another case or with white space around it, and of any other
-    /// word, which counts as missing.
+    /// Reads one of `words`. Warns of another case, white space around it, and another word, which counts as missing.
     pub(super) fn one_of(&self, name: &str, words: &[&'static str]) -> Option<&'static str> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);
@@ -339,6 +337,44 @@ impl<'a> Node<'a> {
         list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
     }
 }
+
+/// The value of an attribute of an interface.
+pub(super) trait Attribute: Sized {
+    /// Reads the attribute `name`; the default of the type if it is missing.
+    fn read(element: Node<'_>, name: &'static str) -> Result<Self>;
+}
+
+impl Attribute for bool {
+    fn read(element: Node<'_>, name: &'static str) -> Result<Self> {
+        Ok(element.flag(name))
+    }
+}
+
+impl Attribute for u32 {
+    fn read(element: Node<'_>, name: &'static str) -> Result<Self> {
+        Ok(element.optional_unsigned(name).unwrap_or_default())
+    }
+}
+
+impl Attribute for i32 {
+    fn read(element: Node<'_>, name: &'static str) -> Result<Self> {
+        Ok(element.integer(name)?.unwrap_or_default())
+    }
+}
+
+impl Attribute for Option<f64> {
+    fn read(element: Node<'_>, name: &'static str) -> Result<Self> {
+        element.number(name)
+    }
+}
+
+/// Sets the fields of a table of [`attributes`](crate::description::attributes) to the attributes of an element.
+macro_rules! read_attributes {
+    (($element:ident, $flags:ident) $($name:literal $field:ident,)*) => {
+        $($flags.$field = Attribute::read($element, $name)?;)*
+    };
+}
+pub(super) use read_attributes;
 
 /// Parses an integer, also one with a point (`1.0`); such a one is rounded to an `f64`.
 pub(super) fn integer(text: &str) -> Option<i128> {

@@ -2,7 +2,7 @@
 
 mod variables;
 
-use super::attributes::{Node, Result};
+use super::attributes::{Attribute, Node, Result, read_attributes};
 use super::definitions::{experiment, general};
 use super::schema;
 use super::variables::kind_of_type;
@@ -93,16 +93,15 @@ fn co_simulation(implementation: Node<'_>, model_identifier: String) -> Result<C
         interface.warn_of(true, place, expected, "none".to_owned(), assumed);
         return Ok(flags);
     };
-    let flag = |name| capabilities.flag(name);
-    flags.can_handle_variable_communication_step_size =
-        flag("canHandleVariableCommunicationStepSize");
-    flags.can_interpolate_inputs = flag("canInterpolateInputs");
-    flags.max_output_derivative_order =
-        capabilities.optional_unsigned("maxOutputDerivativeOrder").unwrap_or(0);
-    flags.can_run_asynchronuously = flag("canRunAsynchronuously");
-    flags.can_be_instantiated_only_once_per_process = flag("canBeInstantiatedOnlyOncePerProcess");
-    flags.can_not_use_memory_management_functions = flag("canNotUseMemoryManagementFunctions");
-    flags.can_reject_steps = flag("canRejectSteps");
-    flags.can_handle_events = flag("canHandleEvents");
+    read_attributes! { (capabilities, flags)
+        "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
+        "canInterpolateInputs" can_interpolate_inputs,
+        "maxOutputDerivativeOrder" max_output_derivative_order,
+        "canRunAsynchronuously" can_run_asynchronuously,
+        "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
+        "canNotUseMemoryManagementFunctions" can_not_use_memory_management_functions,
+        "canRejectSteps" can_reject_steps,
+        "canHandleEvents" can_handle_events,
+    }
     Ok(flags)
 }

@@ -1,9 +1,9 @@
 //! Reads a model description of FMI 2.0.
 
-use super::attributes::{Node, Result};
+use super::attributes::{Attribute, Node, Result, read_attributes};
 use super::definitions::common;
 use super::{schema, structure, variables};
-use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
+use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version, attributes};
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
     version(root);
@@ -39,38 +39,19 @@ fn source_files(element: Node<'_>) -> Result<Vec<String>> {
 }
 
 fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
-    let flag = |name| element.flag(name);
-    Ok(ModelExchange {
-        model_identifier: element.model_identifier()?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
-        can_serialize_fmu_state: flag("canSerializeFMUstate"),
-        provides_directional_derivative: flag("providesDirectionalDerivative"),
-        source_files: source_files(element)?,
-        ..ModelExchange::default()
-    })
+    let model_identifier = element.model_identifier()?;
+    let mut flags = ModelExchange { model_identifier, ..ModelExchange::default() };
+    attributes!(MODEL_EXCHANGE_2, read_attributes!(element, flags));
+    attributes!(COMMON_2, read_attributes!(element, flags));
+    flags.source_files = source_files(element)?;
+    Ok(flags)
 }
 
 fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
-    let flag = |name| element.flag(name);
-    Ok(CoSimulation {
-        model_identifier: element.model_identifier()?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
-        can_interpolate_inputs: flag("canInterpolateInputs"),
-        max_output_derivative_order: element
-            .optional_unsigned("maxOutputDerivativeOrder")
-            .unwrap_or(0),
-        can_run_asynchronuously: flag("canRunAsynchronuously"),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
-        can_serialize_fmu_state: flag("canSerializeFMUstate"),
-        provides_directional_derivative: flag("providesDirectionalDerivative"),
-        source_files: source_files(element)?,
-        ..CoSimulation::default()
-    })
+    let model_identifier = element.model_identifier()?;
+    let mut flags = CoSimulation { model_identifier, ..CoSimulation::default() };
+    attributes!(CO_SIMULATION_2, read_attributes!(element, flags));
+    attributes!(COMMON_2, read_attributes!(element, flags));
+    flags.source_files = source_files(element)?;
+    Ok(flags)
 }

@@ -5,11 +5,11 @@ mod start;
 mod structure;
 mod variables;
 
-use super::attributes::{Node, Result};
+use super::attributes::{Attribute, Node, Result, read_attributes};
 use super::definitions::common;
 use super::schema;
 use crate::description::{
-    CoSimulation, ModelDescription, ModelExchange, ScheduledExecution, Version,
+    CoSimulation, ModelDescription, ModelExchange, ScheduledExecution, Version, attributes,
 };
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
@@ -39,62 +39,25 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
 }
 
 fn model_exchange(element: Node<'_>) -> Result<ModelExchange> {
-    let flag = |name| element.flag(name);
-    let completed = flag("needsCompletedIntegratorStep");
-    Ok(ModelExchange {
-        model_identifier: element.model_identifier()?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        completed_integrator_step_not_needed: !completed,
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUState"),
-        can_serialize_fmu_state: flag("canSerializeFMUState"),
-        provides_directional_derivative: flag("providesDirectionalDerivatives"),
-        needs_completed_integrator_step: completed,
-        provides_evaluate_discrete_states: flag("providesEvaluateDiscreteStates"),
-        provides_adjoint_derivatives: flag("providesAdjointDerivatives"),
-        provides_per_element_dependencies: flag("providesPerElementDependencies"),
-        ..ModelExchange::default()
-    })
+    let model_identifier = element.model_identifier()?;
+    let mut flags = ModelExchange { model_identifier, ..ModelExchange::default() };
+    attributes!(COMMON_3, read_attributes!(element, flags));
+    attributes!(MODEL_EXCHANGE_3, read_attributes!(element, flags));
+    flags.completed_integrator_step_not_needed = !flags.needs_completed_integrator_step;
+    Ok(flags)
 }
 
 fn co_simulation(element: Node<'_>) -> Result<CoSimulation> {
-    let flag = |name| element.flag(name);
-    Ok(CoSimulation {
-        model_identifier: element.model_identifier()?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
-        max_output_derivative_order: element
-            .optional_unsigned("maxOutputDerivativeOrder")
-            .unwrap_or(0),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUState"),
-        can_serialize_fmu_state: flag("canSerializeFMUState"),
-        provides_directional_derivative: flag("providesDirectionalDerivatives"),
-        has_event_mode: flag("hasEventMode"),
-        might_return_early_from_do_step: flag("mightReturnEarlyFromDoStep"),
-        can_return_early_after_intermediate_update: flag("canReturnEarlyAfterIntermediateUpdate"),
-        provides_intermediate_update: flag("providesIntermediateUpdate"),
-        fixed_internal_step_size: element.number("fixedInternalStepSize")?,
-        recommended_intermediate_input_smoothness: element
-            .integer("recommendedIntermediateInputSmoothness")?
-            .unwrap_or(0),
-        provides_evaluate_discrete_states: flag("providesEvaluateDiscreteStates"),
-        provides_adjoint_derivatives: flag("providesAdjointDerivatives"),
-        provides_per_element_dependencies: flag("providesPerElementDependencies"),
-        ..CoSimulation::default()
-    })
+    let model_identifier = element.model_identifier()?;
+    let mut flags = CoSimulation { model_identifier, ..CoSimulation::default() };
+    attributes!(COMMON_3, read_attributes!(element, flags));
+    attributes!(CO_SIMULATION_3, read_attributes!(element, flags));
+    Ok(flags)
 }
 
 fn scheduled_execution(element: Node<'_>) -> Result<ScheduledExecution> {
-    let flag = |name| element.flag(name);
-    Ok(ScheduledExecution {
-        model_identifier: element.model_identifier()?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUState"),
-        can_serialize_fmu_state: flag("canSerializeFMUState"),
-        provides_directional_derivative: flag("providesDirectionalDerivatives"),
-        provides_adjoint_derivatives: flag("providesAdjointDerivatives"),
-        provides_per_element_dependencies: flag("providesPerElementDependencies"),
-    })
+    let model_identifier = element.model_identifier()?;
+    let mut flags = ScheduledExecution { model_identifier, ..ScheduledExecution::default() };
+    attributes!(COMMON_3, read_attributes!(element, flags));
+    Ok(flags)
 }

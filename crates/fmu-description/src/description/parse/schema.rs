@@ -8,6 +8,18 @@ mod fmi3;
 use super::attributes::Node;
 use crate::description::Version;
 
+/// A list of names, without quotes and commas.
+macro_rules! names {
+    ($($name:ident)*) => { &[$(stringify!($name)),*] };
+}
+use names;
+
+/// The names of a table of [`attributes`](crate::description::attributes).
+macro_rules! names_in_table {
+    (() $($name:literal $field:ident,)*) => { &[$($name),*] };
+}
+use names_in_table;
+
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
     attributes: &'static [&'static str],

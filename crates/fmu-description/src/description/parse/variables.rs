@@ -6,15 +6,12 @@ use super::attributes::{Node, Result};
 use super::structure::{index, indices};
 use crate::defect::ParseError;
 use crate::description::{
-    Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability, Version,
+    Causality, Initial, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability,
+    Version,
 };
 use crate::limits::{HELP, exceeds};
 
 const KINDS: [&str; 5] = ["Real", "Integer", "Boolean", "String", "Enumeration"];
-const CAUSALITIES: [&str; 6] =
-    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
-pub(super) const VARIABILITIES: [&str; 5] =
-    ["constant", "fixed", "tunable", "discrete", "continuous"];
 /// Maximum number of variables.
 pub(super) const VARIABLES: usize = 1_000_000;
 
@@ -40,11 +37,11 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
 /// Reads the kind of a type definition of FMI 1.0 or 2.0; a `name` that is no type is read as `Real`.
 pub(super) fn kind_of_type(element: Node<'_>, name: &str) -> Result<Kind> {
     Ok(match name {
-        "Integer" => Kind::Integer(integer_limits(element, &IntegerType::default())?),
+        "Integer" => Kind::Integer(integer_limits(element, None)?),
         "Boolean" => Kind::Boolean(None),
         "String" => Kind::String(None),
-        "Enumeration" => Kind::Enumeration(integer_limits(element, &IntegerType::default())?),
-        _ => Kind::Real(real_limits(element, &RealType::default())?),
+        "Enumeration" => Kind::Enumeration(integer_limits(element, None)?),
+        _ => Kind::Real(real_limits(element, None)?),
     })
 }
 
@@ -131,7 +128,9 @@ pub(super) fn check_references(elements: &[Node<'_>], variables: &[ScalarVariabl
 fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<ScalarVariable> {
     let name = element.required("name")?.to_owned();
     let value_reference = element.unsigned("valueReference")?;
-    let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
+    // The last one, structuralParameter, is of FMI 3.0.
+    let causalities = &Causality::WORDS[..6];
+    let causality = element.word("causality", causalities).unwrap_or(Causality::Local);
     let kind = kind(typed(element)?, types, count)?;
     Ok(ScalarVariable {
         name,
@@ -139,7 +138,7 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
         description: element.text("description"),
         causality,
         variability: variability(element, causality, &kind),
-        initial: element.word("initial", &["exact", "approx", "calculated"]),
+        initial: element.word("initial", Initial::WORDS),
         kind,
         ..ScalarVariable::default()
     })
@@ -148,7 +147,7 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
 /// Reads `variability`, continuous by default. For types that cannot be continuous, warns and reads continuous as
 /// fixed for parameters and as discrete for other variables.
 fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variability {
-    let stated = element.word("variability", &VARIABILITIES);
+    let stated = element.word("variability", Variability::WORDS);
     let variability = stated.unwrap_or(Variability::Continuous);
     if matches!(kind, Kind::Real(_)) || variability != Variability::Continuous {
         return variability;
@@ -181,34 +180,22 @@ pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
 
 /// Reads the type of a variable with its attributes, also those of its declared type.
 pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind> {
-    let declared = declared(element, types);
+    let (declared_type, defaults) = declared(element, types).unzip();
     Ok(match element.element.name {
-        "Real" => {
-            let (name, defaults) = match declared {
-                Some((name, Kind::Real(real))) => (Some(name), real.clone()),
-                _ => (None, RealType::default()),
-            };
-            Kind::Real(RealType {
-                declared_type: name,
-                start: element.number("start")?,
-                derivative: derivative(element, count)?,
-                reinit: element.flag("reinit"),
-                ..real_limits(element, &defaults)?
-            })
-        }
+        "Real" => Kind::Real(RealType {
+            declared_type,
+            start: element.number("start")?,
+            derivative: derivative(element, count)?,
+            reinit: element.flag("reinit"),
+            ..real_limits(element, defaults.and_then(Kind::as_real))?
+        }),
         "Boolean" => Kind::Boolean(element.boolean("start")?),
         "String" => Kind::String(element.text("start")),
         other => {
-            let (name, defaults) = match declared {
-                Some((name, Kind::Integer(declared_type) | Kind::Enumeration(declared_type))) => {
-                    (Some(name), declared_type.clone())
-                }
-                _ => (None, IntegerType::default()),
-            };
             let integer_type = IntegerType {
-                declared_type: name,
+                declared_type,
                 start: element.integer("start")?.map(i128::from),
-                ..integer_limits(element, &defaults)?
+                ..integer_limits(element, defaults.and_then(Kind::as_integer))?
             };
             if other == "Integer" {
                 Kind::Integer(integer_type)
@@ -253,11 +240,12 @@ pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(Stri
     }
 }
 
-fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
+fn real_limits(element: Node<'_>, defaults: Option<&RealType>) -> Result<RealType> {
+    let defaults = defaults.cloned().unwrap_or_default();
     Ok(RealType {
-        quantity: element.text("quantity").or(defaults.quantity.clone()),
-        unit: element.text("unit").or(defaults.unit.clone()),
-        display_unit: element.text("displayUnit").or(defaults.display_unit.clone()),
+        quantity: element.text("quantity").or(defaults.quantity),
+        unit: element.text("unit").or(defaults.unit),
+        display_unit: element.text("displayUnit").or(defaults.display_unit),
         min: element.number("min")?.or(defaults.min),
         max: element.number("max")?.or(defaults.max),
         nominal: element.number("nominal")?.or(defaults.nominal),
@@ -266,9 +254,10 @@ fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType> {
     })
 }
 
-fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType> {
+fn integer_limits(element: Node<'_>, defaults: Option<&IntegerType>) -> Result<IntegerType> {
+    let defaults = defaults.cloned().unwrap_or_default();
     Ok(IntegerType {
-        quantity: element.text("quantity").or(defaults.quantity.clone()),
+        quantity: element.text("quantity").or(defaults.quantity),
         min: element.integer("min")?.map(i128::from).or(defaults.min),
         max: element.integer("max")?.map(i128::from).or(defaults.max),
         ..IntegerType::default()

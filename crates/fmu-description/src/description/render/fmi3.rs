@@ -3,34 +3,26 @@
 mod variables;
 
 use super::tag::Tag;
-use super::{Output, flags, integer_limits, kinds, number, real_limits};
-use crate::description::{
-    CoSimulation, Kind, ModelDescription, ModelExchange, SimpleType, Unknown, Version,
-};
+use super::{Output, integer_limits, kinds, number, real_limits, write_attributes};
+use crate::description::{Kind, ModelDescription, SimpleType, Unknown, Version, attributes};
 
 /// Returns the tag of an interface with the attributes that all three have.
 macro_rules! interface {
     ($name:literal, $flags:ident) => {{
         let tag = Tag::new($name).with("modelIdentifier", &$flags.model_identifier);
-        flags! { tag, $flags:
-            "needsExecutionTool" needs_execution_tool,
-            "canBeInstantiatedOnlyOncePerProcess" can_be_instantiated_only_once_per_process,
-            "canGetAndSetFMUState" can_get_and_set_fmu_state,
-            "canSerializeFMUState" can_serialize_fmu_state,
-            "providesDirectionalDerivatives" provides_directional_derivative,
-            "providesAdjointDerivatives" provides_adjoint_derivatives,
-            "providesPerElementDependencies" provides_per_element_dependencies,
-        }
+        attributes!(COMMON_3, write_attributes!(tag, $flags))
     }};
 }
 
 impl Output {
     pub(super) fn interfaces_3(&mut self, description: &ModelDescription) {
         if let Some(flags) = &description.model_exchange {
-            self.empty(model_exchange(flags));
+            let tag = interface!("ModelExchange", flags);
+            self.empty(attributes!(MODEL_EXCHANGE_3, write_attributes!(tag, flags)));
         }
         if let Some(flags) = &description.co_simulation {
-            self.empty(co_simulation(flags));
+            let tag = interface!("CoSimulation", flags);
+            self.empty(attributes!(CO_SIMULATION_3, write_attributes!(tag, flags)));
         }
         if let Some(flags) = &description.scheduled_execution {
             self.empty(interface!("ScheduledExecution", flags));
@@ -42,7 +34,7 @@ impl Output {
         let tag = Tag::new(&element)
             .with("name", &declared.name)
             .maybe("description", declared.description.as_ref());
-        let tag = attributes(tag, &declared.kind);
+        let tag = attributes_of(tag, &declared.kind);
         if declared.items.is_empty() {
             return self.empty(tag);
         }
@@ -95,7 +87,7 @@ fn unknown<'a>(name: &'a str, row: &Unknown, description: &ModelDescription) -> 
 }
 
 /// Adds the attributes that a type and a variable have in common.
-fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
+fn attributes_of<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
     match kind {
         Kind::Real(real) => real_limits(tag, real, number),
         Kind::Float32(real) => real_limits(tag, real, single),
@@ -124,29 +116,4 @@ fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
 #[expect(clippy::cast_possible_truncation, reason = "the numbers of a Float32 are those of an f32")]
 fn single(value: f64) -> String {
     format!("{:?}", value as f32)
-}
-
-fn model_exchange(flags: &ModelExchange) -> Tag<'_> {
-    let tag = interface!("ModelExchange", flags);
-    flags! { tag, flags:
-        "needsCompletedIntegratorStep" needs_completed_integrator_step,
-        "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
-    }
-}
-
-fn co_simulation(flags: &CoSimulation) -> Tag<'_> {
-    let tag = interface!("CoSimulation", flags);
-    let tag = flags! { tag, flags:
-        "canHandleVariableCommunicationStepSize" can_handle_variable_communication_step_size,
-    };
-    let tag = tag.maybe("fixedInternalStepSize", flags.fixed_internal_step_size.as_ref());
-    flags! { tag, flags:
-        "maxOutputDerivativeOrder" max_output_derivative_order,
-        "recommendedIntermediateInputSmoothness" recommended_intermediate_input_smoothness,
-        "providesIntermediateUpdate" provides_intermediate_update,
-        "mightReturnEarlyFromDoStep" might_return_early_from_do_step,
-        "canReturnEarlyAfterIntermediateUpdate" can_return_early_after_intermediate_update,
-        "hasEventMode" has_event_mode,
-        "providesEvaluateDiscreteStates" provides_evaluate_discrete_states,
-    }
 }

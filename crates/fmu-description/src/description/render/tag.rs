@@ -28,6 +28,12 @@ impl Value for f64 {
     }
 }
 
+impl<T: Value> Value for Option<T> {
+    fn text(&self) -> Cow<'_, str> {
+        self.as_ref().map_or(Cow::Borrowed(""), T::text)
+    }
+}
+
 /// Implements [`Value`] for types whose `Display` is their text in XML.
 macro_rules! displayed {
     ($($kind:ty),*) => {$(
@@ -62,7 +68,7 @@ impl<'a> Tag<'a> {
         }
     }
 
-    /// Adds an attribute, unless its value is the default of the type: zero or false.
+    /// Adds an attribute, unless its value is the default of the type: zero, false or `None`.
     pub(super) fn unless_default<T: Value + Default + PartialEq>(
         self,
         name: &str,

@@ -118,8 +118,7 @@ fn outputs(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<Vec<Un
     Ok(rows)
 }
 
-/// Returns the sorted indices of the inputs that `DirectDependency` names; warns and returns `None` at the first name
-/// that no input has.
+/// Returns the sorted indices of the inputs that `DirectDependency` names; warns and returns `None` for others.
 fn dependencies(element: Node<'_>, inputs: &HashMap<&str, u32>) -> Option<Vec<u32>> {
     let mut indices = Vec::new();
     for name in element.children_named("Name") {

@@ -7,8 +7,6 @@ use crate::description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType, Version,
 };
 
-const INTERVALS: [&str; 6] = ["constant", "fixed", "tunable", "changing", "countdown", "triggered"];
-
 pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>> {
     let Some(list) = root.optional_child("TypeDefinitions")? else { return Ok(Vec::new()) };
     let mut types = Vec::new();
@@ -41,68 +39,54 @@ fn item(element: Node<'_>) -> Result<(String, i64)> {
 }
 
 /// Reads the attributes that a type and a variable have in common into `kind`; a Boolean and a String have none.
-/// `defaults` is the declared type, whose attributes replace missing ones.
+/// `declared` are the name and the kind of the declared type, whose attributes replace missing ones.
 pub(super) fn attributes(
     element: Node<'_>,
     kind: &mut Kind,
-    defaults: Option<&Kind>,
+    declared: Option<(String, &Kind)>,
 ) -> Result<()> {
-    let range = kind.integer_range(Version::V3);
+    let (declared_type, defaults) = declared.unzip();
+    let (range, round) = (kind.integer_range(Version::V3), rounding(kind));
     if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
-        *integer_type = integer(element, &range, defaults.and_then(Kind::as_integer))?;
-        return Ok(());
-    }
-    let precision = Precision::of(kind);
-    if let Some(real_type) = kind.as_real_mut() {
-        *real_type = real(element, precision, defaults.and_then(Kind::as_real))?;
-        return Ok(());
-    }
-    match (kind, defaults) {
-        (Kind::Binary(binary_type), Some(Kind::Binary(defaults))) => {
-            *binary_type = binary(element, defaults);
-        }
-        (Kind::Binary(binary_type), _) => *binary_type = binary(element, &BinaryType::default()),
-        (Kind::Clock(clock_type), Some(Kind::Clock(defaults))) => {
-            *clock_type = clock(element, Some(defaults))?;
-        }
-        (Kind::Clock(clock_type), _) => *clock_type = clock(element, None)?,
-        _ => {}
+        let limits = integer(element, &range, defaults.and_then(Kind::as_integer))?;
+        *integer_type = IntegerType { declared_type, ..limits };
+    } else if let Some(real_type) = kind.as_real_mut() {
+        let limits = real(element, round, defaults.and_then(Kind::as_real))?;
+        *real_type = RealType { declared_type, ..limits };
+    } else if let Kind::Binary(binary_type) = kind {
+        let defaults = match defaults {
+            Some(Kind::Binary(defaults)) => defaults,
+            _ => &BinaryType::default(),
+        };
+        *binary_type = BinaryType { declared_type, ..binary(element, defaults) };
+    } else if let Kind::Clock(clock_type) = kind {
+        let defaults = match defaults {
+            Some(Kind::Clock(defaults)) => Some(defaults),
+            _ => None,
+        };
+        *clock_type = ClockType { declared_type, ..clock(element, defaults)? };
     }
     Ok(())
 }
 
-/// The precision of a floating-point type.
-#[derive(Clone, Copy)]
-pub(super) enum Precision {
-    Single,
-    Double,
-}
-
-impl Precision {
-    pub(super) fn of(kind: &Kind) -> Self {
-        if let Kind::Float32(_) = kind { Precision::Single } else { Precision::Double }
-    }
-
-    /// Rounds a number to the precision.
-    #[expect(clippy::cast_possible_truncation, reason = "the FMU stores the rounded number")]
-    pub(super) fn round(self, value: f64) -> f64 {
-        match self {
-            Precision::Single => f64::from(value as f32),
-            Precision::Double => value,
-        }
+/// Returns the function that rounds a number to the precision of a floating-point type.
+#[expect(clippy::cast_possible_truncation, reason = "the FMU stores the rounded number")]
+pub(super) fn rounding(kind: &Kind) -> fn(f64) -> f64 {
+    match kind {
+        Kind::Float32(_) => |value| f64::from(value as f32),
+        _ => |value| value,
     }
 }
 
-fn real(element: Node<'_>, precision: Precision, defaults: Option<&RealType>) -> Result<RealType> {
+fn real(element: Node<'_>, round: fn(f64) -> f64, defaults: Option<&RealType>) -> Result<RealType> {
     let defaults = defaults.cloned().unwrap_or_default();
-    let round = |value: Option<f64>| value.map(|value| precision.round(value));
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity),
         unit: element.text("unit").or(defaults.unit),
         display_unit: element.text("displayUnit").or(defaults.display_unit),
-        min: round(element.bound("min", defaults.min)?),
-        max: round(element.bound("max", defaults.max)?),
-        nominal: round(element.number("nominal")?).or(defaults.nominal),
+        min: element.bound("min", defaults.min)?.map(round),
+        max: element.bound("max", defaults.max)?.map(round),
+        nominal: element.number("nominal")?.map(round).or(defaults.nominal),
         relative_quantity: element.optional_flag("relativeQuantity").or(defaults.relative_quantity),
         ..RealType::default()
     })
@@ -135,7 +119,7 @@ fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
     let defaults = defaults.cloned().unwrap_or_default();
     let flag = |name, default| element.optional_flag(name).unwrap_or(default);
     let interval_decimal = element.number("intervalDecimal")?.or(defaults.interval_decimal);
-    let stated = element.word("intervalVariability", &INTERVALS);
+    let stated = element.word("intervalVariability", IntervalVariability::WORDS);
     let interval_variability = match stated {
         Some(stated) => stated,
         None if has_defaults => defaults.interval_variability,
@@ -164,7 +148,7 @@ fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariabi
         IntervalVariability::Triggered
     };
     if !element.has("intervalVariability") {
-        let expected = format!("one of {}", INTERVALS.join(", "));
+        let expected = format!("one of {}", IntervalVariability::WORDS.join(", "));
         let actual = "no such attribute".to_owned();
         let place = element.place("intervalVariability");
         let assumed_as = format!("read as {}", assumed.as_str());

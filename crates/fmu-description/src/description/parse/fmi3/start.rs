@@ -1,6 +1,6 @@
 //! Reads the start values of variables and arrays of FMI 3.0.
 
-use super::kinds::Precision;
+use super::kinds::rounding;
 use crate::description::parse::attributes::{Node, Result, integer};
 use crate::description::parse::structure::words;
 use crate::description::{Elements, Kind, Version};
@@ -17,10 +17,10 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
         )?;
         return Ok(single(values, |value| integer_type.start = Some(value)).map(Elements::Integer));
     }
-    let precision = Precision::of(kind);
+    let round = rounding(kind);
     if let Some(real_type) = kind.as_real_mut() {
         // `parse` reads `INF`, `-INF` and `NaN` of XML Schema.
-        let number = |text: &str| Some(precision.round(text.parse().ok()?));
+        let number = |text: &str| text.parse().ok().map(round);
         let values = list(element, number, || "numbers".to_owned())?;
         return Ok(single(values, |value| real_type.start = Some(value)).map(Elements::Real));
     }

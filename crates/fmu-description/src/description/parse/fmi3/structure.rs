@@ -72,8 +72,7 @@ fn list(element: Node<'_>, name: &'static str, references: &References) -> Resul
     Ok(rows)
 }
 
-/// Reads the attribute `dependencies` as indices; `None` if it is absent or, with a warning, if it has a reference
-/// that belongs to no variable.
+/// Reads the attribute `dependencies` as indices; `None` if it is absent or, with a warning, refers to no variable.
 fn dependencies(row: Node<'_>, references: &References) -> Option<Vec<u32>> {
     let text = row.attribute("dependencies")?;
     let mut indices = Vec::new();

@@ -8,25 +8,16 @@ use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::words;
 use crate::description::parse::variables::{
-    Types, VARIABILITIES, VARIABLES, by_name, check_names, check_references, declared,
+    Types, VARIABLES, by_name, check_names, check_references, declared,
 };
 use crate::description::{
-    Causality, Dimension, Elements, Kind, ScalarVariable, SimpleType, Variability,
+    Causality, Dimension, Elements, Initial, Kind, ScalarVariable, SimpleType, Variability,
 };
 use crate::limits::{HELP, exceeds};
 
 /// Maximum size in bytes of the texts and lists that aliases copy from their variables.
 const ALIASES: usize = 128 << 20;
 
-const CAUSALITIES: [&str; 7] = [
-    "parameter",
-    "calculatedParameter",
-    "input",
-    "output",
-    "local",
-    "independent",
-    "structuralParameter",
-];
 pub(super) const A_REFERENCE: &str = "the value reference of a variable";
 
 /// Maps a value reference to the 1-based index of its variable, the first one that is no alias.
@@ -92,10 +83,8 @@ fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References
 }
 
 fn variable(element: Node<'_>, mut kind: Kind, types: &Types<'_>) -> Result<ScalarVariable> {
-    let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
-    let (declared_type, defaults) = declared(element, types).unzip();
-    attributes(element, &mut kind, defaults)?;
-    set_declared_type(&mut kind, declared_type);
+    let causality = element.word("causality", Causality::WORDS).unwrap_or(Causality::Local);
+    attributes(element, &mut kind, declared(element, types))?;
     if let Some(real) = kind.as_real_mut() {
         real.derivative = reference(element, "derivative")?;
         real.reinit = element.flag("reinit");
@@ -107,7 +96,7 @@ fn variable(element: Node<'_>, mut kind: Kind, types: &Types<'_>) -> Result<Scal
         description: element.text("description"),
         causality,
         variability: variability(element, causality, &kind),
-        initial: element.word("initial", &["exact", "approx", "calculated"]),
+        initial: element.word("initial", Initial::WORDS),
         kind,
         dimensions: element.children_named("Dimension").map(dimension).collect::<Result<_, _>>()?,
         start_elements,
@@ -118,20 +107,6 @@ fn variable(element: Node<'_>, mut kind: Kind, types: &Types<'_>) -> Result<Scal
         clocks: clocks(element)?,
         ..ScalarVariable::default()
     })
-}
-
-fn set_declared_type(kind: &mut Kind, name: Option<String>) {
-    if let Some(real) = kind.as_real_mut() {
-        real.declared_type = name;
-    } else if let Some(integer) = kind.as_integer_mut() {
-        integer.declared_type = name;
-    } else {
-        match kind {
-            Kind::Binary(binary) => binary.declared_type = name,
-            Kind::Clock(clock) => clock.declared_type = name,
-            _ => {}
-        }
-    }
 }
 
 /// Reads an `Alias` of `variable`: another variable with its value and attributes, but without start value.
@@ -187,7 +162,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
         _ if continuous => Variability::Continuous,
         _ => Variability::Discrete,
     };
-    let stated = element.word("variability", &VARIABILITIES).unwrap_or(default);
+    let stated = element.word("variability", Variability::WORDS).unwrap_or(default);
     if stated == Variability::Continuous && !continuous {
         let expected = format!("another one than continuous for {}", element.element.name);
         let assumed = format!("read as {}", default.as_str());

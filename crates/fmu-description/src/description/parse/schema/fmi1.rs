@@ -1,42 +1,21 @@
 //! The schema of FMI 1.0 for co-simulation.
 
-use super::{Shape, branch, leaf, list};
+use super::{Shape, branch, leaf, list, names};
 
 const ROOT: Shape = branch(
-    &[
-        "fmiVersion",
-        "modelName",
-        "modelIdentifier",
-        "guid",
-        "description",
-        "author",
-        "version",
-        "generationTool",
-        "generationDateAndTime",
-        "variableNamingConvention",
-        "numberOfContinuousStates",
-        "numberOfEventIndicators",
-    ],
-    &[
-        "UnitDefinitions",
-        "TypeDefinitions",
-        "DefaultExperiment",
-        "VendorAnnotations",
-        "ModelVariables",
-        "Implementation",
-    ],
+    names! {
+        fmiVersion modelName modelIdentifier guid description author version generationTool
+        generationDateAndTime variableNamingConvention numberOfContinuousStates numberOfEventIndicators
+    },
+    names! {
+        UnitDefinitions TypeDefinitions DefaultExperiment VendorAnnotations ModelVariables Implementation
+    },
 );
-const CAPABILITIES: Shape = leaf(&[
-    "canHandleVariableCommunicationStepSize",
-    "canHandleEvents",
-    "canRejectSteps",
-    "canInterpolateInputs",
-    "maxOutputDerivativeOrder",
-    "canRunAsynchronuously",
-    "canSignalEvents",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canNotUseMemoryManagementFunctions",
-]);
+const CAPABILITIES: Shape = leaf(names! {
+    canHandleVariableCommunicationStepSize canHandleEvents canRejectSteps canInterpolateInputs
+    maxOutputDerivativeOrder canRunAsynchronuously canSignalEvents canBeInstantiatedOnlyOncePerProcess
+    canNotUseMemoryManagementFunctions
+});
 /// Attributes of a Real, as a type and as a variable.
 const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal"];

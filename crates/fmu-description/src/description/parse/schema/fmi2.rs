@@ -1,67 +1,25 @@
 //! The schema of FMI 2.0.5.
 
-use super::{Shape, branch, leaf, list};
+use super::{Shape, branch, leaf, list, names, names_in_table};
+use crate::description::attributes;
 use crate::unit::BaseUnit;
 
 const ROOT: Shape = branch(
-    &[
-        "fmiVersion",
-        "modelName",
-        "guid",
-        "description",
-        "author",
-        "version",
-        "copyright",
-        "license",
-        "generationTool",
-        "generationDateAndTime",
-        "variableNamingConvention",
-        "numberOfEventIndicators",
-    ],
-    &[
-        "ModelExchange",
-        "CoSimulation",
-        "UnitDefinitions",
-        "TypeDefinitions",
-        "LogCategories",
-        "DefaultExperiment",
-        "VendorAnnotations",
-        "ModelVariables",
-        "ModelStructure",
-    ],
+    names! {
+        fmiVersion modelName guid description author version copyright license generationTool
+        generationDateAndTime variableNamingConvention numberOfEventIndicators
+    },
+    names! {
+        ModelExchange CoSimulation UnitDefinitions TypeDefinitions LogCategories DefaultExperiment
+        VendorAnnotations ModelVariables ModelStructure
+    },
 );
-/// Attributes of both interfaces.
-const INTERFACE: &[&str] = &[
-    "modelIdentifier",
-    "needsExecutionTool",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canNotUseMemoryManagementFunctions",
-    "canGetAndSetFMUstate",
-    "canSerializeFMUstate",
-    "providesDirectionalDerivative",
-];
-const MODEL_EXCHANGE: Shape =
-    branch(&["completedIntegratorStepNotNeeded"], &["SourceFiles"]).with(INTERFACE);
-const CO_SIMULATION: Shape = branch(
-    &[
-        "canHandleVariableCommunicationStepSize",
-        "canInterpolateInputs",
-        "maxOutputDerivativeOrder",
-        "canRunAsynchronuously",
-    ],
-    &["SourceFiles"],
-)
-.with(INTERFACE);
+const MODEL_EXCHANGE: Shape = interface(attributes!(MODEL_EXCHANGE_2, names_in_table!()));
+const CO_SIMULATION: Shape = interface(attributes!(CO_SIMULATION_2, names_in_table!()));
 const VARIABLE: Shape = branch(
-    &[
-        "name",
-        "valueReference",
-        "description",
-        "causality",
-        "variability",
-        "initial",
-        "canHandleMultipleSetPerTimeInstant",
-    ],
+    names! {
+        name valueReference description causality variability initial canHandleMultipleSetPerTimeInstant
+    },
     &["Real", "Integer", "Boolean", "String", "Enumeration", "Annotations"],
 );
 /// Attributes of a Real, as a type and as a variable.
@@ -69,6 +27,12 @@ const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal", "unbounded"];
 /// Attributes of an Integer or Enumeration, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
+
+/// Returns the shape of an interface with these attributes and those of both interfaces.
+const fn interface(attributes: &'static [&'static str]) -> Shape {
+    let shape = branch(attributes, &["SourceFiles"]).with(&["modelIdentifier"]);
+    shape.with(attributes!(COMMON_2, names_in_table!()))
+}
 
 /// The shape of the element `name` in `parent`; `None` if the schema does not define its content.
 pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {

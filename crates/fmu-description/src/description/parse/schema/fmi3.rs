@@ -1,61 +1,19 @@
 //! The schema of FMI 3.0.2.
 
-use super::{Shape, branch, leaf, list};
+use super::{Shape, branch, leaf, list, names, names_in_table};
+use crate::description::attributes;
 use crate::unit::BaseUnit;
 
 const ROOT: Shape = branch(
-    &[
-        "fmiVersion",
-        "modelName",
-        "instantiationToken",
-        "description",
-        "author",
-        "version",
-        "copyright",
-        "license",
-        "generationTool",
-        "generationDateAndTime",
-        "variableNamingConvention",
-    ],
-    &[
-        "ModelExchange",
-        "CoSimulation",
-        "ScheduledExecution",
-        "UnitDefinitions",
-        "TypeDefinitions",
-        "LogCategories",
-        "DefaultExperiment",
-        "ModelVariables",
-        "ModelStructure",
-        "Annotations",
-    ],
+    names! {
+        fmiVersion modelName instantiationToken description author version copyright license
+        generationTool generationDateAndTime variableNamingConvention
+    },
+    names! {
+        ModelExchange CoSimulation ScheduledExecution UnitDefinitions TypeDefinitions LogCategories
+        DefaultExperiment ModelVariables ModelStructure Annotations
+    },
 );
-/// Attributes of all interfaces.
-const INTERFACE: &[&str] = &[
-    "modelIdentifier",
-    "needsExecutionTool",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canGetAndSetFMUState",
-    "canSerializeFMUState",
-    "providesDirectionalDerivatives",
-    "providesAdjointDerivatives",
-    "providesPerElementDependencies",
-];
-const CO_SIMULATION: Shape = branch(
-    &[
-        "canHandleVariableCommunicationStepSize",
-        "fixedInternalStepSize",
-        "maxOutputDerivativeOrder",
-        "recommendedIntermediateInputSmoothness",
-        "providesIntermediateUpdate",
-        "mightReturnEarlyFromDoStep",
-        "canReturnEarlyAfterIntermediateUpdate",
-        "hasEventMode",
-        "providesEvaluateDiscreteStates",
-    ],
-    &["Annotations"],
-)
-.with(INTERFACE);
 
 /// Declares the names of the elements of variables, and with `Type` at their end those of types.
 macro_rules! elements {
@@ -71,16 +29,10 @@ elements! {
 }
 
 /// Attributes of all variables.
-const VARIABLE: &[&str] = &[
-    "name",
-    "valueReference",
-    "description",
-    "causality",
-    "variability",
-    "canHandleMultipleSetPerTimeInstant",
-    "clocks",
-    "declaredType",
-];
+const VARIABLE: &[&str] = names! {
+    name valueReference description causality variability canHandleMultipleSetPerTimeInstant clocks
+    declaredType
+};
 /// Attributes of all types.
 const TYPE: &[&str] = &["name", "description"];
 /// Attributes of a floating-point number, as a type and as a variable.
@@ -89,28 +41,24 @@ const REAL: &[&str] =
 /// Attributes of an integer, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 /// Attributes of a clock, as a type and as a variable.
-const CLOCK: &[&str] = &[
-    "canBeDeactivated",
-    "priority",
-    "intervalVariability",
-    "intervalDecimal",
-    "shiftDecimal",
-    "supportsFraction",
-    "resolution",
-    "intervalCounter",
-    "shiftCounter",
-];
+const CLOCK: &[&str] = names! {
+    canBeDeactivated priority intervalVariability intervalDecimal shiftDecimal supportsFraction resolution
+    intervalCounter shiftCounter
+};
+
+/// Returns the shape of an interface with these attributes and those of all interfaces.
+const fn interface(attributes: &'static [&'static str]) -> Shape {
+    let shape = branch(attributes, ANNOTATED).with(&["modelIdentifier"]);
+    shape.with(attributes!(COMMON_3, names_in_table!()))
+}
 
 /// The shape of the element `name` in `parent`; `None` if the schema does not define its content.
 pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
     Some(match (parent, name) {
         (_, "fmiModelDescription") => ROOT,
-        (_, "ModelExchange") => {
-            branch(&["needsCompletedIntegratorStep", "providesEvaluateDiscreteStates"], ANNOTATED)
-                .with(INTERFACE)
-        }
-        (_, "CoSimulation") => CO_SIMULATION,
-        (_, "ScheduledExecution") => branch(&[], ANNOTATED).with(INTERFACE),
+        (_, "ModelExchange") => interface(attributes!(MODEL_EXCHANGE_3, names_in_table!())),
+        (_, "CoSimulation") => interface(attributes!(CO_SIMULATION_3, names_in_table!())),
+        (_, "ScheduledExecution") => interface(&[]),
         (_, "UnitDefinitions") => list(&["Unit"]),
         (_, "Unit") => branch(&["name"], &["BaseUnit", "DisplayUnit", "Annotations"]),
         (_, "BaseUnit") => leaf(&["factor", "offset"]).with(&BaseUnit::EXPONENTS),

@@ -1,6 +1,6 @@
 //! Renders `ModelVariables`: variables, arrays with their start values, aliases.
 
-use super::{attributes, reference, references, single};
+use super::{attributes_of, reference, references, single};
 use crate::description::render::Output;
 use crate::description::render::tag::Tag;
 use crate::description::{
@@ -72,7 +72,7 @@ fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<
         .maybe("previous", previous.as_ref())
         .maybe("declaredType", kind.declared_type())
         .maybe("initial", variable.initial.map(Initial::as_str));
-    let tag = attributes(tag, kind).maybe("start", start_list(variable).as_ref());
+    let tag = attributes_of(tag, kind).maybe("start", start_list(variable).as_ref());
     let Some(real) = kind.as_real() else { return tag };
     let derivative = real.derivative.map(|index| reference(description, index));
     tag.maybe("derivative", derivative.as_ref()).unless_default("reinit", &real.reinit)
