@@ -9,44 +9,24 @@ use fmu_description::{ParseError, Position};
 /// Why a system structure cannot be read, flattened or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum SspError {
     /// The file is not XML that can be read.
     #[error(transparent)]
     Xml(#[from] ParseError),
     /// An element has content that SSP does not allow.
     #[error("{at}: <{element}>: expected {expected}, found {actual}")]
-    Content {
-        /// Position of the element.
-        at: Position,
-        /// The element.
-        element: String,
-        /// The allowed content.
-        expected: String,
-        /// The content found.
-        actual: String,
-    },
+    Content { at: Position, element: String, expected: String, actual: String },
     /// The content is valid but contradictory or not supported.
     #[error("{at}: {sentence}")]
-    Meaning {
-        /// Position of the element.
-        at: Position,
-        /// The problem, in a sentence.
-        sentence: String,
-    },
+    Meaning { at: Position, sentence: String },
     /// An error in a file.
     #[error("{}: {reason}", file.display())]
-    In {
-        /// The file.
-        file: PathBuf,
-        /// The error.
-        reason: Box<SspError>,
-    },
+    In { file: PathBuf, reason: Box<SspError> },
     /// An operation on a file failed.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// The operation.
         action: &'static str,
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -57,23 +37,14 @@ pub enum SspError {
     /// A file or an archive exceeds a limit.
     #[error("expected at most {limit} {what}, found more{help}")]
     Limit {
-        /// The limit.
         limit: usize,
-        /// The limited quantity.
         what: &'static str,
         /// [`fmu_description::limits::HELP`] if the limit can be lifted, otherwise empty.
         help: &'static str,
     },
     /// A file, element or variable is missing or unsuitable.
     #[error("{what}: expected {expected}, found {actual}")]
-    Missing {
-        /// The file, element or variable.
-        what: String,
-        /// The expected kind or property.
-        expected: String,
-        /// The kind or property found.
-        actual: String,
-    },
+    Missing { what: String, expected: String, actual: String },
 }
 
 impl SspError {

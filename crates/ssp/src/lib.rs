@@ -46,8 +46,7 @@ pub struct Opened {
     /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked
     /// FMUs, which exist as long as [`Opened::folders`].
     pub assembly: Assembly,
-    /// Start time, stop time and base step that the file states. An OSP file without `BaseStepSize` has a
-    /// base step of 0.1 s.
+    /// Start time, stop time and base step that the file states. The base step of an OSP file without one is 0.1 s.
     pub experiment: DefaultExperiment,
     /// Names of elements with the communication step in s that the file proposes for them: the annotation
     /// `osp:StepSizeHint`, or `stepSize` of an OSP file, rounded down to a multiple of the base step.
@@ -75,10 +74,9 @@ pub struct Folders {
 /// or a folder with `OspSystemStructure.xml` and without an SSD, is read in the format of libcosim,
 /// with its functions and variable groups.
 ///
-/// Elements of nested systems, other SSDs and SSPs become part of the assembly. Their names are joined
-/// by dots, without the name of the root system. Along a path of connections, units are converted and
-/// transformations applied connection by connection. Parameter bindings of outer systems override
-/// bindings of inner systems, later bindings override earlier ones.
+/// Elements of nested systems, other SSDs and SSPs become part of the assembly. Their names are joined by dots, without
+/// the name of the root system. Along a path of connections, units are converted and transformations applied connection
+/// by connection. Parameter bindings of outer systems override those of inner systems, later ones earlier ones.
 ///
 /// # Errors
 ///
@@ -115,7 +113,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         let Content::Fmu(fmu) = node.content else { continue };
         if !names.insert(node.path.as_str()) {
             let sentence = format!("two components have the hierarchical name {}", node.path);
-            return Err(error::semantic_error(node.at, sentence).in_file(&node.file.shown));
+            return Err(error::semantic_error(node.at.0, sentence).in_file(&node.file.shown));
         }
         elements.push(Element {
             name: node.path.clone(),

@@ -2,7 +2,6 @@
 
 pub(super) mod files;
 
-use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -90,18 +89,11 @@ impl Loader {
         self.tree.nodes.push(Node {
             path: place.path,
             parent: place.parent,
-            children: HashMap::new(),
-            dictionaries: HashMap::new(),
             file: file.clone(),
-            at: base.at.0,
+            at: base.at,
             connectors: base.connectors.clone(),
             connector_positions: positions,
-            outside: None,
-            connections: Vec::new(),
-            bindings: Vec::new(),
-            step_size: None,
-            implementation: Implementation::Any,
-            content: Content::System,
+            ..Node::default()
         });
         Ok(self.tree.nodes.len() - 1)
     }

@@ -191,8 +191,7 @@ impl Loader {
         })
     }
 
-    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group, without
-    /// those of nested groups.
+    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group, not of nested ones.
     fn signals(&self, signals: &End, variables: &End) -> Result<Vec<[End; 2]>, String> {
         let group = self.group(variables)?;
         let components = (0..group.variables.len()).map(|k| {
@@ -211,9 +210,8 @@ impl Loader {
         self.simulator_entry(simulator).map(|(index, _)| &self.files.fmus[*index].description)
     }
 
-    /// Connects two variables, or a variable and a signal, from output to input. Returns an error sentence if an
-    /// end does not exist, if both are outputs or both are inputs, or if the input of a linear transformation
-    /// already has a source.
+    /// Connects two variables, or a variable and a signal, from output to input. An error sentence if an end does not
+    /// exist, both are outputs or both inputs, or the input of a linear transformation already has a source.
     fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
         let (source, target) = match (self.is_source(first)?, self.is_source(second)?) {
             (true, false) => (first, second),

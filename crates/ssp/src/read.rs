@@ -55,45 +55,47 @@ pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
 /// The parsed content, and warnings with positions about undeclared prefixes and unknown content.
 type Read<T> = Result<(T, Vec<String>), SspError>;
 
-/// Parses the XML of a file and checks it against the schema; also returns warnings.
-fn read(bytes: &[u8], space: &str, root: &str) -> Read<Node> {
+/// Parses the XML of a file, checks it against the schema and reads its root element; also returns warnings.
+fn read<T>(
+    bytes: &[u8],
+    space: &str,
+    root: &str,
+    content: impl Fn(&Node) -> Result<T, SspError>,
+) -> Read<T> {
     let (node, mut warnings) = xml::read(bytes, space, root)?;
     schema::check(&node, &mut warnings);
-    Ok((node, warnings))
+    Ok((content(&node)?, warnings))
 }
 
 /// Parses an SSD file; also returns warnings.
 pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
     let name = "SystemStructureDescription";
-    let (root, warnings) = read(bytes, name, name)?;
-    let system = root.child("System")?;
-    let system = system.ok_or_else(|| root.wrong("an element System", "none"))?;
-    let structure = SystemStructure {
-        name: root.required("name")?.to_owned(),
-        system: system::system(system)?,
-        definitions: definitions(&root)?,
-        experiment: root.child("DefaultExperiment")?.map(system::experiment).transpose()?,
-        generation_tool: root.text("generationTool"),
-    };
-    Ok((structure, warnings))
+    read(bytes, name, name, |root| {
+        let system = root.child("System")?;
+        let system = system.ok_or_else(|| root.wrong("an element System", "none"))?;
+        Ok(SystemStructure {
+            name: root.required("name")?.to_owned(),
+            system: system::system(system)?,
+            definitions: definitions(root)?,
+            experiment: root.child("DefaultExperiment")?.map(system::experiment).transpose()?,
+            generation_tool: root.text("generationTool"),
+        })
+    })
 }
 
 /// Parses an SSV file; also returns warnings.
 pub(super) fn ssv(bytes: &[u8]) -> Read<ParameterSet> {
-    let (root, warnings) = read(bytes, "SystemStructureParameterValues", "ParameterSet")?;
-    Ok((parameter_set(&root)?, warnings))
+    read(bytes, "SystemStructureParameterValues", "ParameterSet", parameter_set)
 }
 
 /// Parses an SSM file; also returns warnings.
 pub(super) fn ssm(bytes: &[u8]) -> Read<ParameterMapping> {
-    let (root, warnings) = read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?;
-    Ok((parameter_mapping(&root)?, warnings))
+    read(bytes, "SystemStructureParameterMapping", "ParameterMapping", parameter_mapping)
 }
 
 /// Parses an SSB file; also returns warnings.
 pub(super) fn ssb(bytes: &[u8]) -> Read<SignalDictionary> {
-    let (root, warnings) = read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?;
-    Ok((signal_dictionary(&root)?, warnings))
+    read(bytes, "SystemStructureSignalDictionary", "SignalDictionary", signal_dictionary)
 }
 
 fn parameter_set(node: &Node) -> Result<ParameterSet, SspError> {
@@ -140,8 +142,7 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     }))
 }
 
-/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a
-/// single value or text.
+/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`; `None` for a single one.
 fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
     if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
         let values = node.children_named("Value").map(|value| value.required("value"));

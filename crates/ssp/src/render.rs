@@ -5,10 +5,10 @@ mod tag;
 use fmu_description::unit::BaseUnit;
 
 use super::structure::{
-    Component, Connection, Connector, ConnectorKind, Content, Conversion, DefaultExperiment,
-    Definitions, DictionarySource, Dimension, Element, ElementBase, End, Implementation,
-    MappingEntry, Parameter, ParameterBinding, ParameterMapping, ParameterSet, ParameterValue,
-    SignalDictionary, Source, System, SystemStructure, Transformation, Type,
+    Component, Connection, Connector, ConnectorKind, Conversion, DefaultExperiment, Definitions,
+    DictionarySource, Dimension, Element, ElementBase, End, Implementation, MappingEntry,
+    Parameter, ParameterBinding, ParameterMapping, ParameterSet, ParameterValue, SignalDictionary,
+    Source, System, SystemStructure, Transformation, Type,
 };
 use tag::Tag;
 
@@ -64,25 +64,16 @@ fn base(tag: Tag, base: &ElementBase) -> Tag {
 }
 
 fn component(component: &Component) -> Tag {
-    let content = match component.content {
-        Content::Fmu => "application/x-fmu-sharedlibrary",
-        Content::Definition => "application/x-ssp-definition",
-        Content::Package => "application/x-ssp-package",
-    };
-    let implementation = match component.implementation {
-        Implementation::Any => None,
-        Implementation::CoSimulation => Some("CoSimulation"),
-        Implementation::ModelExchange => Some("ModelExchange"),
-        Implementation::ScheduledExecution => Some("ScheduledExecution"),
-    };
+    let implementation =
+        Some(component.implementation).filter(|stated| *stated != Implementation::Any);
     let source = Some(component.source.as_str()).filter(|source| !source.is_empty());
-    let newer = source.is_none() || implementation == Some("ScheduledExecution");
+    let newer = source.is_none() || implementation == Some(Implementation::ScheduledExecution);
     let hint =
         component.step_size.map(|size| Tag::new("osp:StepSizeHint").with("value", number(size)));
     base(Tag::new("ssd:Component"), &component.base)
-        .with("type", content)
+        .with("type", component.content.as_str())
         .maybe("source", source)
-        .maybe("implementation", implementation)
+        .maybe("implementation", implementation.map(Implementation::as_str))
         .newer(newer)
         .maybe_add(hint.map(annotation))
 }

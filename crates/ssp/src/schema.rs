@@ -7,56 +7,31 @@ use fmu_description::Position;
 
 use super::xml::Node;
 
+/// A list of names, without quotes and commas.
+macro_rules! names {
+    ($($name:ident)*) => { [$(stringify!($name)),*] };
+}
+
 /// Attributes of every element.
 const ANYWHERE: [&str; 2] = ["id", "description"];
 /// Additional attributes of root elements.
-const TOP: [&str; 8] = [
-    "version",
-    "name",
-    "author",
-    "fileversion",
-    "copyright",
-    "license",
-    "generationTool",
-    "generationDateAndTime",
-];
+const TOP: [&str; 8] = names! {
+    version name author fileversion copyright license generationTool generationDateAndTime
+};
 /// Names of type elements of connectors and parameter values.
-pub(super) const TYPES: [&str; 17] = [
-    "Real",
-    "Float64",
-    "Float32",
-    "Integer",
-    "Int8",
-    "UInt8",
-    "Int16",
-    "UInt16",
-    "Int32",
-    "UInt32",
-    "Int64",
-    "UInt64",
-    "Boolean",
-    "String",
-    "Enumeration",
-    "Binary",
-    "Clock",
-];
-const TRANSFORMATIONS: [&str; 4] = [
-    "LinearTransformation",
-    "BooleanMappingTransformation",
-    "IntegerMappingTransformation",
-    "EnumerationMappingTransformation",
-];
+pub(super) const TYPES: [&str; 17] = names! {
+    Real Float64 Float32 Integer Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64
+    Boolean String Enumeration Binary Clock
+};
+const TRANSFORMATIONS: [&str; 4] = names! {
+    LinearTransformation BooleanMappingTransformation IntegerMappingTransformation
+    EnumerationMappingTransformation
+};
 /// Elements that most other elements may contain.
 const COMMON: [&str; 3] = ["MetaData", "Signature", "Annotations"];
 /// Lists that the standard allows once; the reader accepts several.
-const LISTS: [&str; 6] = [
-    "Connectors",
-    "ParameterBindings",
-    "Connections",
-    "SignalDictionaries",
-    "Units",
-    "Enumerations",
-];
+const LISTS: [&str; 6] =
+    names! { Connectors ParameterBindings Connections SignalDictionaries Units Enumerations };
 const ELEMENT: [&str; 3] = ["Connectors", "ElementGeometry", "ParameterBindings"];
 const SYSTEM: [&str; 5] =
     ["Elements", "Connections", "SignalDictionaries", "SystemGeometry", "GraphicalElements"];
@@ -136,15 +111,10 @@ fn content(name: &str) -> Option<(Names, &'static [&'static str])> {
         "Connections" => (&[&["Connection"]], &[]),
         "Connection" => (
             &[&TRANSFORMATIONS, &["ConnectionGeometry"], &COMMON],
-            &[
-                "startElement",
-                "startConnector",
-                "startIndices",
-                "endElement",
-                "endConnector",
-                "endIndices",
-                "suppressUnitConversion",
-            ],
+            &names! {
+                startElement startConnector startIndices endElement endConnector endIndices
+                suppressUnitConversion
+            },
         ),
         "MappingEntry" => {
             (&[&TRANSFORMATIONS, &COMMON], &["source", "target", "suppressUnitConversion"])

@@ -1,19 +1,18 @@
 //! The content of SSD, SSV, SSM and SSB files (SSP 1.0.1 and 2.0, sections 4 to 8) as plain data.
 //!
-//! Geometry, graphical elements and annotations are left out, except the step sizes in annotations of
-//! the Open Simulation Platform.
+//! Geometry, graphical elements and annotations are left out, except step sizes of the Open Simulation Platform.
+#![expect(missing_docs, reason = "fields without documentation have the names of the standard")]
 
 mod kinds;
 
 use fmu_description::Position;
 use fmu_description::unit::BaseUnit;
 
-pub use kinds::{ConnectorKind, Dimension, ParameterValue, Type};
+pub use kinds::{ConnectorKind, Content, Dimension, Implementation, ParameterValue, Type};
 
 /// `SystemStructureDescription`, the root element of an SSD file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SystemStructure {
-    /// `name`.
     pub name: String,
     /// The root system.
     pub system: System,
@@ -21,16 +20,13 @@ pub struct SystemStructure {
     pub definitions: Definitions,
     /// `DefaultExperiment`.
     pub experiment: Option<DefaultExperiment>,
-    /// `generationTool`.
     pub generation_tool: Option<String>,
 }
 
 /// The definitions of enumerations and units in one file (section 4.4).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Definitions {
-    /// `Enumerations`.
     pub enumerations: Vec<Enumeration>,
-    /// `Units`.
     pub units: Vec<Unit>,
 }
 
@@ -68,9 +64,7 @@ pub struct DefaultExperiment {
 pub struct System {
     /// Name, connectors and parameter bindings.
     pub base: ElementBase,
-    /// `Elements`.
     pub elements: Vec<Element>,
-    /// `Connections`.
     pub connections: Vec<Connection>,
     /// `SignalDictionaries`.
     pub dictionaries: Vec<DictionarySource>,
@@ -83,7 +77,6 @@ pub struct ElementBase {
     pub name: String,
     /// `id`. The source `#id` of a component refers to the first system with this `id`.
     pub id: Option<String>,
-    /// `Connectors`.
     pub connectors: Vec<Connector>,
     /// `ParameterBindings`; later bindings override earlier ones.
     pub bindings: Vec<ParameterBinding>,
@@ -140,36 +133,9 @@ pub struct Component {
     pub content: Content,
     /// `source`, a URI; empty if absent (SSP 2.0): the component then has connectors only.
     pub source: String,
-    /// `implementation`.
     pub implementation: Implementation,
     /// Step in s, `osp:StepSizeHint` in an annotation `com.opensimulationplatform`.
     pub step_size: Option<f64>,
-}
-
-/// `type` of a component: the media type of its source.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Content {
-    /// `application/x-fmu-sharedlibrary`.
-    #[default]
-    Fmu,
-    /// `application/x-ssp-definition`, an SSD file.
-    Definition,
-    /// `application/x-ssp-package`, an SSP archive.
-    Package,
-}
-
-/// `implementation` of a component.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Implementation {
-    /// `any`.
-    #[default]
-    Any,
-    /// `CoSimulation`.
-    CoSimulation,
-    /// `ModelExchange`.
-    ModelExchange,
-    /// `ScheduledExecution` (SSP 2.0), of FMI 3.0.
-    ScheduledExecution,
 }
 
 /// `SignalDictionaryReference` (section 5.5).
@@ -184,7 +150,6 @@ pub struct DictionaryReference {
 /// `SignalDictionary` of a system: its name and its content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DictionarySource {
-    /// `name`.
     pub name: String,
     /// The dictionary.
     pub content: Source<SignalDictionary>,
@@ -206,7 +171,6 @@ pub struct SignalDictionary {
 pub struct Connector {
     /// `name`; for a component, the name of the FMU's variable.
     pub name: String,
-    /// `kind`.
     pub kind: ConnectorKind,
     /// Type, if stated.
     pub kind_of_value: Option<Type>,
@@ -257,12 +221,7 @@ pub struct Conversion {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Transformation {
     /// `LinearTransformation`: `target = factor source + offset`.
-    Linear {
-        /// `factor`.
-        factor: f64,
-        /// `offset`.
-        offset: f64,
-    },
+    Linear { factor: f64, offset: f64 },
     /// `BooleanMappingTransformation`: source and target of each entry.
     Boolean(Vec<(bool, bool)>),
     /// `IntegerMappingTransformation`: source and target of each entry.
@@ -302,9 +261,7 @@ pub enum Source<T> {
 /// `ParameterSet`, the root element of an SSV file (section 6).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
-    /// `name`.
     pub name: String,
-    /// `Parameters`.
     pub parameters: Vec<Parameter>,
     /// `Enumerations` and `Units`.
     pub definitions: Definitions,

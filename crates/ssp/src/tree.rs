@@ -10,7 +10,7 @@ use fmu_description::{ModelDescription, Position, ScalarVariable, Version};
 use super::conversion::Measure;
 use super::source::Base;
 use super::structure::{
-    Connection, Connector, Definitions, Implementation, ParameterMapping, ParameterSet,
+    Connection, Connector, Definitions, Implementation, ParameterMapping, ParameterSet, Place,
     SystemStructure,
 };
 
@@ -31,7 +31,7 @@ pub(super) struct Tree {
 }
 
 /// A system, a component, a signal dictionary, or a reference to one.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Node {
     /// Hierarchical name without the root system, joined by dots; empty for the root.
     pub(super) path: String,
@@ -44,7 +44,7 @@ pub(super) struct Node {
     /// The file that declares the connectors and connections.
     pub(super) file: Rc<File>,
     /// Position of the element in that file.
-    pub(super) at: Position,
+    pub(super) at: Place,
     pub(super) connectors: Vec<Connector>,
     /// Positions of the connectors by name.
     pub(super) connector_positions: HashMap<String, usize>,
@@ -60,8 +60,9 @@ pub(super) struct Node {
 }
 
 /// The kind of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Content {
+    #[default]
     System,
     /// An index into [`Tree::fmus`].
     Fmu(usize),
@@ -72,7 +73,7 @@ pub(super) enum Content {
 }
 
 /// A file: the data that other files need.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct File {
     /// Name of the file for messages.
     pub(super) shown: PathBuf,

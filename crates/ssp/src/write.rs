@@ -234,8 +234,7 @@ impl Exporter {
         })
     }
 
-    /// Returns the name and definition of the unit of a variable, if it has one; an error if the variable does not
-    /// exist.
+    /// Returns name and definition of the unit of a variable, if it has one; an error if there is no such variable.
     fn unit(&self, terminal: &Terminal) -> Result<Option<(String, Option<BaseUnit>)>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {

@@ -32,8 +32,10 @@ pub(super) struct Node {
     pub(super) name: String,
     /// Whether the element belongs to an SSP namespace.
     is_ssp: bool,
+    /// The text, without white space around it.
+    pub(super) content: String,
     attributes: Vec<(String, String)>,
-    children: Vec<Node>,
+    pub(super) children: Vec<Node>,
     pub(super) at: Position,
 }
 
@@ -54,10 +56,9 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     let mut scope = Scope::default();
     scope.open(&element);
     let namespace = scope.space(&element).unwrap_or_default().to_owned();
-    let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
     let is_root =
         namespace == required || (namespace.is_empty() && scope.has_assumed_prefix(&element));
-    if !is_root || local != root {
+    if !is_root || local(&element.name) != root {
         return Err(SspError::Content {
             at: element.at,
             actual: format!("namespace {namespace:?}"),
@@ -129,18 +130,38 @@ impl Scope {
         if !is_known && !self.undeclared.iter().any(|(known, _)| known == prefix) {
             self.undeclared.push((prefix.to_owned(), element.at));
         }
-        let children = element.children.into_iter().map(|child| self.node(child));
+        let xml::Element { name, text: content, attributes, children, at } = element;
+        let children = children.into_iter().map(|child| self.node(child));
         let children = children.collect::<Result<Vec<Node>, SspError>>()?;
         self.close();
-        let name = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-        let node = Node { name, is_ssp, attributes: element.attributes, children, at: element.at };
+        let name = local(&name).to_owned();
+        let node = Node { name, is_ssp, content, attributes, children, at };
         node.characters()?;
         Ok(node)
     }
 }
 
+/// Parses a finite number.
+pub(super) fn finite(text: &str) -> Option<f64> {
+    f64::from_str(text).ok().filter(|value| value.is_finite())
+}
+
+/// Returns a name without its prefix.
+fn local(name: &str) -> &str {
+    name.rsplit(':').next().unwrap_or_default()
+}
+
 fn prefix(element: &xml::Element) -> &str {
     element.name.split_once(':').map_or("", |(prefix, _)| prefix)
+}
+
+/// An element of a file whose namespaces do not matter.
+impl From<xml::Element> for Node {
+    fn from(element: xml::Element) -> Self {
+        let xml::Element { name, text: content, attributes, children, at } = element;
+        let children = children.into_iter().map(Node::from).collect();
+        Node { name: local(&name).to_owned(), is_ssp: false, content, attributes, children, at }
+    }
 }
 
 impl Node {
@@ -200,7 +221,7 @@ impl Node {
 
     /// Parses the attribute `name`, without the white space around it, with `read`, which returns `None` for
     /// invalid text. Returns `None` if the attribute is absent.
-    fn parsed<T>(
+    pub(super) fn parsed<T>(
         &self,
         name: &str,
         expected: &str,
@@ -228,7 +249,6 @@ impl Node {
 
     /// Reads a finite `xs:double`; `None` if the attribute is absent.
     pub(super) fn number(&self, name: &str) -> Result<Option<f64>, SspError> {
-        let finite = |text: &str| f64::from_str(text).ok().filter(|value| value.is_finite());
         self.parsed(name, "a finite number", finite)
     }
 
@@ -262,9 +282,14 @@ impl Node {
         self.children.iter().filter(|child| child.is_ssp)
     }
 
+    /// Returns the children called `name` in any namespace.
+    pub(super) fn any_children(&self, name: &str) -> impl Iterator<Item = &Node> {
+        self.children.iter().filter(move |child| child.name == name)
+    }
+
     /// Returns the first child called `name` in any namespace, for annotations.
     pub(super) fn any_child(&self, name: &str) -> Option<&Node> {
-        self.children.iter().find(|child| child.name == name)
+        self.any_children(name).next()
     }
 
     pub(super) fn children_named(&self, name: &str) -> impl Iterator<Item = &Node> {

@@ -56,8 +56,7 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Returns the SSD at a path given by the user: an SSD file, or in a folder or SSP the SSD `fragment`, by default
-    /// `SystemStructure.ssd`.
+    /// Returns the SSD at the user's path: the file, or in a folder or SSP `fragment`, else `SystemStructure.ssd`.
     pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
         if target.path.is_dir() {

@@ -1,13 +1,11 @@
 //! Parses `OspSystemStructure.xml`. Nothing here opens a file.
 
-use std::str::FromStr;
-
-use fmu_description::Position;
-use fmu_description::xml::{self, Element};
+use fmu_description::{Position, xml};
 
 use crate::assembly::Setting;
 use crate::error::SspError;
 use crate::function::Function as Sum;
+use crate::xml::{Node, finite};
 
 /// Default base step in s.
 const STEP: f64 = 0.1;
@@ -28,7 +26,6 @@ pub(super) struct Document {
     pub(super) connections: Vec<Connection>,
 }
 
-/// `Simulator`.
 #[derive(Debug)]
 pub(super) struct Simulator {
     pub(super) name: String,
@@ -82,185 +79,141 @@ impl std::fmt::Display for End {
 
 /// Parses the file; also returns warnings with positions about unknown content.
 pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
-    let root = xml::read(bytes)?;
-    if local(&root) != "OspSystemStructure" {
-        let actual = format!("<{}>", root.name);
-        return Err(wrong(&root, "the root element OspSystemStructure", actual));
+    let element = xml::read(bytes)?;
+    let actual = format!("<{}>", element.name);
+    // libcosim uses one namespace.
+    let root = Node::from(element);
+    if root.name != "OspSystemStructure" {
+        return Err(root.wrong("the root element OspSystemStructure", actual));
     }
     for name in ONCE {
-        if let Some(second) = root.children.iter().filter(|child| local(child) == name).nth(1) {
-            return Err(wrong(second, format!("one element {name}"), "another one"));
+        if let Some(second) = root.any_children(name).nth(1) {
+            return Err(second.wrong(format!("one element {name}"), "another one"));
         }
     }
     let mut warnings = Vec::new();
     let mut document = Document { step: STEP, ..Document::default() };
     for child in &root.children {
-        match local(child) {
+        let children = child.children.iter();
+        match child.name.as_str() {
             "StartTime" => document.start = Some(time(child)?),
             "EndTime" => document.stop = Some(time(child)?),
             "BaseStepSize" => document.step = time(child)?,
             "Algorithm" => algorithm(child, &mut warnings)?,
-            "Simulators" => document.simulators = all(child, "Simulator", simulator)?,
-            "Functions" => {
-                document.functions =
-                    child.children.iter().map(function).collect::<Result<_, _>>()?;
+            "Simulators" => {
+                document.simulators = children.map(simulator).collect::<Result<_, _>>()?;
             }
+            "Functions" => document.functions = children.map(function).collect::<Result<_, _>>()?,
             "Connections" => {
-                let connections = child.children.iter().map(connection);
-                document.connections = connections.collect::<Result<_, _>>()?;
+                document.connections = children.map(connection).collect::<Result<_, _>>()?;
             }
             "EccoConfiguration" | "Description" => {}
             other => warnings.push(format!("{}: <{other}> is skipped", child.at)),
         }
     }
     if document.step <= 0.0 {
-        return Err(wrong(&root, "a BaseStepSize above 0", document.step.to_string()));
+        return Err(root.wrong("a BaseStepSize above 0", document.step.to_string()));
     }
     Ok((document, warnings))
 }
 
-fn algorithm(element: &Element, warnings: &mut Vec<String>) -> Result<(), SspError> {
-    match element.text.to_ascii_lowercase().as_str() {
+fn algorithm(node: &Node, warnings: &mut Vec<String>) -> Result<(), SspError> {
+    match node.content.to_ascii_lowercase().as_str() {
         "" | "fixedstep" => Ok(()),
         "ecco" => {
             let sentence = "the algorithm ecco is not available: all steps are BaseStepSize; \
                             --step-control energy is similar";
-            warnings.push(format!("{}: {sentence}", element.at));
+            warnings.push(format!("{}: {sentence}", node.at));
             Ok(())
         }
-        _ => Err(wrong(element, "the algorithm fixedStep or ecco", format!("{:?}", element.text))),
+        _ => Err(node.wrong("the algorithm fixedStep or ecco", format!("{:?}", node.content))),
     }
 }
 
-fn simulator(element: &Element) -> Result<Simulator, SspError> {
-    let values = element.children.iter().filter(|child| local(child) == "InitialValues");
-    let values = values.flat_map(|values| &values.children).map(|value| {
+fn simulator(node: &Node) -> Result<Simulator, SspError> {
+    if node.name != "Simulator" {
+        return Err(node.wrong("an element Simulator", &node.name));
+    }
+    let values = node.any_children("InitialValues").flat_map(|values| &values.children);
+    let settings = values.map(|value| {
         let stated = value.children.first();
         let stated =
-            stated.ok_or_else(|| wrong(value, "Real, Integer, Boolean or String", "none"))?;
+            stated.ok_or_else(|| value.wrong("Real, Integer, Boolean or String", "none"))?;
         Ok(Setting {
-            variable: required(value, "variable")?.to_owned(),
-            value: required(stated, "value")?.to_owned(),
+            variable: value.required("variable")?.to_owned(),
+            value: stated.required("value")?.to_owned(),
         })
     });
     Ok(Simulator {
-        name: required(element, "name")?.to_owned(),
-        source: required(element, "source")?.to_owned(),
-        step_size: number(element, "stepSize")?,
-        settings: values.collect::<Result<_, SspError>>()?,
-        at: element.at,
+        name: node.required("name")?.to_owned(),
+        source: node.required("source")?.to_owned(),
+        step_size: node.number("stepSize")?,
+        settings: settings.collect::<Result<_, SspError>>()?,
+        at: node.at,
     })
 }
 
-fn function(element: &Element) -> Result<Function, SspError> {
-    let kind = match local(element) {
+fn function(node: &Node) -> Result<Function, SspError> {
+    let kind = match node.name.as_str() {
         "LinearTransformation" => Kind::Linear {
-            factor: number(element, "factor")?.unwrap_or(1.0),
-            offset: number(element, "offset")?.unwrap_or(0.0),
+            factor: node.number("factor")?.unwrap_or(1.0),
+            offset: node.number("offset")?.unwrap_or(0.0),
         },
-        "Sum" => Kind::Sum(Sum::Sum { inputs: count(element, "inputCount")? }),
+        "Sum" => Kind::Sum(Sum::Sum { inputs: count(node, "inputCount")? }),
         "VectorSum" => {
-            let (inputs, dimension) = (count(element, "inputCount")?, count(element, "dimension")?);
+            let (inputs, dimension) = (count(node, "inputCount")?, count(node, "dimension")?);
             if inputs.saturating_mul(dimension) > COUNT {
                 let actual = format!("{inputs} x {dimension}");
-                return Err(wrong(element, format!("at most {COUNT} inputs"), actual));
+                return Err(node.wrong(format!("at most {COUNT} inputs"), actual));
             }
             Kind::Sum(Sum::VectorSum { inputs, dimension })
         }
         other => {
             let expected = "LinearTransformation, Sum or VectorSum";
-            return Err(wrong(element, expected, format!("the function {other}")));
+            return Err(node.wrong(expected, format!("the function {other}")));
         }
     };
-    Ok(Function { name: required(element, "name")?.to_owned(), kind, at: element.at })
+    Ok(Function { name: node.required("name")?.to_owned(), kind, at: node.at })
 }
 
-fn connection(element: &Element) -> Result<Connection, SspError> {
-    let groups = match local(element) {
+fn connection(node: &Node) -> Result<Connection, SspError> {
+    let groups = match node.name.as_str() {
         "VariableConnection" | "SignalConnection" => false,
         "VariableGroupConnection" | "SignalGroupConnection" => true,
         other => {
             let expected = "VariableConnection, SignalConnection, VariableGroupConnection or \
                  SignalGroupConnection";
-            return Err(wrong(element, expected, other));
+            return Err(node.wrong(expected, other));
         }
     };
-    let ends = element.children.iter().map(end).collect::<Result<Vec<_>, SspError>>()?;
+    let ends = node.children.iter().map(end).collect::<Result<Vec<_>, SspError>>()?;
     let count = ends.len();
     let ends = <[End; 2]>::try_from(ends)
-        .map_err(|_| wrong(element, "two ends", format!("{count} elements")))?;
+        .map_err(|_| node.wrong("two ends", format!("{count} elements")))?;
     if ends.iter().all(|end| end.is_signal) {
-        return Err(wrong(element, "a variable at one end", "a signal at both"));
+        return Err(node.wrong("a variable at one end", "a signal at both"));
     }
-    Ok(Connection { ends, groups, at: element.at })
+    Ok(Connection { ends, groups, at: node.at })
 }
 
-fn end(element: &Element) -> Result<End, SspError> {
-    let is_signal = local(element).starts_with("Signal");
+fn end(node: &Node) -> Result<End, SspError> {
+    let is_signal = node.name.starts_with("Signal");
     let owner = if is_signal { "function" } else { "simulator" };
     Ok(End {
-        owner: required(element, owner)?.to_owned(),
-        name: required(element, "name")?.to_owned(),
+        owner: node.required(owner)?.to_owned(),
+        name: node.required("name")?.to_owned(),
         is_signal,
     })
 }
 
-/// Reads each child with `read`; a child that is not called `name` is an error.
-fn all<T>(
-    element: &Element,
-    name: &str,
-    read: impl Fn(&Element) -> Result<T, SspError>,
-) -> Result<Vec<T>, SspError> {
-    let members = element.children.iter().map(|child| match local(child) {
-        local_name if local_name == name => read(child),
-        local_name => Err(wrong(child, format!("an element {name}"), local_name)),
-    });
-    members.collect()
-}
-
-/// Returns the name without prefix, because libcosim uses one namespace.
-pub(super) fn local(element: &Element) -> &str {
-    element.name.rsplit(':').next().unwrap_or_default()
-}
-
-pub(super) fn attribute<'a>(element: &'a Element, name: &str) -> Option<&'a str> {
-    let attribute = element.attributes.iter().find(|(known, _)| known == name);
-    attribute.map(|(_, value)| value.as_str())
-}
-
-fn required<'a>(element: &'a Element, name: &str) -> Result<&'a str, SspError> {
-    let value = attribute(element, name);
-    value.ok_or_else(|| wrong(element, format!("the attribute {name}"), "none"))
-}
-
-fn finite(text: &str) -> Option<f64> {
-    f64::from_str(text.trim()).ok().filter(|value| value.is_finite())
-}
-
-fn number(element: &Element, name: &str) -> Result<Option<f64>, SspError> {
-    let Some(text) = attribute(element, name) else { return Ok(None) };
-    let expected = || format!("a finite number in the attribute {name}");
-    finite(text).map(Some).ok_or_else(|| wrong(element, expected(), format!("{text:?}")))
-}
-
-fn count(element: &Element, name: &str) -> Result<usize, SspError> {
-    let text = required(element, name)?;
-    let count = text.trim().parse().ok().filter(|count| (1..=COUNT).contains(count));
-    let expected = || format!("a whole number from 1 to {COUNT} in the attribute {name}");
-    count.ok_or_else(|| wrong(element, expected(), format!("{text:?}")))
+fn count(node: &Node, name: &str) -> Result<usize, SspError> {
+    let expected = format!("a whole number from 1 to {COUNT}");
+    let count = |text: &str| text.parse().ok().filter(|count| (1..=COUNT).contains(count));
+    node.needed(name, |node, name| node.parsed(name, &expected, count))
 }
 
 /// Reads the text of an element as a time in s.
-fn time(element: &Element) -> Result<f64, SspError> {
-    let wrong = || wrong(element, "a finite number", format!("{:?}", element.text));
-    finite(&element.text).ok_or_else(wrong)
-}
-
-fn wrong(element: &Element, expected: impl Into<String>, actual: impl Into<String>) -> SspError {
-    SspError::Content {
-        at: element.at,
-        element: local(element).to_owned(),
-        expected: expected.into(),
-        actual: actual.into(),
-    }
+fn time(node: &Node) -> Result<f64, SspError> {
+    let wrong = || node.wrong("a finite number", format!("{:?}", node.content));
+    finite(&node.content).ok_or_else(wrong)
 }

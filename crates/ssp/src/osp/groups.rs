@@ -1,10 +1,10 @@
 //! Reads variable groups from `NAME_OspModelDescription.xml`, where NAME is the model name of the
 //! FMU.
 
-use fmu_description::xml::{self, Element};
+use fmu_description::xml;
 
-use super::document::{attribute, local};
 use crate::error::SspError;
+use crate::xml::Node;
 
 /// A named group of variables and nested groups.
 #[derive(Debug)]
@@ -16,20 +16,18 @@ pub(super) struct Group {
 
 /// Reads the groups of a model description.
 pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Group>, Vec<String>), SspError> {
-    let root = xml::read(bytes)?;
-    let lists = root.children.iter().filter(|child| local(child) == "VariableGroups");
+    let root = Node::from(xml::read(bytes)?);
+    let lists = root.any_children("VariableGroups");
     Ok((lists.flat_map(|list| &list.children).map(group).collect(), Vec::new()))
 }
 
 /// Reads a group; the name of the element (force, velocity, port, ...) does not matter.
-fn group(element: &Element) -> Group {
-    let (variables, groups): (Vec<&Element>, Vec<&Element>) =
-        element.children.iter().partition(|child| local(child) == "Variable");
-    let reference = |variable: &&Element| attribute(variable, "ref").map(str::to_owned);
+fn group(node: &Node) -> Group {
+    let groups = node.children.iter().filter(|child| child.name != "Variable");
     Group {
-        name: attribute(element, "name").unwrap_or_default().to_owned(),
-        variables: variables.iter().filter_map(reference).collect(),
-        groups: groups.into_iter().map(group).collect(),
+        name: node.text("name").unwrap_or_default(),
+        variables: node.any_children("Variable").filter_map(|child| child.text("ref")).collect(),
+        groups: groups.map(group).collect(),
     }
 }
 

@@ -59,8 +59,7 @@ impl Value {
     }
 
     /// Converts the value to the unit of `there`, then applies the transformation of a mapping; also returns warnings.
-    /// Returns an error sentence if the units measure different quantities or if the transformation is for
-    /// another type.
+    /// An error sentence if the units measure different quantities or the transformation is for another type.
     pub(super) fn convert(
         self,
         conversion: &Conversion,

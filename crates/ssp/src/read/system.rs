@@ -58,28 +58,22 @@ fn base(node: &Node) -> Result<ElementBase, SspError> {
 
 fn component(node: &Node) -> Result<Component, SspError> {
     let content = match node.attribute("type") {
-        None | Some("application/x-fmu-sharedlibrary") => Content::Fmu,
-        Some("application/x-ssp-definition") => Content::Definition,
-        Some("application/x-ssp-package") => Content::Package,
+        None => Some(Content::Fmu),
         // A component without a source has only connectors; its type does not matter.
-        Some(_) if node.attribute("source").is_none() => Content::Fmu,
-        Some(other) => {
-            let expected = "the type application/x-fmu-sharedlibrary, application/x-ssp-definition \
-                 or application/x-ssp-package";
-            return Err(node.wrong(expected, format!("{other:?}")));
+        Some(stated) => {
+            Content::named(stated).or(node.attribute("source").is_none().then_some(Content::Fmu))
         }
     };
-    let implementation = match node.attribute("implementation") {
-        None | Some("any") => Implementation::Any,
-        Some("CoSimulation") => Implementation::CoSimulation,
-        Some("ModelExchange") => Implementation::ModelExchange,
-        Some("ScheduledExecution") => Implementation::ScheduledExecution,
-        Some(other) => {
-            let expected =
-                "the implementation any, CoSimulation, ModelExchange or ScheduledExecution";
-            return Err(node.wrong(expected, format!("{other:?}")));
-        }
-    };
+    let content = content.ok_or_else(|| {
+        let expected = "the type application/x-fmu-sharedlibrary, application/x-ssp-definition \
+             or application/x-ssp-package";
+        node.wrong(expected, format!("{:?}", node.attribute("type").unwrap_or_default()))
+    })?;
+    let implementation = node.attribute("implementation").unwrap_or("any");
+    let implementation = Implementation::named(implementation).ok_or_else(|| {
+        let expected = "the implementation any, CoSimulation, ModelExchange or ScheduledExecution";
+        node.wrong(expected, format!("{implementation:?}"))
+    })?;
     let hint = annotation(node)?.and_then(|content| content.any_child("StepSizeHint"));
     let step_size = hint.map(|hint| hint.number("value")).transpose()?.flatten();
     Ok(Component {
@@ -106,8 +100,7 @@ fn dictionary_reference(node: &Node) -> Result<DictionaryReference, SspError> {
 
 fn connector(node: &Node) -> Result<Connector, SspError> {
     let stated = node.required("kind")?;
-    let kind = ConnectorKind::ALL.into_iter().find(|kind| kind.as_str() == stated);
-    let kind = kind.ok_or_else(|| {
+    let kind = ConnectorKind::named(stated).ok_or_else(|| {
         let names = ConnectorKind::ALL.map(ConnectorKind::as_str).join(", ");
         node.wrong(format!("one of the kinds {names}"), format!("{stated:?}"))
     })?;

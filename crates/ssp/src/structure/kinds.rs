@@ -1,57 +1,74 @@
-//! Kinds and types of connectors and values of parameters (SSP 1.0.1 and 2.0, sections 4.5.1, 5.2.1
-//! and 6).
+//! Kinds and types of connectors and components, and values of parameters (SSP 1.0.1 and 2.0, sections 4.5.1,
+//! 5.2.1, 5.4 and 6).
 
-/// `kind` of a connector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ConnectorKind {
-    /// `input`.
-    Input,
-    /// `output`.
-    Output,
-    /// `parameter`.
-    Parameter,
-    /// `calculatedParameter`.
-    CalculatedParameter,
-    /// `inout`, of references to signal dictionaries.
-    Inout,
-    /// `structuralParameter` (SSP 2.0), of FMI 3.0.
-    StructuralParameter,
-    /// `constant` (SSP 2.0).
-    Constant,
-    /// `local` (SSP 2.0).
-    Local,
-    /// `unspecified` (SSP 2.0): the variable of the FMU determines the kind, otherwise the connection.
-    Unspecified,
+/// Declares an enumeration with the texts of its values in the files.
+macro_rules! words {
+    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $(#[doc = concat!("`", $text, "`.")] $(#[$doc])* $variant,)* }
+
+        impl $name {
+            /// All values, in the order of the declaration.
+            pub const ALL: [$name; [$($text),*].len()] = [$($name::$variant),*];
+
+            /// Returns the attribute value of the standard.
+            #[must_use]
+            pub fn as_str(self) -> &'static str {
+                match self { $($name::$variant => $text,)* }
+            }
+
+            /// Returns the value with this text, if there is one.
+            pub(crate) fn named(text: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|value| value.as_str() == text)
+            }
+        }
+    };
 }
 
-impl ConnectorKind {
-    /// All kinds, in the order of the declaration.
-    pub const ALL: [ConnectorKind; 9] = [
-        ConnectorKind::Input,
-        ConnectorKind::Output,
-        ConnectorKind::Parameter,
-        ConnectorKind::CalculatedParameter,
-        ConnectorKind::Inout,
-        ConnectorKind::StructuralParameter,
-        ConnectorKind::Constant,
-        ConnectorKind::Local,
-        ConnectorKind::Unspecified,
-    ];
+words! {
+    /// `kind` of a connector.
+    ConnectorKind {
+        Input = "input",
+        Output = "output",
+        Parameter = "parameter",
+        CalculatedParameter = "calculatedParameter",
+        /// Of references to signal dictionaries.
+        Inout = "inout",
+        /// SSP 2.0, of FMI 3.0.
+        StructuralParameter = "structuralParameter",
+        /// SSP 2.0.
+        Constant = "constant",
+        /// SSP 2.0.
+        Local = "local",
+        /// SSP 2.0: the variable of the FMU determines the kind, otherwise the connection.
+        Unspecified = "unspecified",
+    }
+}
 
-    /// Returns the attribute value of the standard.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            ConnectorKind::Input => "input",
-            ConnectorKind::Output => "output",
-            ConnectorKind::Parameter => "parameter",
-            ConnectorKind::CalculatedParameter => "calculatedParameter",
-            ConnectorKind::Inout => "inout",
-            ConnectorKind::StructuralParameter => "structuralParameter",
-            ConnectorKind::Constant => "constant",
-            ConnectorKind::Local => "local",
-            ConnectorKind::Unspecified => "unspecified",
-        }
+words! {
+    /// `type` of a component: the media type of its source.
+    #[derive(Default)]
+    Content {
+        #[default]
+        Fmu = "application/x-fmu-sharedlibrary",
+        /// An SSD file.
+        Definition = "application/x-ssp-definition",
+        /// An SSP archive.
+        Package = "application/x-ssp-package",
+    }
+}
+
+words! {
+    /// `implementation` of a component.
+    #[derive(Default)]
+    Implementation {
+        #[default]
+        Any = "any",
+        CoSimulation = "CoSimulation",
+        ModelExchange = "ModelExchange",
+        /// SSP 2.0, of FMI 3.0.
+        ScheduledExecution = "ScheduledExecution",
     }
 }
 
@@ -127,7 +144,6 @@ pub enum ParameterValue {
     Binary(String),
     /// `Int8` to `UInt64` (SSP 2.0) with a value beyond `i32`, which FMI 2.0 does not have.
     Long(i128),
-    /// An array (SSP 2.0), which FMI 2.0 does not have: the name of the element that states the
-    /// type, and the values as text.
+    /// An array (SSP 2.0), which FMI 2.0 does not have: name of the element that states the type, and values as text.
     Array(String, Vec<String>),
 }
