@@ -57,8 +57,7 @@ impl Axis {
         Self { scale: Scale::Linear, low, high, pixels, ticks }
     }
 
-    /// Creates an axis over `ends` that is linear between minus and plus `knee`, which is above 0, and
-    /// logarithmic beyond.
+    /// Creates an axis over `ends`: linear between minus and plus `knee`, which is above 0, logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends.0, ends.1, pixels, ticks) }
@@ -101,8 +100,7 @@ impl Axis {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Returns the page coordinate of a value; a value far outside is clipped to one axis length
-    /// outside. NaN gives NaN.
+    /// Returns the page coordinate of a value; far outside, it is clipped to one axis length outside; NaN for NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.to_linear(end));
@@ -131,8 +129,7 @@ impl Axis {
         }
     }
 
-    /// Returns the number of decades between two ticks of an axis over `decades`, so that there are about as many ticks
-    /// as requested.
+    /// Returns the number of decades between two ticks of an axis over `decades`, for about as many ticks as requested.
     fn stride(&self, decades: f64) -> i32 {
         let most = f64::from(self.ticks);
         (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)

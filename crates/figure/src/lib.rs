@@ -64,13 +64,11 @@ pub struct Panel<'a> {
     pub y_label: &'a str,
     /// Range of the time axis; `None`: all finite times.
     pub x_range: Option<(f64, f64)>,
-    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, with a
-    /// remark beside the legend.
+    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, as a remark says.
     pub y_cap: Option<f64>,
     /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,
-    /// Times marked by a vertical dashed line, each with its text in the legend. Times outside of the axis are left
-    /// out.
+    /// Times marked by a vertical dashed line, each with its text in the legend. Times outside of the axis are skipped.
     pub marks: Vec<(f64, &'a str)>,
     /// Height of the frame in SVG units; default: 168.
     pub frame_height: Option<f64>,
@@ -95,20 +93,14 @@ pub struct Series<'a> {
 
 /// Line colours that colour-blind readers can distinguish (Okabe and Ito, 2008).
 #[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "the names of the colours")]
 pub enum Ink {
-    /// Blue.
     Blue,
-    /// Sky blue.
     Sky,
-    /// Vermilion.
     Vermilion,
-    /// Bluish green.
     Green,
-    /// Orange.
     Orange,
-    /// Reddish purple.
     Purple,
-    /// Black.
     Black,
 }
 
@@ -135,21 +127,14 @@ impl Series<'_> {
 /// The reason why a figure could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum FigureError {
     /// A curve has different numbers of times and values.
     #[error("curve {label:?}: {times} times, but {values} values")]
-    Lengths {
-        /// Name of the curve.
-        label: String,
-        /// Number of times.
-        times: usize,
-        /// Number of values.
-        values: usize,
-    },
+    Lengths { label: String, times: usize, values: usize },
     /// The file cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -160,8 +145,7 @@ pub enum FigureError {
 }
 
 impl Figure<'_> {
-    /// Writes `stem`.svg and `stem`.png, each atomically; creates the folder if it is missing.
-    /// Equal figures give equal bytes.
+    /// Writes `stem`.svg and `stem`.png, each atomically; creates their folder. Equal figures give equal bytes.
     ///
     /// # Errors
     ///

@@ -5,8 +5,7 @@ use std::{fs, io, process};
 
 use crate::distinct::is_stream;
 
-/// A written file under a temporary name. [`Pending::commit`] gives it its final name; dropping it without
-/// that removes the file.
+/// A written file under a temporary name. [`Pending::commit`] gives it its final name, dropping it removes it.
 pub struct Pending {
     partial: PathBuf,
     path: PathBuf,

@@ -27,6 +27,7 @@ impl fmt::Display for Position {
 /// The error of reading an XML file of FMI or SSP.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum ParseError {
     /// The text of the file cannot be decoded.
     #[error("expected XML in UTF-8, or in the encoding that it declares, found {actual}")]
@@ -42,49 +43,30 @@ pub enum ParseError {
     },
     /// The file is not well-formed XML.
     #[error("{at}: expected well-formed XML, found: {actual}")]
-    Xml {
-        /// The position.
-        at: Position,
-        /// The reason.
-        actual: String,
-    },
+    Xml { at: Position, actual: String },
     /// The file has a document type declaration, which FMI does not use and which could define
     /// entities.
     #[error("{at}: expected no document type declaration, found <!DOCTYPE")]
-    Doctype {
-        /// The position.
-        at: Position,
-    },
+    Doctype { at: Position },
     /// The file exceeds a limit: nesting, elements, attributes, variables or bytes of aliases.
     #[error("{at}: expected at most {limit} {what}, found more{help}")]
     Limit {
-        /// The position.
         at: Position,
-        /// The limited quantity.
         what: &'static str,
-        /// The limit.
         limit: usize,
         /// [`HELP`] if the limit can be lifted, otherwise empty.
         help: &'static str,
     },
     /// The file is of an unknown version of the standard.
     #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {actual:?}")]
-    Version {
-        /// The position.
-        at: Position,
-        /// The version in the file.
-        actual: String,
-    },
+    Version { at: Position, actual: String },
     /// An element is missing, or there is one too many.
     #[error("{at}: in <{element}>: expected {expected}, found {actual}")]
     Element {
         /// The position of the parent element.
         at: Position,
-        /// The parent element.
         element: String,
-        /// The expected content.
         expected: String,
-        /// The actual content.
         actual: String,
     },
     /// An attribute is missing or has an invalid value.
@@ -92,13 +74,9 @@ pub enum ParseError {
     Attribute {
         /// The position of the element.
         at: Position,
-        /// The element.
         element: String,
-        /// The attribute.
         attribute: &'static str,
-        /// The expected value.
         expected: String,
-        /// The actual value.
         actual: String,
     },
 }

@@ -22,36 +22,23 @@ pub const NO_FOLDER: &str = "\0(no fmuResourceLocation)";
 /// The error of a conversion between a path and a URI.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum LocationError {
     /// The path is relative.
     #[error("expected an absolute path, found {}", path.display())]
-    Relative {
-        /// The path.
-        path: PathBuf,
-    },
+    Relative { path: PathBuf },
     /// The path is not valid Unicode.
     #[error("expected a path in Unicode, found {}", path.display())]
-    NotUnicode {
-        /// The path.
-        path: PathBuf,
-    },
+    NotUnicode { path: PathBuf },
     /// The URI is not a valid `file:` URI.
     #[error(
         "expected a file URI with an absolute path, such as file:///tmp/fmu/resources, \
          found {uri:?}"
     )]
-    NotAFile {
-        /// The URI.
-        uri: String,
-    },
+    NotAFile { uri: String },
     /// The URI names another machine.
     #[error("expected a file on this machine, found host {host:?} in {uri:?}")]
-    Host {
-        /// The host.
-        host: String,
-        /// The URI.
-        uri: String,
-    },
+    Host { host: String, uri: String },
 }
 
 /// Converts an absolute path to a URI `file:///...` (RFC 8089, appendix B) without a trailing slash.
@@ -71,7 +58,7 @@ pub fn file_uri(path: &Path) -> Result<String, LocationError> {
     if !path.is_absolute() {
         return Err(LocationError::Relative { path: path.to_owned() });
     }
-    Ok(encode(&bytes_of(path)?, cfg!(windows)))
+    Ok(encode(bytes_of(path)?, cfg!(windows)))
 }
 
 /// Returns an absolute path as text with a separator at its end, as `resourcePath` of FMI 3.0 needs it. On
@@ -170,19 +157,12 @@ fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
     Ok(bytes)
 }
 
-#[cfg(unix)]
-#[expect(clippy::unnecessary_wraps, reason = "paths of other platforms may not be text")]
-fn bytes_of(path: &Path) -> Result<Cow<'_, [u8]>, LocationError> {
-    use std::os::unix::ffi::OsStrExt as _;
-    Ok(Cow::Borrowed(path.as_os_str().as_bytes()))
-}
-
-#[cfg(not(unix))]
-fn bytes_of(path: &Path) -> Result<Cow<'_, [u8]>, LocationError> {
-    match path.to_str() {
-        Some(text) => Ok(Cow::Borrowed(text.as_bytes())),
-        None => Err(LocationError::NotUnicode { path: path.to_owned() }),
+/// Returns the bytes of a path, on other systems than Unix only of one in Unicode.
+fn bytes_of(path: &Path) -> Result<&[u8], LocationError> {
+    if cfg!(not(unix)) && path.to_str().is_none() {
+        return Err(LocationError::NotUnicode { path: path.to_owned() });
     }
+    Ok(path.as_os_str().as_encoded_bytes())
 }
 
 #[cfg(unix)]

@@ -26,20 +26,14 @@ pub struct Unit {
 /// `BaseUnit`: exponents of the base units, and `base = factor * unit + offset`, without the offset for a
 /// [difference](crate::RealType::is_relative).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "exponents are named by their units")]
 pub struct BaseUnit {
-    /// Exponent of the kilogram.
     pub kg: i32,
-    /// Exponent of the metre.
     pub m: i32,
-    /// Exponent of the second.
     pub s: i32,
-    /// Exponent of the ampere.
     pub a: i32,
-    /// Exponent of the kelvin.
     pub k: i32,
-    /// Exponent of the mole.
     pub mol: i32,
-    /// Exponent of the candela.
     pub cd: i32,
     /// Exponent of the radian, which FMI counts as a base unit.
     pub rad: i32,
@@ -73,9 +67,8 @@ impl BaseUnit {
         [self.kg, self.m, self.s, self.a, self.k, self.mol, self.cd, self.rad]
     }
 
-    /// Returns factor and offset of the conversion from this unit to `other`,
-    /// `value_in_other = factor * value + offset`; `None` if the exponents differ. A
-    /// [difference](crate::RealType::is_relative) is converted by the factor alone.
+    /// Returns factor and offset of the conversion from this unit to `other`, `value_in_other = factor * value +
+    /// offset`; `None` if the exponents differ. A [difference](crate::RealType::is_relative) has no offset.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
         let factor = self.factor / other.factor;
@@ -102,6 +95,7 @@ pub struct DisplayUnit {
 /// The error of parsing a unit expression. Columns count characters from 1.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum UnitError {
     /// A name is not a known unit.
     #[error(
@@ -109,23 +103,18 @@ pub enum UnitError {
          degC or %, with or without an SI prefix, found {name:?}"
     )]
     UnknownName {
-        /// The whole expression.
         expression: String,
         /// Where the name starts.
         column: usize,
-        /// The name.
         name: String,
     },
     /// A character does not fit the syntax.
     #[error("unit {expression:?}, column {column}: expected {expected}, found {actual}")]
     Syntax {
-        /// The whole expression.
         expression: String,
         /// Column of the character.
         column: usize,
-        /// The allowed symbols.
         expected: &'static str,
-        /// The character found.
         actual: String,
     },
     /// A unit with an offset (such as degC) is part of a larger expression, where it has no meaning.
@@ -134,33 +123,25 @@ pub enum UnitError {
          expected a unit without one, such as K"
     )]
     Offset {
-        /// The whole expression.
         expression: String,
         /// Where the name starts.
         column: usize,
-        /// The name.
         name: String,
     },
     /// The conversion factor is not within 1e-300 and 1e300.
     #[error(
         "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {actual}"
     )]
-    Magnitude {
-        /// The whole expression.
-        expression: String,
-        /// The factor.
-        actual: String,
-    },
+    Magnitude { expression: String, actual: String },
 }
 
 impl Unit {
     /// Parses a unit expression and computes its conversion to SI base units.
     ///
-    /// `expression` is a product of units separated by `.`, `*` or a blank, each with an optional
-    /// integer exponent (`m2`, `m^2`, `s-1`), and any number of divisions by one unit (`m/s`) or by
-    /// a product in parentheses (`J/(kg.K)`). `""` and `"1"` are dimensionless. The name of the
-    /// result is the expression, unchanged. Metric units accept SI prefixes (`km`, `us`).
-    /// `Hz` is a revolution per second, 2 pi rad/s, as in the table of section 2.2.2.
+    /// `expression` is a product of units separated by `.`, `*` or a blank, each with an optional integer exponent
+    /// (`m2`, `m^2`, `s-1`), and any number of divisions by one unit (`m/s`) or by a product in parentheses
+    /// (`J/(kg.K)`). `""` and `"1"` are dimensionless. The name of the result is the expression, unchanged. Metric
+    /// units accept SI prefixes (`km`, `us`). `Hz` is 2 pi rad/s, as in the table of section 2.2.2.
     ///
     /// `rad` gets the display unit `deg`, `rad/s` gets `deg/s`. Powers of ten are collected and applied
     /// once, so that the factor has few rounding errors.

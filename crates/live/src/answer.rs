@@ -15,7 +15,6 @@ const REST: usize = 256 << 10;
 /// Time for reading these bytes.
 const REST_TIME: Duration = Duration::from_millis(500);
 
-/// An answer.
 pub(crate) struct Answer {
     pub(crate) status: u16,
     pub(crate) kind: &'static str,

@@ -43,8 +43,7 @@ struct Head {
     body_size: usize,
 }
 
-/// Reads a request until `deadline`. Refuses a request that is late, too large or not HTTP/1.1, and a body that is not
-/// UTF-8.
+/// Reads a request until `deadline`. Refuses one that is late, too large or not HTTP/1.1, and a body that is not UTF-8.
 pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequest, Refusal> {
     let mut bytes = Vec::new();
     let Head { mut request, size, body_size } = loop {
@@ -62,8 +61,7 @@ pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequ
     Ok(request)
 }
 
-/// Appends the bytes that arrive next, if any. Returns a refusal after `deadline`, `None` if the client has closed the
-/// connection.
+/// Appends the bytes that arrive next, if any; a refusal after `deadline`, `None` if the connection is closed.
 fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
     let late = Some((408, "the request took too long"));
     let left = deadline.saturating_duration_since(Instant::now());

@@ -1,5 +1,4 @@
-//! The threads of the server: one accepts connections, one calls the run for samples, and one for each
-//! connection answers its request.
+//! The threads of the server: one accepts connections, one calls for samples, one per connection answers it.
 
 use std::io;
 use std::net::{TcpListener, TcpStream};

@@ -99,8 +99,7 @@ impl View {
         self.shared.call_for_request();
     }
 
-    /// Returns the next request, if there is one; waits for it up to the time `wait`, or not at all if `wait`
-    /// is `None`.
+    /// Returns the next request, if there is one; waits for it up to the time `wait`, if this is stated.
     #[must_use]
     pub fn request(&self, wait: Option<Duration>) -> Option<Request> {
         match wait {
@@ -143,8 +142,7 @@ impl View {
         self.messages.clone()
     }
 
-    /// Publishes the end of the run and closes the server. If a page is open, waits up to the time `patience`
-    /// until it has received the end.
+    /// Publishes the end of the run and closes the server. An open page may receive the end for the time `patience`.
     pub fn end(self, outcome: &str, patience: Duration) {
         let outcome = outcome.to_owned();
         // Empties the queue: the server may sleep until the next sample is due.

@@ -47,8 +47,7 @@ impl Columns {
     }
 }
 
-/// Returns the value that all rows have, NaN without rows; `None` if rows differ, or for infinity, which JSON cannot
-/// express.
+/// Returns the value of all rows, NaN without rows; `None` if rows differ, and for infinity, which JSON cannot express.
 fn constant(values: &[f64]) -> Option<f64> {
     let first = values.first().copied().unwrap_or(f64::NAN);
     let same = values

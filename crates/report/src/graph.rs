@@ -92,8 +92,7 @@ fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
     }
 }
 
-/// Returns the name of a single connection whose output and input have the same name, otherwise the number of
-/// connections.
+/// Returns the name that output and input of a single connection have, otherwise the number of connections.
 fn label_of(connections: &[&Connection]) -> String {
     match connections {
         [only] if only.output == only.input => short(&only.output),

@@ -161,6 +161,7 @@ pub struct Page {
 /// An error of a report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
     /// A results file cannot be read.
     #[error(transparent)]
@@ -170,14 +171,10 @@ pub enum Error {
         "{file}: no variable to show, expected at least one with numbers beside the time; CSV has commas, semicolons \
          or tabs between its values"
     )]
-    Empty {
-        /// The file.
-        file: String,
-    },
+    Empty { file: String },
     /// A file has no row in the range of time.
     #[error("{file}: no row {}", interval((*from, *to)))]
     NoRows {
-        /// The file.
         file: String,
         /// The start of the range, negative infinity for that of the file.
         from: f64,
@@ -186,19 +183,13 @@ pub enum Error {
     },
     /// A bus trace cannot be read.
     #[error("{file}: {source}")]
-    Trace {
-        /// The file.
-        file: String,
-        /// The reason.
-        source: std::io::Error,
-    },
+    Trace { file: String, source: std::io::Error },
     /// A line of a bus trace is no frame.
     #[error(
         "{file}: line {line}: expected a frame as candump writes it, such as \
          `(0.001200) can0 101#0080`, found `{actual}`; `--bus-trace NAME.log` writes such a trace"
     )]
     Frame {
-        /// The file.
         file: String,
         /// The number of the line.
         line: usize,
@@ -207,12 +198,7 @@ pub enum Error {
     },
     /// The two files have no variable with numbers in common.
     #[error("{file} and {other} have no variable in common")]
-    Apart {
-        /// The first file.
-        file: String,
-        /// The second file.
-        other: String,
-    },
+    Apart { file: String, other: String },
 }
 
 /// Returns the text by which a later report recognises a report of a results file with the name of `results`, in any
@@ -227,8 +213,7 @@ pub fn identity(results: &Path) -> String {
 ///
 /// At most [`VARIABLES`] variables are shown; the page says how many are left out. It has all rows, unless these are
 /// more than two million values; then each plot says how many of the rows it has. Files are read row by row, the first
-/// one once for the statistics and once for the plots, together with the second one: the memory does not depend on
-/// their length.
+/// one for the statistics and, together with the second one, for the plots: the memory does not depend on their length.
 ///
 /// # Errors
 ///

@@ -11,8 +11,7 @@ use crate::statistics::Statistics;
 
 /// Largest number of curves in a plot: the number of colours.
 const CURVES: usize = 7;
-/// Largest number of values in the plots of a page, without variables that do not change: 16 MB, and at most 21 MB in
-/// the file.
+/// Largest number of values in the plots of a page, without constant variables: 16 MB, at most 21 MB in the file.
 const VALUES: usize = 2_000_000;
 /// Least number of blocks of rows of a plot.
 const BLOCKS: usize = 300;

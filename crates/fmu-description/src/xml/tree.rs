@@ -36,8 +36,7 @@ pub(crate) struct Element<'a> {
 }
 
 impl Element<'_> {
-    /// Copies the element and its children. The depth of this recursion is limited, because the reader limits that of
-    /// elements.
+    /// Copies the element and its children. The reader limits the depth of elements, and so that of this recursion.
     pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
         super::Element {
@@ -177,8 +176,7 @@ pub(crate) fn read(text: &str) -> Result<Element<'_>, ParseError> {
     read_but(text, is_annotation)
 }
 
-/// Reads the root element of `text`, without elements for which `skipped` is true. An empty-element tag is never
-/// skipped.
+/// Reads the root element of `text`, without elements that are `skipped`. An empty-element tag is never skipped.
 pub(super) fn read_but(
     text: &str,
     skipped: impl Fn(&BytesStart<'_>) -> bool,
