@@ -1,6 +1,5 @@
 //! Checks the sender of a request: token, host and origin.
 
-use std::fmt::Write as _;
 use std::io;
 
 use crate::request::HttpRequest;
@@ -14,14 +13,9 @@ pub(crate) struct Token(String);
 impl Token {
     /// Creates a token from 192 random bits of the operating system.
     pub(crate) fn random() -> io::Result<Self> {
-        let mut bytes = [0; BYTES];
+        let mut bytes = [0_u8; BYTES];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
-        let mut text = String::with_capacity(2 * BYTES);
-        for byte in bytes {
-            // Writing to a String cannot fail.
-            let _ = write!(text, "{byte:02x}");
-        }
-        Ok(Self(text))
+        Ok(Self(bytes.map(|byte| format!("{byte:02x}")).concat()))
     }
 
     pub(crate) fn text(&self) -> &str {

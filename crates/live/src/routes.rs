@@ -89,8 +89,8 @@ impl Site {
         self.shared.call_for_sample();
         let dropped = self.shared.dropped.load(Ordering::Relaxed);
         // Read before the store takes the events, so that a page that sees the end has all of them.
-        let phase = self.shared.phase().name();
-        let state = self.shared.store().state(query, phase, dropped);
+        let phase = self.shared.phase();
+        let state = self.shared.store().state(query, &phase, dropped);
         Answer::json(200, &state)
     }
 

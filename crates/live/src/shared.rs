@@ -5,6 +5,8 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use serde::Serialize;
+
 use crate::store::{Event, Store};
 
 /// The flag by which the server calls the run for a sample.
@@ -13,7 +15,8 @@ const SAMPLE: u8 = 1;
 const REQUEST: u8 = 2;
 
 /// The state of the run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Phase {
     /// The run steps.
     Running = 0,
@@ -21,17 +24,6 @@ pub enum Phase {
     Paused = 1,
     /// The run has ended.
     Ended = 2,
-}
-
-impl Phase {
-    /// Returns the name on the page.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Phase::Running => "running",
-            Phase::Paused => "paused",
-            Phase::Ended => "ended",
-        }
-    }
 }
 
 /// The state that the run and the server share.

@@ -158,7 +158,7 @@ impl Store {
 
     /// Returns the state of the run with the rows and messages of `query`; values that are not finite, and those of
     /// signals that do not exist, are null.
-    pub(crate) fn state(&mut self, query: &Query, phase: &str, dropped: u64) -> Value {
+    pub(crate) fn state(&mut self, query: &Query, phase: &impl Serialize, dropped: u64) -> Value {
         self.outcome_shown |= self.outcome.is_some();
         let rows: Vec<&Row> =
             self.rows.iter().filter(|row| row.number > query.rows_after).collect();
@@ -221,7 +221,7 @@ mod tests {
         // A sample of a paused run repeats the time.
         store.add(sample(4.0));
         let query = Query { rows_after: 3, shown: vec![1, 0, 7], ..Query::default() };
-        let state = store.state(&query, "running", 0);
+        let state = store.state(&query, &"running", 0);
         assert_eq!(state["times"], json!([3.0, 4.0]));
         assert_eq!(state["values"], json!([[null, null], [3.0, 4.0], [null, null]]));
         assert_eq!(state["row"], 5);
@@ -234,13 +234,13 @@ mod tests {
             let fmu = if number % 3 == 0 { "plant" } else { "" }.to_owned();
             store.add(Event::Message { fmu, text: number.to_string() });
         }
-        let state = store.state(&Query { messages_after: 1499, ..Query::default() }, "running", 0);
+        let state = store.state(&Query { messages_after: 1499, ..Query::default() }, &"running", 0);
         assert_eq!(state["counts"], json!({ "": 1000, "plant": 500 }));
         assert_eq!(state["messages"], json!([{ "fmu": "", "text": "1499" }]));
-        let all = store.state(&Query::default(), "running", 0);
+        let all = store.state(&Query::default(), &"running", 0);
         assert_eq!(all["messages"].as_array().unwrap().len(), MESSAGES);
         let none =
-            store.state(&Query { messages_after: u64::MAX, ..Query::default() }, "running", 0);
+            store.state(&Query { messages_after: u64::MAX, ..Query::default() }, &"running", 0);
         assert_eq!(none["messages"], json!([]));
     }
 }
