@@ -83,20 +83,18 @@ fn paragraph(text: Option<&str>) -> String {
         .unwrap_or_default()
 }
 
-/// Renders a table, with a header row unless `header` is empty; nothing if `rows` is empty. Cells are HTML.
-fn table(header: &[&str], rows: &[Vec<String>]) -> String {
-    if rows.is_empty() {
-        return String::new();
+/// Renders a table, with a header row unless `header` is empty; nothing if there are no `rows`. Cells are HTML.
+fn table(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let row = |cells: Vec<String>| format!("<tr>{}</tr>\n", cells.concat());
+    let body: String = rows
+        .map(|cells| row(cells.iter().map(|cell| format!("<td>{cell}</td>")).collect()))
+        .collect();
+    if body.is_empty() {
+        return body;
     }
-    let cells = |row: &Vec<String>| {
-        let cells = row.iter().map(|cell| format!("<td>{cell}</td>"));
-        format!("<tr>{}</tr>\n", cells.collect::<Vec<_>>().concat())
-    };
     let names: Vec<String> = header.iter().map(|name| format!("<th>{name}</th>")).collect();
-    let head =
-        if names.is_empty() { String::new() } else { format!("<tr>{}</tr>\n", names.concat()) };
-    let body: Vec<String> = rows.iter().map(cells).collect();
-    format!("<table>\n{head}{}</table>\n", body.concat())
+    let head = if names.is_empty() { String::new() } else { row(names) };
+    format!("<table>\n{head}{body}</table>\n")
 }
 
 /// Renders the table of version, author, copyright, generation and GUID, without absent values.
@@ -110,11 +108,10 @@ fn facts(description: &ModelDescription) -> String {
         ("Made at", description.generation_date_and_time.as_deref()),
         (token, Some(description.guid.as_str()).filter(|guid| !guid.is_empty())),
     ];
-    let rows: Vec<Vec<String>> = facts
-        .iter()
-        .filter_map(|(name, value)| Some(vec![(*name).to_owned(), escaped((*value)?).into_owned()]))
-        .collect();
-    table(&[], &rows)
+    let row = |(name, value): (&str, Option<&str>)| {
+        Some(vec![name.to_owned(), escaped(value?).into_owned()])
+    };
+    table(&[], facts.into_iter().filter_map(row))
 }
 
 fn variables(description: &ModelDescription) -> String {
@@ -135,8 +132,7 @@ fn variables(description: &ModelDescription) -> String {
             escaped(variable.description.as_deref().unwrap_or_default()).into_owned(),
         ]
     };
-    let rows: Vec<Vec<String>> = description.variables.iter().map(row).collect();
-    table(&header, &rows)
+    table(&header, description.variables.iter().map(row))
 }
 
 fn code(text: &str) -> String {
@@ -219,28 +215,24 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
 }
 
 fn log_categories(description: &ModelDescription) -> String {
-    let rows: Vec<Vec<String>> = description
-        .log_categories
-        .iter()
-        .map(|category| {
-            let text = category.description.as_deref().unwrap_or_default();
-            vec![code(&category.name), escaped(text).into_owned()]
-        })
-        .collect();
-    table(&["Category", "Messages"], &rows)
+    let rows = description.log_categories.iter().map(|category| {
+        let text = category.description.as_deref().unwrap_or_default();
+        vec![code(&category.name), escaped(text).into_owned()]
+    });
+    table(&["Category", "Messages"], rows)
 }
 
 fn experiment(default_experiment: &DefaultExperiment) -> String {
-    let rows: Vec<Vec<String>> = [
+    let rows = [
         ("Start time in s", default_experiment.start_time),
         ("Stop time in s", default_experiment.stop_time),
         ("Relative tolerance", default_experiment.tolerance),
         ("Step size in s", default_experiment.step_size),
-    ]
-    .iter()
-    .filter_map(|(name, value)| Some(vec![(*name).to_owned(), code(&format!("{:?}", (*value)?))]))
-    .collect();
-    table(&[], &rows)
+    ];
+    let row = |(name, value): (&str, Option<f64>)| {
+        Some(vec![name.to_owned(), code(&format!("{:?}", value?))])
+    };
+    table(&[], rows.into_iter().filter_map(row))
 }
 
 /// Returns the text of a flag or a number.
@@ -255,7 +247,7 @@ fn shown(value: &impl ToString) -> String {
 /// Renders the attributes of an interface, pairs of name and value, as one table.
 fn interface(parts: &[&[(&str, String)]]) -> String {
     let row = |(name, value): &(&str, String)| vec![code(name), escaped(value).into_owned()];
-    table(&[], &parts.iter().copied().flatten().map(row).collect::<Vec<_>>())
+    table(&[], parts.iter().copied().flatten().map(row))
 }
 
 /// The attributes of a table of [`attributes`] with their values as text.

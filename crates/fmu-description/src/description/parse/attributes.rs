@@ -63,6 +63,12 @@ impl<'a> Node<'a> {
         self.warn_of(false, place, expected, format!("{actual:?}"), assumed);
     }
 
+    /// Warns that there is no such attribute.
+    pub(super) fn warn_missing(&self, attribute: &str, expected: &str, assumed: &str) {
+        let actual = "no such attribute".to_owned();
+        self.warn_of(true, self.place(attribute), expected, actual, assumed);
+    }
+
     /// Returns the name of an attribute in a warning.
     pub(super) fn place(&self, attribute: &str) -> String {
         format!("<{}>, attribute {attribute}", self.element.name)
@@ -108,9 +114,7 @@ impl<'a> Node<'a> {
     /// `default`.
     pub(super) fn text_or(&self, name: &str, default: String) -> String {
         self.text(name).unwrap_or_else(|| {
-            let actual = "no such attribute".to_owned();
-            let assumed = format!("read as {default:?}");
-            self.warn_of(true, self.place(name), "a value", actual, &assumed);
+            self.warn_missing(name, "a value", &format!("read as {default:?}"));
             default
         })
     }

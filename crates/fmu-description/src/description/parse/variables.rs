@@ -219,9 +219,8 @@ pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(Stri
     let (kind, version) = (element.element.name, element.warnings.version);
     let Some(name) = element.attribute(NAME) else {
         if kind == "Enumeration" {
-            let (expected, actual) = ("the name of an enumeration", "no such attribute".to_owned());
             let assumed = "read without names of its items";
-            element.warn_of(true, element.place(NAME), expected, actual, assumed);
+            element.warn_missing(NAME, "the name of an enumeration", assumed);
         }
         return None;
     };

@@ -10,7 +10,15 @@ mod fmi3;
 
 /// The problems of the sample after `change`; there must be exactly one, in `section`.
 fn only_problem(section: &str, change: impl FnOnce(&mut ModelDescription)) -> String {
-    let mut description = sample::complete();
+    only_problem_of(sample::complete(), section, change)
+}
+
+/// The problems of `description` after `change`; there must be exactly one, in `section`.
+fn only_problem_of(
+    mut description: ModelDescription,
+    section: &str,
+    change: impl FnOnce(&mut ModelDescription),
+) -> String {
     change(&mut description);
     let problems = description.problems();
     assert_eq!(problems.len(), 1, "{problems:?}");

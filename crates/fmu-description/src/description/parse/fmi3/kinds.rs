@@ -142,17 +142,15 @@ fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
 /// Returns the interval variability of a clock without a valid one: constant if it has an interval, otherwise
 /// triggered. Warns if the attribute is missing.
 fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariability {
+    const NAME: &str = "intervalVariability";
     let assumed = if interval.is_some() {
         IntervalVariability::Constant
     } else {
         IntervalVariability::Triggered
     };
-    if !element.has("intervalVariability") {
+    if !element.has(NAME) {
         let expected = format!("one of {}", IntervalVariability::WORDS.join(", "));
-        let actual = "no such attribute".to_owned();
-        let place = element.place("intervalVariability");
-        let assumed_as = format!("read as {}", assumed.as_str());
-        element.warn_of(true, place, &expected, actual, &assumed_as);
+        element.warn_missing(NAME, &expected, &format!("read as {}", assumed.as_str()));
     }
     assumed
 }

@@ -5,12 +5,7 @@ use crate::description::{BinaryType, Dimension, Elements, IntervalVariability};
 
 /// The problems of the sample after `change`; there must be exactly one, in `section`.
 fn only_problem(section: &str, change: impl FnOnce(&mut ModelDescription)) -> String {
-    let mut description = sample::complete_3();
-    change(&mut description);
-    let problems = description.problems();
-    assert_eq!(problems.len(), 1, "{problems:?}");
-    assert_eq!(problems[0].section, section, "{problems:?}");
-    problems[0].to_string()
+    only_problem_of(sample::complete_3(), section, change)
 }
 
 /// Expects one problem, in `section` and with `text`, if the attributes of `name` change.
