@@ -1,6 +1,8 @@
 //! Chooses the settings of the algorithm that the user has not stated, from the capabilities of the
 //! FMUs.
 
+use std::borrow::Borrow;
+
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::{
@@ -107,7 +109,8 @@ pub fn choose(
     });
     let extrapolation =
         request.extrapolation.unwrap_or_else(|| default_extrapolation(system, &mut reasons));
-    let discrete = ports(system, &request.discrete)?;
+    let discrete = request.discrete.iter().map(|name| system.port(name));
+    let discrete = discrete.collect::<Result<Vec<_>, _>>()?;
     explain_signals(system, &discrete, &mut reasons);
     let loose = matches!(control, StepControl::Increment | StepControl::Energy);
     let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
@@ -248,27 +251,22 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
         (SignalType::Clocked, true, "clocked, passed on at the ticks of their clock"),
         (SignalType::Clocked, false, "clocked, but one of the FMUs has no event mode and no ticks"),
     ] {
-        let names = system
-            .connections
-            .iter()
-            .filter(|connection| of_connection(connection) == chosen)
-            .filter(|connection| {
-                (has_events(connection.from) && has_events(connection.to)) == events
-            });
-        let names: Vec<String> = names
-            .map(|connection| {
-                format!("{} -> {}", system.name(connection.from), system.name(connection.to))
-            })
-            .collect();
+        let is_such = |connection: &&Connection| {
+            let both_have_events = has_events(connection.from) && has_events(connection.to);
+            of_connection(connection) == chosen && both_have_events == events
+        };
+        let names = system.connections.iter().filter(is_such).map(|connection| {
+            format!("{} -> {}", system.name(connection.from), system.name(connection.to))
+        });
+        let names: Vec<String> = names.collect();
         if !names.is_empty() {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
             reasons.push(format!("{what}: {}", shortened(&names)));
         }
     }
 }
 
 /// Joins the first names of a list for a message, with the number of the others.
-fn shortened(names: &[&str]) -> String {
+fn shortened<N: Borrow<str>>(names: &[N]) -> String {
     const SHOWN: usize = 8;
     let more = names.len().saturating_sub(SHOWN);
     let shown = names[..names.len().min(SHOWN)].join(", ");
@@ -284,10 +282,6 @@ fn multiples(system: &System, request: &AlgorithmRequest) -> Result<Vec<u32>, Sy
         multiples[system.slave(name)?] = *multiple;
     }
     Ok(multiples)
-}
-
-fn ports(system: &System, names: &[String]) -> Result<Vec<Port>, SystemError> {
-    names.iter().map(|name| system.port(name)).collect()
 }
 
 fn events(system: &System, request: &AlgorithmRequest) -> Result<Vec<EventSource>, SystemError> {

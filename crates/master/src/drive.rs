@@ -66,11 +66,8 @@ pub enum DriveKind {
 pub struct Drive {
     port: Port,
     reference: u32,
-    kind: DriveKind,
-    signal: Signal,
-    /// The variable keeps its start value before this time in s.
-    start: f64,
-    texts: Vec<String>,
+    pub(crate) kind: DriveKind,
+    source: DriveSource,
     faults: Option<FaultChain>,
     cursor: Cursor,
     /// The sample set last.
@@ -86,41 +83,15 @@ impl Drive {
     /// type `kind`.
     #[must_use]
     pub fn new(port: Port, reference: u32, kind: DriveKind, source: DriveSource) -> Self {
-        let DriveSource { signal, start, texts } = source;
-        let cursor = Cursor::default();
-        let faults = None;
+        let (cursor, faults) = (Cursor::default(), None);
         let (written, accepted, committed) = (None, None, None);
-        Self {
-            port,
-            reference,
-            kind,
-            signal,
-            start,
-            texts,
-            faults,
-            cursor,
-            written,
-            accepted,
-            committed,
-        }
+        Self { port, reference, kind, source, faults, cursor, written, accepted, committed }
     }
 
     /// Returns the port of the variable.
     #[must_use]
     pub fn port(&self) -> Port {
         self.port
-    }
-
-    /// Returns the value reference of the variable.
-    #[must_use]
-    pub fn reference(&self) -> u32 {
-        self.reference
-    }
-
-    /// Returns the type of the variable.
-    #[must_use]
-    pub fn kind(&self) -> DriveKind {
-        self.kind
     }
 
     /// Returns the value and the right-hand derivative at `time` in s; `None` before the start of
@@ -136,22 +107,20 @@ impl Drive {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position")]
     pub fn text(&self, value: f64) -> Option<&String> {
-        self.texts.get(value as usize)
+        self.source.texts.get(value as usize)
     }
 
     fn undisturbed(&mut self, time: f64) -> Option<Sample> {
-        reached(time, self.start).then(|| self.signal.at(time, &mut self.cursor))
+        let DriveSource { signal, start, .. } = &self.source;
+        reached(time, *start).then(|| signal.at(time, &mut self.cursor))
     }
 
     /// Returns the faults with the memory of those in `saved`; `None` if faults that had begun there differ.
     pub(crate) fn resumed_faults(&self, saved: &DriveState) -> Option<FaultChain> {
         let time = saved.committed.unwrap_or(f64::NEG_INFINITY);
         let mut faults = self.faults.clone().unwrap_or_default();
-        let is_same = match &saved.faults {
-            Some(saved) => faults.resume(saved, time),
-            None => faults.resume(&FaultChain::default(), time),
-        };
-        is_same.then_some(faults)
+        let saved = saved.faults.clone().unwrap_or_default();
+        faults.resume(&saved, time).then_some(faults)
     }
 
     /// Puts faults between the signal and the variable.
@@ -191,18 +160,20 @@ impl Drive {
     }
 
     fn next_break(&self, after: f64) -> Option<f64> {
-        let start = earliest(after, [self.start].into_iter().filter(|start| start.is_finite()));
-        let signal = self.signal.next_break(after);
+        let DriveSource { signal, start, .. } = &self.source;
+        let start = earliest(after, Some(*start).filter(|start| start.is_finite()));
+        let signal = signal.next_break(after);
         let faults = self.faults.as_ref().and_then(|faults| faults.next_break(after));
         [start, signal, faults].into_iter().flatten().reduce(f64::min)
     }
 }
 
 /// The signal that a variable follows, and the time at which it starts to follow it.
+#[derive(Clone, Debug)]
 pub struct DriveSource {
     /// The signal.
     pub signal: Signal,
-    /// Start time in s; minus infinity: the whole run.
+    /// Start time in s, before which the variable keeps its start value; minus infinity: the whole run.
     pub start: f64,
     /// The texts that the values of the signal index, if the variable is a String.
     pub texts: Vec<String>,
@@ -267,20 +238,6 @@ impl Drives {
     /// Iterates mutably over the drives, so that the caller can sample them.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Drive> {
         self.all.iter_mut()
-    }
-
-    /// Calls `show` with type, value and text of the drive at the index `number` at `time` in s, unless
-    /// the variable still has its start value.
-    pub(crate) fn show(
-        &mut self,
-        number: usize,
-        time: f64,
-        show: impl FnOnce(DriveKind, f64, Option<&String>),
-    ) {
-        let drive = &mut self.all[number];
-        if let Some(sample) = drive.sample(time) {
-            show(drive.kind, sample.value, drive.text(sample.value));
-        }
     }
 
     /// Whether there is no driven variable.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use crate::drive::{DriveKind, Drives, integer};
 use crate::error::{SystemError, call};
+use crate::signal::Sample;
 use crate::system::{Port, System};
 use slave::{CallError, Slave, Value, ValueType, to_hex};
 
@@ -117,10 +118,12 @@ impl Readout {
         }
     }
 
-    /// Writes the values of driven variables at `time`, in s.
+    /// Writes the values of driven variables at `time`, in s, except those that still have their start values.
     pub(crate) fn apply(&mut self, drives: &mut Drives, time: f64) {
         for &(number, position) in &self.driven {
-            drives.show(number, time, |kind, value, text| match kind {
+            let Some(drive) = drives.iter_mut().nth(number) else { continue };
+            let Some(Sample { value, .. }) = drive.sample(time) else { continue };
+            match drive.kind {
                 DriveKind::Real { .. } => self.reals[position] = value,
                 DriveKind::Integer { least, largest } => {
                     self.integers[position] = integer(value, least, largest);
@@ -129,11 +132,11 @@ impl Readout {
                     self.booleans[position] = i32::from(value != 0.0);
                 }
                 DriveKind::String => {
-                    if let Some(text) = text {
+                    if let Some(text) = drive.text(value) {
                         self.strings[position].clone_from(text);
                     }
                 }
-            });
+            }
         }
     }
 

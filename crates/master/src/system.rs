@@ -82,9 +82,7 @@ impl System {
             return Err(SystemError::SameName { name: name.to_owned() });
         }
         self.names.insert(name.to_owned(), self.slaves.len());
-        // A name that two variables have stands for the first one.
-        let variables = slave.description().variables.iter().enumerate().rev();
-        self.variables.push(variables.map(|(k, variable)| (variable.name.clone(), k)).collect());
+        self.variables.push(by_name(slave.description()));
         self.slaves.push((name.to_owned(), slave));
         self.events.push(false);
         Ok(())
@@ -311,6 +309,12 @@ impl System {
             expected,
         })
     }
+}
+
+/// Returns the positions of the variables by name. A name that two variables have stands for the first one.
+fn by_name(description: &ModelDescription) -> HashMap<String, usize> {
+    let variables = description.variables.iter().enumerate().rev();
+    variables.map(|(position, variable)| (variable.name.clone(), position)).collect()
 }
 
 /// Returns the error for a missing variable, with similar names.

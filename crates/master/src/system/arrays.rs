@@ -1,6 +1,6 @@
 //! Arrays: each element is a variable `name[1,2]`; connections and settings may name the whole array.
 
-use super::{Connection, Port, System};
+use super::{Connection, Port, System, by_name};
 use crate::error::SystemError;
 use fmu_description::Causality;
 use slave::{Transformation, Value, ValueType};
@@ -233,9 +233,7 @@ impl System {
             value: text.to_owned(),
             source,
         })?;
-        let variables = slave.description().variables.iter().enumerate().rev();
-        self.variables[port.slave] =
-            variables.map(|(k, variable)| (variable.name.clone(), k)).collect();
+        self.variables[port.slave] = by_name(slave.description());
         self.move_ports(port.slave, &before)
     }
 

@@ -81,11 +81,7 @@ impl System {
 
     /// Repeats settings in initialization mode, where the standard allows it (FMI 2.0.5, table 4.2.4), because some
     /// FMUs reset them when they enter it: inputs always, as some FMUs cannot read them, and other variables if they
-    /// have another value. `time` in s appears in the error message.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if an FMU cannot be used any more.
+    /// have another value. Returns an error, with `time` in s, if an FMU cannot be used any more.
     pub(crate) fn repeat_settings(&mut self, time: f64) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             let variable = self.variable(setting.port);
@@ -118,12 +114,8 @@ impl System {
     }
 
     /// Reads the settings back after the initialization, except inputs and the variables whose holders are in
-    /// `replaced`, which have received another value. `time` in s appears in the error message.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if a parameter has another value than the one set, or if an FMU cannot be
-    /// used any more.
+    /// `replaced`, which have received another value. Returns an error if a parameter has another value than the one
+    /// set or, with `time` in s, if an FMU cannot be used any more.
     pub(crate) fn confirm_settings(
         &mut self,
         replaced: &HashSet<Port>,
