@@ -55,7 +55,7 @@ pub(crate) struct Iterated {
     directional: bool,
     /// Whether a step whose iteration fails is made once without iteration.
     falls_back: bool,
-    fallbacks: Fallbacks,
+    pub(crate) fallbacks: Fallbacks,
 }
 
 /// Count of the steps whose iteration failed and that were made once without iteration.
@@ -68,10 +68,6 @@ pub struct Fallbacks {
 }
 
 impl Coupler {
-    pub(crate) fn new(engine: &Engine, algorithm: &Algorithm, scale: Scale) -> Self {
-        Self { iterated: Iterated::new(engine, algorithm, scale) }
-    }
-
     /// Makes one step from `time` over `size`.
     pub(crate) fn step(
         &mut self,
@@ -84,16 +80,11 @@ impl Coupler {
             Some(iterated) => iterated.step(engine, time, size),
         }
     }
-
-    /// Returns the count of steps whose iteration failed; `None` without iteration.
-    pub(crate) fn fallbacks(&self) -> Option<&Fallbacks> {
-        self.iterated.as_ref().map(|iterated| &iterated.fallbacks)
-    }
 }
 
 impl Iterated {
     /// Returns `None` for coupling without iteration.
-    fn new(engine: &Engine, algorithm: &Algorithm, scale: Scale) -> Option<Self> {
+    pub(crate) fn new(engine: &Engine, algorithm: &Algorithm, scale: Scale) -> Option<Self> {
         let (count, limit) = (engine.exchange.reals.outputs().len(), algorithm.iterations);
         let iteration = match algorithm.coupling {
             Coupling::Once => return None,

@@ -14,10 +14,10 @@ use crate::algorithm::Algorithm;
 use crate::drive::Drives;
 use crate::error::{SystemError, call};
 use crate::exchange::{Exchange, Values};
-use crate::grid::{Grid, is_rigid, size_between};
+use crate::grid::{Grid, is_rigid, multiples, size_between};
+use crate::order::Order;
 use crate::system::System;
 use groups::Groups;
-pub(crate) use groups::Schedule;
 pub(crate) use instants::{InstantEnd, Instants, Parts};
 use slave::{CallError, CommunicationStep, Failure, StepResult};
 use threads::{Threads, run};
@@ -131,10 +131,11 @@ impl Engine {
         drives: Drives,
         instants: Instants,
         grid: Grid,
-        schedule: Schedule,
+        order: &Order,
         algorithm: &Algorithm,
     ) -> Result<Self, SystemError> {
-        let Schedule { groups, multiples } = schedule;
+        let groups = Groups::new(&system, algorithm.method, order);
+        let multiples = multiples(&system, algorithm)?;
         let rigid = Rigid::of(&system, &multiples);
         let background = system.slaves.iter_mut().any(|(_, slave)| slave.in_background().is_some());
         let threads = Threads::new(algorithm.jobs, groups.len())?;
@@ -162,7 +163,7 @@ impl Engine {
     /// Call it after a change of the scenario.
     pub(crate) fn choose_sweep(&mut self) {
         self.passes = self.threads.is_none() && !self.background && self.exchange.passes();
-        let changes = !self.drives.is_empty() || self.exchange.is_faulty();
+        let changes = !self.drives.is_empty() || self.exchange.is_faulty;
         self.division = match &self.rigid {
             None if changes || self.instants.are_connected() => Division::AtChanges,
             Some(rigid) if changes && !rigid.reported => Division::Report,

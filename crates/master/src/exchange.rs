@@ -25,7 +25,7 @@ use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
-use crate::error::{SystemError, call, contradiction};
+use crate::error::{SystemError, contradiction};
 use crate::fault::FaultChain;
 use crate::limits::Watch;
 use crate::signal_type::Way;
@@ -48,7 +48,7 @@ pub(crate) struct Exchange {
     ticks: Ticks,
     allow_nan: bool,
     /// Whether any connection has a fault.
-    faulty: bool,
+    pub(crate) is_faulty: bool,
     watch: Watch,
 }
 
@@ -61,11 +61,9 @@ pub(crate) struct Values {
 }
 
 impl Values {
-    /// Whether both belong to systems with equal numbers of connected variables.
-    pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
-        self.reals.has_shape_of(&other.reals)
-            && self.held.has_shape_of(&other.held)
-            && self.at_events.has_shape_of(&other.at_events)
+    /// Returns the numbers of connected variables, by the way in which their values pass and by type.
+    pub(crate) fn lengths(&self) -> ([usize; 7], [[[usize; 3]; 5]; 2]) {
+        (self.reals.lengths(), [&self.held, &self.at_events].map(ChannelsState::lengths))
     }
 }
 
@@ -74,7 +72,8 @@ impl Exchange {
     /// it refuses; empty: none.
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
-        let to_reals: Vec<Port> = reals.integer_sources().iter().map(|(port, _)| *port).collect();
+        let to_reals: Vec<Port> =
+            reals.layout.from_integers.iter().map(|(port, _)| *port).collect();
         let by_way = |way| -> Vec<&Connection> {
             system
                 .connections
@@ -88,15 +87,12 @@ impl Exchange {
         let ticks = Ticks::new(system, &by_way(Way::Tick));
         let watch = Watch::new(system, |port| reals.output(port));
         let allow_nan = algorithm.allow_nan;
-        Self { reals, held, at_events, ticks, allow_nan, faulty: false, watch }
+        Self { reals, held, at_events, ticks, allow_nan, is_faulty: false, watch }
     }
 
-    /// Puts faults on connections; each fault is given with the input of its connection.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error, and changes no fault, if an input has no connection, if it is a String, a binary or a clock
-    /// that ticks in event mode, or if two chains are given with it.
+    /// Puts faults on connections; each fault is given with the input of its connection. Returns an error, and changes
+    /// no fault, if an input has no connection, if it is a String, a binary or a clock that ticks in event mode, or if
+    /// two chains are given with it.
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
@@ -121,19 +117,13 @@ impl Exchange {
                 || self.held.set_fault(*input, fault)
                 || self.at_events.set_fault(*input, fault);
         }
-        self.faulty = !faults.is_empty();
+        self.is_faulty = !faults.is_empty();
         Ok(())
-    }
-
-    /// Whether any connection has a fault.
-    pub(crate) fn is_faulty(&self) -> bool {
-        self.faulty
     }
 
     /// Returns the faults on the connection to an input.
     pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
-        let reals = self.reals.fault(input);
-        reals.or_else(|| self.held.fault(input)).or_else(|| self.at_events.fault(input))
+        self.faults().find(|(known, _)| *known == input).map(|(_, fault)| fault)
     }
 
     /// Records the undisturbed values in the faults, and checks the limits of inputs; the communication point `time` is
@@ -145,7 +135,7 @@ impl Exchange {
             let integer = |port| held.value(port).or_else(|| at_events.value(port)).copied();
             self.watch.check(time, self.reals.outputs(), integer);
         }
-        if self.faulty {
+        if self.is_faulty {
             self.reals.commit(time);
             let ahead = |slave| self.reals.is_ahead(slave, time);
             self.held.commit(time, &ahead);
@@ -156,19 +146,14 @@ impl Exchange {
     /// Returns the first time after `after`, both in s, at which a fault on a connection starts or
     /// ends.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
-        if !self.faulty {
+        if !self.is_faulty {
             return None;
         }
-        let breaks = [
-            self.reals.next_break(after),
-            self.held.next_break(after),
-            self.at_events.next_break(after),
-        ];
-        breaks.into_iter().flatten().reduce(f64::min)
+        self.faults().filter_map(|(_, fault)| fault.next_break(after)).reduce(f64::min)
     }
 
-    /// Iterates over all faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
+    /// Iterates over the faults, each with the input of its connection.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = (Port, &FaultChain)> {
         self.reals.faults().chain(self.held.faults()).chain(self.at_events.faults())
     }
 
@@ -185,7 +170,7 @@ impl Exchange {
     /// Computes the inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
-        if !self.held.is_empty() {
+        if !self.held.is_empty {
             let ahead = |source| {
                 self.reals.is_ahead(source, self.reals.source_time(slave, source, time, size))
             };
@@ -201,13 +186,12 @@ impl Exchange {
         position: usize,
         step: CommunicationStep,
     ) -> Result<StepResult, SystemError> {
-        let (name, slave) = &mut system.slaves[position];
-        let slave = slave.as_mut();
-        self.set_held(position, slave).map_err(|source| call(name, step.time, source))?;
-        let done = self.reals.advance(position, slave, step);
-        let done = done.map_err(|source| call(name, step.time, source))?;
-        self.read_discrete(position, slave).map_err(|source| call(name, step.time, source))?;
-        Ok(done)
+        system.perform(position, step.time, |slave| {
+            self.set_held(position, slave)?;
+            let done = slave.advance(&mut self.reals.request(position, step))?;
+            self.reals.trace.spans[position].stepped = true;
+            self.read_discrete(position, slave).map(|()| done)
+        })
     }
 
     /// Sets the inputs of a background slave and starts its step; does nothing for other slaves.
@@ -217,16 +201,15 @@ impl Exchange {
         position: usize,
         step: CommunicationStep,
     ) -> Result<(), SystemError> {
-        let (name, slave) = &mut system.slaves[position];
-        if slave.in_background().is_none() {
-            return Ok(());
-        }
-        let set = self.set_held(position, slave.as_mut());
-        set.and_then(|()| match slave.in_background() {
-            Some(slave) => slave.begin_advance(&self.reals.request(position, step)),
-            None => Ok(()),
+        system.perform(position, step.time, |slave| {
+            if slave.in_background().is_some() {
+                self.set_held(position, slave)?;
+            }
+            match slave.in_background() {
+                Some(slave) => slave.begin_advance(&self.reals.request(position, step)),
+                None => Ok(()),
+            }
         })
-        .map_err(|source| call(name, step.time, source))
     }
 
     /// Waits for the step of a background slave and reads its outputs; steps any other slave with
@@ -237,13 +220,14 @@ impl Exchange {
         position: usize,
         step: CommunicationStep,
     ) -> Result<StepResult, SystemError> {
-        let (name, slave) = &mut system.slaves[position];
-        if slave.in_background().is_none() {
+        if system.slaves[position].1.in_background().is_none() {
             return self.advance(system, position, step);
         }
-        let done = self.reals.finish(position, slave.as_mut(), step);
-        done.and_then(|done| self.read_discrete(position, slave.as_mut()).map(|()| done))
-            .map_err(|source| call(name, step.time, source))
+        system.perform(position, step.time, |slave| {
+            let done = slave::finish(slave, &mut self.reals.request(position, step))?;
+            self.reals.trace.spans[position].stepped = true;
+            self.read_discrete(position, slave).map(|()| done)
+        })
     }
 
     /// Steps several slaves at once; returns their results in the order of `slaves`, or the first error
@@ -257,49 +241,41 @@ impl Exchange {
         run: impl FnOnce(&mut [Task<'_>]),
     ) -> Result<Vec<StepResult>, SystemError> {
         for &position in slaves {
-            let (name, slave) = &mut system.slaves[position];
-            self.set_held(position, slave.as_mut())
-                .map_err(|source| call(name, step(position).time, source))?;
+            let time = step(position).time;
+            system.perform(position, time, |slave| self.set_held(position, slave))?;
         }
         let results = self.reals.advance_all(system, slaves, step, run);
-        let mut done = Vec::with_capacity(slaves.len());
-        for (&position, result) in slaves.iter().zip(results) {
-            let (name, slave) = &mut system.slaves[position];
-            let at = |source| call(name, step(position).time, source);
-            done.push(result.map_err(at)?);
-            self.read_discrete(position, slave.as_mut()).map_err(at)?;
-        }
-        Ok(done)
+        let read = |(&position, result): (&usize, Result<StepResult, CallError>)| {
+            system.perform(position, step(position).time, |slave| {
+                let done = result?;
+                self.read_discrete(position, slave).map(|()| done)
+            })
+        };
+        slaves.iter().zip(results).map(read).collect()
     }
 
     /// Whether [`Reals::pass`] can make a complete sweep.
     pub(crate) fn passes(&self) -> bool {
-        self.held.is_empty() && self.at_events.is_empty() && self.reals.passes()
+        self.held.is_empty && self.at_events.is_empty && self.reals.passes()
     }
 
     #[inline]
     fn set_held(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
-        if self.held.is_empty() { Ok(()) } else { self.held.set(position, slave) }
+        if self.held.is_empty { Ok(()) } else { self.held.set(position, slave) }
     }
 
     /// Reads the connected outputs of the slave at `position` that are not extrapolated.
     #[inline]
     fn read_discrete(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
-        if !self.held.is_empty() {
+        if !self.held.is_empty {
             self.held.read(position, slave)?;
-            self.copy_integers_to_reals();
-        }
-        if self.at_events.is_empty() { Ok(()) } else { self.at_events.read(position, slave) }
-    }
-
-    /// Copies Integer outputs that are connected to Real inputs.
-    fn copy_integers_to_reals(&mut self) {
-        for k in 0..self.reals.integer_sources().len() {
-            let (port, output) = self.reals.integer_sources()[k];
-            if let Some(&value) = self.held.integers.value(port) {
-                self.reals.outputs_mut()[output] = slave::to_real(value);
+            for &(port, output) in &self.reals.layout.from_integers {
+                if let Some(&value) = self.held.integers.value(port) {
+                    self.reals.trace.latest[output] = slave::to_real(value);
+                }
             }
         }
+        if self.at_events.is_empty { Ok(()) } else { self.at_events.read(position, slave) }
     }
 
     /// Reads all connected outputs, and their derivatives, of the slave at `position`.

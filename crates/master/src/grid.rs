@@ -16,8 +16,8 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     start: f64,
-    /// End of the run in s.
-    stop: Option<f64>,
+    /// End of the run in s: the stop time or, before it, the end given by [`EarlyEnd`].
+    pub(crate) stop: Option<f64>,
     step: f64,
     /// Number of grid points passed.
     pub(crate) count: u64,
@@ -150,11 +150,6 @@ impl Grid {
             Some(stop) if end > stop - ROUNDING * size => stop,
             _ => end,
         }
-    }
-
-    /// Returns the end of the run in s: the stop time or, before it, the end given by [`EarlyEnd`].
-    pub(crate) fn stop(&self) -> Option<f64> {
-        self.stop
     }
 
     /// Returns the end of a step of `size` s from the time reached, at most the stop time.

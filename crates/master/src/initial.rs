@@ -77,7 +77,7 @@ fn solve_connections(
             graph.solve(system, &nodes, start)?;
         } else {
             for node in nodes {
-                let value = graph.read(system, node, start)?;
+                let value = system.read(graph.outputs[node], start)?;
                 graph.write(system, node, &value, start)?;
             }
         }
@@ -123,8 +123,7 @@ impl<'a> Graph<'a> {
             connections[node].push(number);
             inputs[connection.to.slave].push((connection.to.variable, node));
         }
-        let rows: Vec<_> =
-            system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
+        let rows = Rows::of(system);
         let mut edges = Vec::new();
         for (node, output) in outputs.iter().enumerate() {
             let inputs = &inputs[output.slave];
@@ -141,10 +140,6 @@ impl<'a> Graph<'a> {
         let components = components(outputs.len(), &edges);
         let faults = faults.iter().map(|(input, fault)| (*input, fault)).collect();
         Self { faults, outputs, connections, components, allow_nan: false }
-    }
-
-    fn read(&self, system: &mut System, node: usize, time: f64) -> Result<Value, SystemError> {
-        system.read(self.outputs[node], time)
     }
 
     /// Sets all inputs and parameters that are connected to an output, after transformations and faults.
@@ -207,7 +202,7 @@ impl<'a> Graph<'a> {
         nodes: &[usize],
         time: f64,
     ) -> Result<Vec<Value>, SystemError> {
-        nodes.iter().map(|&node| self.read(system, node, time)).collect()
+        nodes.iter().map(|&node| system.read(self.outputs[node], time)).collect()
     }
 
     /// Evaluates `G(u)`: the outputs, with the values `u` at the connected inputs.

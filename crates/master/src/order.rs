@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use fmu_description::{ModelDescription, Unknown};
+use fmu_description::Unknown;
 
 use crate::signal_type::SignalType;
 use crate::system::{Connection, System};
@@ -50,15 +50,11 @@ fn is_clocked(system: &System, connection: &Connection) -> bool {
 /// Returns for each slave the positions of the inputs with direct feedthrough to a connected output; `None`: all.
 fn feedthrough_inputs(system: &System) -> Vec<Option<HashSet<usize>>> {
     let mut feedthrough = vec![Some(HashSet::new()); system.slaves.len()];
-    let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
+    let rows = Rows::of(system);
     for connection in system.connections.iter().filter(|connection| !is_clocked(system, connection))
     {
         let from = connection.from;
-        let description = system.slaves[from.slave].1.description();
-        let rows = rows[from.slave].get_or_insert_with(|| by_index(&description.structure.outputs));
-        let Some(unknown) = u32::try_from(from.variable + 1).ok().and_then(|k| rows.get(&k)) else {
-            continue;
-        };
+        let Some(unknown) = rows[from.slave].output(from.variable) else { continue };
         match (&unknown.dependencies, &mut feedthrough[from.slave]) {
             (None, inputs) => *inputs = None,
             (Some(list), Some(inputs)) => {
@@ -81,25 +77,32 @@ pub(crate) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    pub(crate) fn new(description: &'a ModelDescription) -> Self {
-        Self {
-            initial: by_index(&description.structure.initial_unknowns),
-            outputs: by_index(&description.structure.outputs),
-        }
+    /// Returns the entries of each slave.
+    pub(crate) fn of(system: &'a System) -> Vec<Self> {
+        let structures = system.slaves.iter().map(|(_, slave)| &slave.description().structure);
+        let rows = structures.map(|structure| Self {
+            initial: by_index(&structure.initial_unknowns),
+            outputs: by_index(&structure.outputs),
+        });
+        rows.collect()
+    }
+
+    /// Returns the entry of the output at position `output`; `None` if it is no output.
+    fn output(&self, output: usize) -> Option<&'a Unknown> {
+        self.outputs.get(&u32::try_from(output + 1).ok()?).copied()
     }
 
     /// Returns the variables (1-based indices) on which the output at position `output` depends
     /// directly; `None`: possibly all, or it is no output.
     pub(crate) fn direct_dependencies(&self, output: usize) -> Option<&'a [u32]> {
-        let index = u32::try_from(output + 1).ok()?;
-        self.outputs.get(&index)?.dependencies.as_deref()
+        self.output(output)?.dependencies.as_deref()
     }
 
     /// Returns the variables (1-based indices) on which the output at position `output` depends in
     /// initialization mode; `None`: possibly all, or it is no output.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {
         let index = u32::try_from(output + 1).ok()?;
-        let row = self.initial.get(&index).or_else(|| self.outputs.get(&index))?;
-        row.dependencies.as_deref()
+        let initial = self.initial.get(&index).copied();
+        initial.or_else(|| self.output(output))?.dependencies.as_deref()
     }
 }

@@ -11,9 +11,9 @@ use fmu_description::Experiment;
 
 use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::capabilities;
-use crate::coupling::{Coupler, Fallbacks};
+use crate::coupling::{Coupler, Fallbacks, Iterated};
 use crate::drive::Scenario;
-use crate::engine::{Ending, Engine, Instants, Parts, Schedule};
+use crate::engine::{Ending, Engine, Instants, Parts};
 use crate::error::{SystemError, call};
 use crate::events::Events;
 use crate::exchange::Exchange;
@@ -23,7 +23,7 @@ use crate::order::{Order, by_direct_dependencies};
 use crate::readout::Readout;
 use crate::step_control::{Pace, SizeControl};
 use crate::system::{Port, System};
-use slave::{CallError, Failure};
+use slave::{CallError, Failure, Slave};
 
 use checkpoint::Origin;
 pub use checkpoint::{Checkpoint, KeptState};
@@ -104,13 +104,12 @@ impl Simulation {
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
         let drives = scenario.drives;
-        let schedule = Schedule::new(&system, algorithm, &order, multiples);
-        let engine = Engine::new(system, exchange, drives, instants, grid, schedule, algorithm)?;
+        let engine = Engine::new(system, exchange, drives, instants, grid, &order, algorithm)?;
         let control = SizeControl::new(&engine.system, &engine.exchange.reals, algorithm)?;
         let events = Events::new(&algorithm.events);
         let varies = algorithm.control != StepControl::Fixed || events.is_some();
         Ok(Self {
-            coupler: Coupler::new(&engine, algorithm, control.scale.clone()),
+            coupler: Coupler { iterated: Iterated::new(&engine, algorithm, control.scale.clone()) },
             engine,
             control,
             events,
@@ -269,7 +268,7 @@ impl Simulation {
     /// Returns the count of steps whose iteration failed; `None` without iteration.
     #[must_use]
     pub fn fallbacks(&self) -> Option<&Fallbacks> {
-        self.coupler.fallbacks()
+        self.coupler.iterated.as_ref().map(|iterated| &iterated.fallbacks)
     }
 
     /// Calls [`crate::Slave::free`] of every slave, even if one fails; call it after
@@ -279,13 +278,7 @@ impl Simulation {
     ///
     /// Returns the first failure.
     pub fn free(&mut self) -> Result<(), SystemError> {
-        let time = self.engine.grid.time;
-        let mut first = Ok(());
-        for (name, slave) in &mut self.engine.system.slaves {
-            let done = slave.free().map_err(|source| call(name, time, source));
-            first = first.and(done);
-        }
-        first
+        self.perform_all(|slave| slave.free())
     }
 
     /// Ends the simulation: calls `fmi2Terminate` of every slave, even if one fails.
@@ -294,14 +287,22 @@ impl Simulation {
     ///
     /// Returns the first failure.
     pub fn terminate(&mut self) -> Result<(), SystemError> {
+        self.perform_all(|slave| match slave.terminate() {
+            // A slave without `fmi2Terminate` needs no end.
+            Err(CallError { failure: Failure::Missing, .. }) => Ok(()),
+            done => done,
+        })
+    }
+
+    /// Performs `action` with every slave, even if one fails; returns the first failure.
+    fn perform_all(
+        &mut self,
+        action: fn(&mut dyn Slave) -> Result<(), CallError>,
+    ) -> Result<(), SystemError> {
         let time = self.engine.grid.time;
         let mut first = Ok(());
         for (name, slave) in &mut self.engine.system.slaves {
-            match slave.terminate() {
-                // A slave without `fmi2Terminate` needs no end.
-                Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
-                Err(source) => first = first.and(Err(call(name, time, source))),
-            }
+            first = first.and(action(slave.as_mut()).map_err(|source| call(name, time, source)));
         }
         first
     }

@@ -68,13 +68,6 @@ pub(crate) struct StepOutcome {
     pub(crate) ending: Option<Ending>,
 }
 
-impl StepOutcome {
-    pub(crate) fn new(end: f64, swept: Swept) -> Self {
-        let ending = if let Swept::Ended(ending) = swept { Some(ending) } else { None };
-        Self { end, ending }
-    }
-}
-
 /// Slot of the FMU states to which a rejected step returns.
 const SLOT: usize = 1;
 
@@ -179,7 +172,8 @@ impl SizeControl {
         if self.kind != StepControl::Fixed {
             self.update_size(&engine.exchange.reals, size);
         }
-        Ok(StepOutcome::new(end, swept))
+        let ending = if let Swept::Ended(ending) = swept { Some(ending) } else { None };
+        Ok(StepOutcome { end, ending })
     }
 
     /// Attempts a step towards `end`; repeats it with a smaller size until it is accepted.
@@ -210,14 +204,14 @@ impl SizeControl {
                     Verdict::Rejected { .. } | Verdict::Stuck if is_break(engine, time) => {
                         engine.exchange.reals.clear_history();
                         self.clear_history();
-                        return Ok(StepOutcome::new(end, swept));
+                        return Ok(StepOutcome { end, ending: None });
                     }
                     Verdict::Rejected { .. } | Verdict::Stuck => {
                         return Err(SystemError::Stuck { time, size, error });
                     }
                     Verdict::Accepted { .. } => {
                         self.update_size(&engine.exchange.reals, size);
-                        return Ok(StepOutcome::new(end, swept));
+                        return Ok(StepOutcome { end, ending: None });
                     }
                 },
             };
@@ -312,7 +306,7 @@ impl SizeControl {
     pub(crate) fn update_size(&mut self, reals: &Reals, size: f64) {
         match self.kind {
             StepControl::Increment => {
-                let measure = self.scale.distance(reals.outputs(), reals.starts());
+                let measure = self.scale.distance(reals.outputs(), &reals.trace.start);
                 if let Controller::Forward(control) = &mut self.controller {
                     self.size = control.next(size, measure);
                 }
@@ -387,12 +381,8 @@ impl Pace {
         Self { smallest, steps: 0, length: 0.0 }
     }
 
-    /// Counts a step of `size` s that ended at the time of `grid`.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if the last steps are so close to the smallest one that the run cannot
-    /// reach its end.
+    /// Counts a step of `size` s that ended at the time of `grid`. Returns an error if the last steps are so close to
+    /// the smallest one that the run cannot reach its end.
     pub(crate) fn check(&mut self, size: f64, grid: &Grid) -> Result<(), SystemError> {
         (self.steps, self.length) = (self.steps + 1, self.length + size);
         if self.steps < PACE_INTERVAL {
@@ -401,7 +391,7 @@ impl Pace {
         let (steps, length, smallest) = (self.steps, self.length, self.smallest);
         (self.steps, self.length) = (0, 0.0);
         let mean = length / f64::from(steps);
-        let left = grid.stop().map_or(0.0, |stop| (stop - grid.time) / mean);
+        let left = grid.stop.map_or(0.0, |stop| (stop - grid.time) / mean);
         if mean > SMALL * smallest || left < MOST_REMAINING_STEPS {
             return Ok(());
         }

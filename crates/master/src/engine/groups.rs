@@ -2,27 +2,9 @@
 
 use std::ops::Range;
 
-use crate::algorithm::{Algorithm, Method};
+use crate::algorithm::Method;
 use crate::order::Order;
 use crate::system::System;
-
-/// Which slaves step together, and how often each of them steps.
-pub(crate) struct Schedule {
-    pub(super) groups: Groups,
-    /// For each slave: the number of communication steps in one of its steps.
-    pub(super) multiples: Vec<u32>,
-}
-
-impl Schedule {
-    pub(crate) fn new(
-        system: &System,
-        algorithm: &Algorithm,
-        order: &Order,
-        multiples: Vec<u32>,
-    ) -> Self {
-        Self { groups: Groups::new(system, algorithm.method, order), multiples }
-    }
-}
 
 /// The slaves in groups. Groups step one after the other; within a group, all inputs are computed
 /// before the first slave steps.

@@ -4,6 +4,8 @@
 //! time stands still while outputs, inputs and discrete states change. All outputs are read before any input is set,
 //! so the order of the slaves does not matter.
 
+use std::ops::ControlFlow;
+
 use super::Ending;
 use crate::drive::Drives;
 use crate::error::SystemError;
@@ -117,7 +119,8 @@ impl Instants {
         parts: &mut Parts<'_>,
         time: f64,
     ) -> Result<InstantEnd, SystemError> {
-        parts.exchange.reals.copy_outputs(&mut self.before);
+        self.before.clear();
+        self.before.extend_from_slice(parts.exchange.reals.outputs());
         for slave in 0..self.pending.len() {
             if self.pending[slave] <= time {
                 self.pending[slave] = f64::INFINITY;
@@ -131,11 +134,10 @@ impl Instants {
                 return self.leave(parts, time);
             }
             needs_update = match self.update(parts, time)? {
-                UpdateResult::Ended(ending) => {
+                ControlFlow::Break(ending) => {
                     return Ok(InstantEnd { ending: Some(ending), jumped: false });
                 }
-                UpdateResult::Again => true,
-                UpdateResult::Settled => false,
+                ControlFlow::Continue(needs_update) => needs_update,
             };
         }
         Err(self.unsettled(parts, time))
@@ -162,8 +164,8 @@ impl Instants {
             }
         }
         parts.drives.write_to(parts.system, time, |slave| self.in_event[slave])?;
-        let in_event = (0..self.in_event.len()).filter(|&slave| self.in_event[slave]);
-        in_event.into_iter().try_for_each(|slave| parts.drives.tick(parts.system, slave, time))
+        let mut in_event = (0..self.in_event.len()).filter(|&slave| self.in_event[slave]);
+        in_event.try_for_each(|slave| parts.drives.tick(parts.system, slave, time))
     }
 
     /// Passes values and ticks until they do not change any more; returns whether a discrete value or a tick was
@@ -208,8 +210,13 @@ impl Instants {
         Err(self.unsettled(parts, time))
     }
 
-    /// Updates the discrete states of the slaves in event mode.
-    fn update(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<UpdateResult, SystemError> {
+    /// Updates the discrete states of the slaves in event mode. Returns whether a slave needs another update, or the
+    /// slave that requests the end of the simulation.
+    fn update(
+        &mut self,
+        parts: &mut Parts<'_>,
+        time: f64,
+    ) -> Result<ControlFlow<Ending, bool>, SystemError> {
         let mut again = false;
         for slave in 0..self.in_event.len() {
             if !self.in_event[slave] {
@@ -219,13 +226,13 @@ impl Instants {
             let info =
                 with_events(parts.system, slave, time, |events| events.update_discrete_states())?;
             if info.terminate_simulation {
-                return Ok(UpdateResult::Ended(Ending { slave, time }));
+                return Ok(ControlFlow::Break(Ending { slave, time }));
             }
             again |= info.discrete_states_need_update;
         }
         parts.exchange.end_ticks();
         self.set.fill(false);
-        Ok(if again { UpdateResult::Again } else { UpdateResult::Settled })
+        Ok(ControlFlow::Continue(again))
     }
 
     /// Leaves event mode, asks for the next events and reads the outputs.
@@ -302,16 +309,6 @@ impl Instants {
         }
         SystemError::Unsettled { time, iterations: MOST, names: names.join(", ") }
     }
-}
-
-/// The outcome of an update.
-enum UpdateResult {
-    /// A slave needs another one.
-    Again,
-    /// No slave needs another one.
-    Settled,
-    /// A slave requested the end of the simulation.
-    Ended(Ending),
 }
 
 /// Performs `action` with the events of a slave; an error names it and `time`, in s.

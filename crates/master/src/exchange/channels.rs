@@ -14,7 +14,8 @@ pub(super) struct Channels {
     booleans: Channel<i32>,
     strings: Channel<String>,
     binaries: Channel<Vec<u8>>,
-    empty: bool,
+    /// Whether there are no connections and no other outputs to read.
+    pub(super) is_empty: bool,
 }
 
 /// The values of [`Channels`] that change during the run.
@@ -28,16 +29,19 @@ pub(crate) struct ChannelsState {
 }
 
 impl ChannelsState {
-    pub(super) fn has_shape_of(&self, other: &Self) -> bool {
-        self.reals.has_shape_of(&other.reals)
-            && self.integers.has_shape_of(&other.integers)
-            && self.booleans.has_shape_of(&other.booleans)
-            && self.strings.has_shape_of(&other.strings)
-            && self.binaries.has_shape_of(&other.binaries)
+    pub(super) fn lengths(&self) -> [[usize; 3]; 5] {
+        [
+            self.reals.lengths(),
+            self.integers.lengths(),
+            self.booleans.lengths(),
+            self.strings.lengths(),
+            self.binaries.lengths(),
+        ]
     }
 }
 
-/// Calls a method of the channels of all types, one after the other, up to the first error.
+/// Calls a method of the channels of all types, one after the other: up to the first error, up to the first that
+/// returns true, or all.
 macro_rules! all {
     ($channels:ident.$method:ident($($argument:expr),*)?) => {{
         $channels.reals.$method($($argument),*)?;
@@ -46,6 +50,13 @@ macro_rules! all {
         $channels.strings.$method($($argument),*)?;
         $channels.binaries.$method($($argument),*)
     }};
+    ($channels:ident.$method:ident($($argument:expr),*) || ..) => {
+        $channels.reals.$method($($argument),*)
+            || $channels.integers.$method($($argument),*)
+            || $channels.booleans.$method($($argument),*)
+            || $channels.strings.$method($($argument),*)
+            || $channels.binaries.$method($($argument),*)
+    };
     ($channels:ident.$method:ident($($argument:expr),*);) => {
         $channels.reals.$method($($argument),*);
         $channels.integers.$method($($argument),*);
@@ -64,58 +75,30 @@ impl Channels {
             };
             connections.iter().filter(has_type).copied().collect()
         };
-        let reals = Channel::new(system, REALS, &by_type(ValueType::Real), &[]);
-        let integers = Channel::new(system, INTEGERS, &by_type(ValueType::Integer), more);
-        let booleans = Channel::new(system, BOOLEANS, &by_type(ValueType::Boolean), &[]);
-        let strings = Channel::new(system, STRINGS, &by_type(ValueType::String), &[]);
-        let binaries = Channel::new(system, BINARIES, &by_type(ValueType::Binary), &[]);
-        let empty = reals.is_empty()
-            && integers.is_empty()
-            && booleans.is_empty()
-            && strings.is_empty()
-            && binaries.is_empty();
-        Self { reals, integers, booleans, strings, binaries, empty }
+        Self {
+            reals: Channel::new(system, REALS, &by_type(ValueType::Real), &[]),
+            integers: Channel::new(system, INTEGERS, &by_type(ValueType::Integer), more),
+            booleans: Channel::new(system, BOOLEANS, &by_type(ValueType::Boolean), &[]),
+            strings: Channel::new(system, STRINGS, &by_type(ValueType::String), &[]),
+            binaries: Channel::new(system, BINARIES, &by_type(ValueType::Binary), &[]),
+            is_empty: connections.is_empty() && more.is_empty(),
+        }
     }
 
-    /// Whether there are no connections and no other outputs to read.
-    pub(super) fn is_empty(&self) -> bool {
-        self.empty
-    }
-
-    /// Puts a fault on the connection to an input; returns false if the input has no connection here, or is a String or
-    /// a binary.
+    /// Puts a fault on the connection to an input, which is no String and no binary; returns false if the input has no
+    /// connection here.
     pub(super) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        self.reals.set_fault(input, fault)
-            || self.integers.set_fault(input, fault)
-            || self.booleans.set_fault(input, fault)
-    }
-
-    /// Returns the faults on the connection to an input.
-    pub(super) fn fault(&self, input: Port) -> Option<&FaultChain> {
-        let reals = self.reals.fault(input).or_else(|| self.integers.fault(input));
-        reals.or_else(|| self.booleans.fault(input))
+        all!(self.set_fault(input, fault) || ..)
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves for which `ahead`
     /// is true contribute the value at the start of their step.
     pub(super) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
-        self.reals.commit(time, ahead);
-        self.integers.commit(time, ahead);
-        self.booleans.commit(time, ahead);
+        all!(self.commit(time, ahead););
     }
 
-    /// Returns the first time after `after` at which a fault starts or ends.
-    pub(super) fn next_break(&self, after: f64) -> Option<f64> {
-        let breaks = [
-            self.reals.next_break(after),
-            self.integers.next_break(after),
-            self.booleans.next_break(after),
-        ];
-        breaks.into_iter().flatten().reduce(f64::min)
-    }
-
-    /// Iterates over all faults, for a checkpoint.
-    pub(super) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
+    /// Iterates over the faults, each with the input of its connection.
+    pub(super) fn faults(&self) -> impl Iterator<Item = (Port, &FaultChain)> {
         self.reals.faults().chain(self.integers.faults()).chain(self.booleans.faults())
     }
 
@@ -132,11 +115,7 @@ impl Channels {
 
     /// Whether a gathered input of `slave` differs from the value that was set last.
     pub(super) fn has_new(&self, slave: usize) -> bool {
-        self.reals.has_new(slave)
-            || self.integers.has_new(slave)
-            || self.booleans.has_new(slave)
-            || self.strings.has_new(slave)
-            || self.binaries.has_new(slave)
+        all!(self.has_new(slave) || ..)
     }
 
     /// Adds the inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
@@ -161,19 +140,19 @@ impl Channels {
 
     /// Copies all values to `state`.
     pub(super) fn save(&self, state: &mut ChannelsState) {
-        self.reals.save(&mut state.reals);
-        self.integers.save(&mut state.integers);
-        self.booleans.save(&mut state.booleans);
-        self.strings.save(&mut state.strings);
-        self.binaries.save(&mut state.binaries);
+        state.reals.copy(&self.reals.state);
+        state.integers.copy(&self.integers.state);
+        state.booleans.copy(&self.booleans.state);
+        state.strings.copy(&self.strings.state);
+        state.binaries.copy(&self.binaries.state);
     }
 
     /// Restores all values from `state`.
     pub(super) fn restore(&mut self, state: &ChannelsState) {
-        self.reals.restore(&state.reals);
-        self.integers.restore(&state.integers);
-        self.booleans.restore(&state.booleans);
-        self.strings.restore(&state.strings);
-        self.binaries.restore(&state.binaries);
+        self.reals.state.copy(&state.reals);
+        self.integers.state.copy(&state.integers);
+        self.booleans.state.copy(&state.booleans);
+        self.strings.state.copy(&state.strings);
+        self.binaries.state.copy(&state.binaries);
     }
 }

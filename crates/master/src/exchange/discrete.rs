@@ -118,7 +118,7 @@ struct Wiring {
 pub(crate) struct Channel<T> {
     access: Access<T>,
     wiring: Wiring,
-    state: ChannelState<T>,
+    pub(crate) state: ChannelState<T>,
     /// Values for the inputs.
     values: Vec<T>,
 }
@@ -137,12 +137,11 @@ pub(crate) struct ChannelState<T> {
 }
 
 impl<T: Clone> ChannelState<T> {
-    pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
+    pub(crate) fn lengths(&self) -> [usize; 3] {
         [&self.latest, &self.start, &self.inputs].map(Vec::len)
-            == [&other.latest, &other.start, &other.inputs].map(Vec::len)
     }
 
-    fn copy(&mut self, other: &Self) {
+    pub(crate) fn copy(&mut self, other: &Self) {
         self.latest.clone_from(&other.latest);
         self.start.clone_from(&other.start);
         self.inputs.clone_from(&other.inputs);
@@ -189,11 +188,6 @@ impl Wiring {
             output_ports: outputs,
         }
     }
-
-    /// Returns the index of an input; `None` without a connection here.
-    fn input(&self, input: Port) -> Option<usize> {
-        self.input_ports.iter().position(|&port| port == input)
-    }
 }
 
 impl<T: Clone + Default> Channel<T> {
@@ -224,13 +218,8 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        let index = self.wiring.input(input);
+        let index = self.wiring.input_ports.iter().position(|&port| port == input);
         index.map(|k| self.wiring.faults[k] = Some(fault.clone())).is_some()
-    }
-
-    /// Returns the faults on the connection to an input.
-    pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
-        self.wiring.input(input).and_then(|k| self.wiring.faults[k].as_ref())
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
@@ -249,21 +238,16 @@ impl<T: Clone + Default> Channel<T> {
         }
     }
 
-    /// Returns the first time after `after` at which a fault starts or ends.
-    pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
-        let faults = self.wiring.faults.iter().flatten();
-        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
-    }
-
     /// Makes the end values of the last step the start values of the next one.
     pub(crate) fn shift(&mut self, slave: usize) {
         let range = self.wiring.port_maps[slave].output_range.clone();
         self.state.start[range.clone()].clone_from_slice(&self.state.latest[range]);
     }
 
-    /// Iterates over the faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
-        self.wiring.faults.iter_mut().flatten()
+    /// Iterates over the faults, each with the input of its connection.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = (Port, &FaultChain)> {
+        let inputs = self.wiring.input_ports.iter().zip(&self.wiring.faults);
+        inputs.filter_map(|(port, fault)| Some((*port, fault.as_ref()?)))
     }
 
     /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true
@@ -308,21 +292,6 @@ impl<T: Clone + Default> Channel<T> {
     /// Records the gathered values of all inputs as those that were set last.
     pub(crate) fn accept(&mut self) {
         self.state.inputs.clone_from(&self.values);
-    }
-
-    /// Whether there are no outputs to read, and so no connections.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.state.latest.is_empty()
-    }
-
-    /// Copies the state to `state`.
-    pub(crate) fn save(&self, state: &mut ChannelState<T>) {
-        state.copy(&self.state);
-    }
-
-    /// Restores the state from `state`.
-    pub(crate) fn restore(&mut self, state: &ChannelState<T>) {
-        self.state.copy(state);
     }
 
     /// Reads the outputs.

@@ -16,12 +16,6 @@ impl Reals {
         true
     }
 
-    /// Returns the faults on the connection to an input.
-    pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
-        let k = self.layout.input_ports.iter().position(|&port| port == input)?;
-        self.faults.get(k)?.as_ref()
-    }
-
     /// Records the undisturbed values in the faults at the final communication point `time`.
     pub(crate) fn commit(&mut self, time: f64) {
         for k in 0..self.faults.len() {
@@ -35,14 +29,9 @@ impl Reals {
         }
     }
 
-    /// Returns the first time after `after` at which a fault starts or ends.
-    pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
-        let faults = self.faults.iter().flatten();
-        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
-    }
-
-    /// Iterates over the faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
-        self.faults.iter_mut().flatten()
+    /// Iterates over the faults, each with the input of its connection.
+    pub(crate) fn faults(&self) -> impl Iterator<Item = (Port, &FaultChain)> {
+        let inputs = self.layout.input_ports.iter().zip(&self.faults);
+        inputs.filter_map(|(port, fault)| Some((*port, fault.as_ref()?)))
     }
 }

@@ -123,7 +123,7 @@ impl Exchange {
     /// Computes the discrete and clocked inputs of `slave` at `time`. Returns whether there is a new value or a
     /// tick for them.
     pub(crate) fn gather_at_events(&mut self, slave: usize, time: f64) -> bool {
-        if !self.at_events.is_empty() {
+        if !self.at_events.is_empty {
             self.at_events.gather(slave, time, &|source| self.reals.is_ahead(source, time));
         }
         self.at_events.has_new(slave) || self.ticks.has_due(slave)
@@ -178,7 +178,11 @@ impl Exchange {
 
 impl Reals {
     /// Reads the connected outputs of a slave without their derivatives.
-    fn read_values(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
+    pub(super) fn read_values(
+        &mut self,
+        slave: usize,
+        instance: &mut dyn Slave,
+    ) -> Result<(), CallError> {
         let port_map = &self.layout.port_maps[slave];
         if port_map.outputs.is_empty() {
             return Ok(());
@@ -213,11 +217,6 @@ impl Reals {
             instance.set_real(&self.layout.port_maps[slave].inputs, &self.values[range])?;
         }
         Ok(changed)
-    }
-
-    /// Copies the values of the outputs to `before`.
-    pub(crate) fn copy_outputs(&self, before: &mut Vec<f64>) {
-        before.clone_from(&self.trace.latest);
     }
 
     /// Removes the past of the outputs whose values differ from `before`: they have jumped. Returns whether any has.

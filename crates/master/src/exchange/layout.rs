@@ -208,15 +208,10 @@ impl Layout {
     /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on an input
     /// that follows it, also through further slaves. An output without stated dependencies counts as smooth.
     fn find_jumping(&mut self, system: &System) {
-        let is_discrete = |port: Port| system.signal_type(port) != SignalType::Continuous;
-        let mut jumping: HashSet<Port> =
-            self.output_ports.iter().copied().filter(|port| is_discrete(*port)).collect();
-        if jumping.is_empty() {
-            self.jumping = vec![false; self.output_ports.len()];
-            return;
-        }
-        let rows: Vec<_> =
-            system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
+        let outputs = || self.output_ports.iter().zip(&self.discrete);
+        let discrete = outputs().filter(|(_, is_discrete)| **is_discrete);
+        let mut jumping: HashSet<Port> = discrete.map(|(port, _)| *port).collect();
+        let rows = Rows::of(system);
         loop {
             let from_jumping =
                 system.connections.iter().filter(|connection| jumping.contains(&connection.from));
@@ -236,8 +231,8 @@ impl Layout {
             }
             jumping.extend(dependent);
         }
-        let jumps = |port: &Port| jumping.contains(port) && !is_discrete(*port);
-        self.jumping = self.output_ports.iter().map(jumps).collect();
+        self.jumping =
+            outputs().map(|(port, is_discrete)| jumping.contains(port) && !is_discrete).collect();
     }
 
     /// Assigns indices to the derivatives: slave by slave, first order before second order.

@@ -47,13 +47,9 @@ impl Pass {
         self.parts.reserve(self.ranges.len());
     }
 
-    /// Sets the inputs of all slaves from `latest`, makes `step` with each slave and reads
-    /// their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves that did
-    /// not complete the step or ended it at an event, with their results.
-    ///
-    /// # Errors
-    ///
-    /// Returns the first failure with its slave; `latest` then has its former values.
+    /// Sets the inputs of all slaves from `latest`, makes `step` with each slave and reads their outputs. Replaces
+    /// `latest` after all slaves have stepped. Returns the slaves that did not complete the step or ended it at an
+    /// event, with their results; or the first failure with its slave, and `latest` then has its former values.
     #[inline]
     pub(super) fn run(
         &mut self,

@@ -99,12 +99,6 @@ impl Reals {
         &mut self.trace.latest
     }
 
-    /// Returns the Integer outputs that are connected to Reals: port, and index in
-    /// [`Reals::outputs`].
-    pub(crate) fn integer_sources(&self) -> &[(Port, usize)] {
-        &self.layout.from_integers
-    }
-
     /// Prepares a step of `slave` from `time` over `size`: end values of the last step become start
     /// values.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
@@ -269,19 +263,6 @@ impl Reals {
         extrapolation.later(time - span.start)
     }
 
-    /// Sets the gathered inputs of `slave`, steps it, reads its outputs.
-    #[inline]
-    pub(crate) fn advance(
-        &mut self,
-        slave: usize,
-        instance: &mut dyn Slave,
-        step: CommunicationStep,
-    ) -> Result<StepResult, CallError> {
-        let done = instance.advance(&mut self.request(slave, step))?;
-        self.trace.spans[slave].stepped = true;
-        Ok(done)
-    }
-
     /// Builds the request of the step of `slave` with its gathered inputs.
     #[inline]
     pub(super) fn request(&mut self, slave: usize, step: CommunicationStep) -> StepRequest<'_> {
@@ -325,15 +306,12 @@ impl Reals {
 
     /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let (port_map, trace) = (&self.layout.port_maps[slave], &mut self.trace);
-        if !port_map.outputs.is_empty() {
-            instance
-                .get_real(&port_map.outputs, &mut trace.latest[port_map.output_range.clone()])?;
-        }
+        self.read_values(slave, instance)?;
+        let port_map = &self.layout.port_maps[slave];
         if port_map.derived_outputs.is_empty() {
             return Ok(());
         }
-        let derivatives = &mut trace.derivatives[port_map.output_derivative_range.clone()];
+        let derivatives = &mut self.trace.derivatives[port_map.output_derivative_range.clone()];
         instance.get_output_derivatives(
             &port_map.derived_outputs,
             &port_map.output_orders,

@@ -87,11 +87,6 @@ impl Reals {
         Ok(())
     }
 
-    /// Returns the values of the outputs at the start of the last step.
-    pub(crate) fn starts(&self) -> &[f64] {
-        &self.trace.start
-    }
-
     /// Writes the error of the extrapolation of each output over the last step of `size` s to
     /// `errors`.
     pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {

@@ -45,7 +45,7 @@ pub(crate) struct Trace {
     /// Values of all outputs at the end of the last step.
     pub(super) latest: Vec<f64>,
     /// Values of all outputs at the start of the last step.
-    pub(super) start: Vec<f64>,
+    pub(crate) start: Vec<f64>,
     /// Values of all outputs at the start of the step before the last one.
     pub(super) before: Vec<f64>,
     /// Values of all outputs at the start of the step before that.
@@ -59,19 +59,11 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
-    pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
-        let shape = |trace: &Self| {
-            [
-                trace.latest.len(),
-                trace.start.len(),
-                trace.before.len(),
-                trace.earlier.len(),
-                trace.derivatives.len(),
-                trace.start_derivatives.len(),
-                trace.spans.len(),
-            ]
-        };
-        shape(self) == shape(other)
+    pub(crate) fn lengths(&self) -> [usize; 7] {
+        let values = [&self.latest, &self.start, &self.before, &self.earlier];
+        let [latest, start, before, earlier] = values.map(Vec::len);
+        let derivatives = [&self.derivatives, &self.start_derivatives].map(Vec::len);
+        [latest, start, before, earlier, derivatives[0], derivatives[1], self.spans.len()]
     }
 
     /// Copies all values of `other`, which belongs to the same system, without allocating.

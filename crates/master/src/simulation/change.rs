@@ -20,7 +20,7 @@ impl Simulation {
         let ahead = self.slow_slaves().filter_map(|slave| self.current_step(slave));
         let touched = ahead.fold(self.attempted.max(grid.time), |last, (_, end)| last.max(end));
         let next = self.control.varied_end(touched).unwrap_or_else(|| grid.point_after(touched));
-        grid.stop().is_none_or(|stop| next < stop).then_some(next)
+        grid.stop.is_none_or(|stop| next < stop).then_some(next)
     }
 
     /// Replaces the scenario by one that adds to it: further driven variables, further points of

@@ -242,7 +242,7 @@ impl Simulation {
     /// Returns the faults on connections, each with the input of its connection.
     fn faults(&self) -> Vec<(Port, FaultChain)> {
         let exchange = &self.engine.exchange;
-        let connections = self.engine.system.connections.iter().filter(|_| exchange.is_faulty());
+        let connections = self.engine.system.connections.iter().filter(|_| exchange.is_faulty);
         let faults = connections.map(|connection| (connection.to, exchange.fault(connection.to)));
         faults.filter_map(|(input, fault)| Some((input, fault?.clone()))).collect()
     }
@@ -322,7 +322,7 @@ impl Simulation {
         }
         let mut values = Values::default();
         self.engine.exchange.save(&mut values);
-        if values.has_shape_of(&checkpoint.master.values) {
+        if values.lengths() == checkpoint.master.values.lengths() {
             return Ok(());
         }
         Err(contradiction(
