@@ -19,23 +19,6 @@ pub enum Decimation {
     Nth(u64),
 }
 
-impl Decimation {
-    /// Checks that the interval is finite and above zero, or that the count is above zero; returns the decimation.
-    ///
-    /// # Errors
-    ///
-    /// A message for the user with the invalid interval or count.
-    pub fn check(self) -> Result<Self, String> {
-        match self {
-            Self::Every(interval) if !(interval > 0.0 && interval.is_finite()) => {
-                Err(format!("rows are recorded every {interval} s, expected an interval above 0"))
-            }
-            Self::Nth(0) => Err("rows are recorded every 0 steps, expected at least 1".to_owned()),
-            valid => Ok(valid),
-        }
-    }
-}
-
 /// Decides for each communication point whether it is recorded. Serialisable, so that a resumed run
 /// records the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -127,15 +110,5 @@ mod tests {
             kept.extend(times[41..].iter().filter(|time| resumed.at(**time)));
             assert_eq!(kept, recorded(decimation, 0.0, &times), "{decimation:?}");
         }
-    }
-
-    #[test]
-    fn an_interval_that_cannot_be_kept_to_is_refused() {
-        for unsound in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            let sentence = Decimation::Every(unsound).check().unwrap_err();
-            assert!(sentence.contains(&unsound.to_string()), "{sentence}");
-        }
-        assert!(Decimation::Nth(0).check().is_err());
-        assert_eq!(Decimation::Nth(1).check(), Ok(Decimation::Nth(1)));
     }
 }

@@ -288,38 +288,30 @@ fn check_names(columns: &[Column]) -> Result<(), ResultsError> {
     }
 }
 
-/// The number of columns of each type; Long columns count as integers.
+/// The types of the values of a row, and the number of columns of each; Long columns count as Integer.
 #[derive(Debug, Clone, Copy)]
-struct Widths {
-    reals: usize,
-    integers: usize,
-    booleans: usize,
-    strings: usize,
-}
+struct Widths([(ColumnKind, usize); 4]);
 
 impl Widths {
     fn new(columns: &[Column]) -> Self {
         let count = |kind| columns.iter().filter(|column| column.kind == kind).count();
-        Self {
-            reals: count(ColumnKind::Real),
-            integers: count(ColumnKind::Integer) + count(ColumnKind::Long),
-            booleans: count(ColumnKind::Boolean),
-            strings: count(ColumnKind::String),
-        }
+        Self([
+            (ColumnKind::Real, count(ColumnKind::Real)),
+            (ColumnKind::Integer, count(ColumnKind::Integer) + count(ColumnKind::Long)),
+            (ColumnKind::Boolean, count(ColumnKind::Boolean)),
+            (ColumnKind::String, count(ColumnKind::String)),
+        ])
     }
 
     fn check(&self, row: &Row<'_>) -> Result<(), ResultsError> {
-        for (kind, expected, actual) in [
-            (ColumnKind::Real, self.reals, row.reals.len()),
-            (ColumnKind::Integer, self.integers, row.integers.len()),
-            (ColumnKind::Boolean, self.booleans, row.booleans.len()),
-            (ColumnKind::String, self.strings, row.strings.len()),
-        ] {
-            if expected != actual {
-                return Err(ResultsError::Values { kind, expected, actual });
+        let Row { reals, integers, booleans, strings, .. } = row;
+        let lengths = [reals.len(), integers.len(), booleans.len(), strings.len()];
+        match self.0.into_iter().zip(lengths).find(|((_, expected), actual)| expected != actual) {
+            Some(((kind, expected), actual)) => {
+                Err(ResultsError::Values { kind, expected, actual })
             }
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 

@@ -127,7 +127,7 @@ impl OutputFile {
             return Ok(());
         }
         if links(&metadata) == 0 {
-            return Err(ResultsError::Gone { path: self.path.clone() });
+            return Err(self.gone());
         }
         let size = metadata.len();
         let position = (&self.file).stream_position().map_err(|error| self.failed(error))?;
@@ -148,14 +148,13 @@ impl OutputFile {
 
     /// Opens the file again after its descriptor was closed or replaced; returns its metadata.
     fn reopen(&mut self) -> Result<Metadata, ResultsError> {
-        let gone = || ResultsError::Gone { path: self.path.clone() };
         if !self.regular {
-            return Err(gone());
+            return Err(self.gone());
         }
-        let file = open_alone(&self.absolute, false).ok().flatten().ok_or_else(gone)?;
+        let file = open_alone(&self.absolute, false).ok().flatten().ok_or_else(|| self.gone())?;
         let metadata = file.metadata().map_err(|error| self.failed(error))?;
         if Identity::new(&metadata) != self.identity {
-            return Err(gone());
+            return Err(self.gone());
         }
         let mut file = with_high_descriptor(file);
         file.seek(SeekFrom::Start(self.length)).map_err(|error| self.failed(error))?;
@@ -224,18 +223,12 @@ impl OutputFile {
         let leads = || {
             let (named, written) = (fs::metadata(&self.absolute)?, self.file.metadata()?);
             // Some network file systems give a file a new number while it is open.
-            let alike = || {
-                Ok::<_, io::Error>(
-                    named.len() == written.len() && named.modified()? == written.modified()?,
-                )
-            };
-            Ok::<_, io::Error>(Identity::new(&named) == self.identity || alike()?)
+            Ok::<_, io::Error>(
+                Identity::new(&named) == self.identity
+                    || named.len() == written.len() && named.modified()? == written.modified()?,
+            )
         };
-        if !self.regular || leads().unwrap_or(false) {
-            Ok(())
-        } else {
-            Err(ResultsError::Gone { path: self.path.clone() })
-        }
+        if !self.regular || leads().unwrap_or(false) { Ok(()) } else { Err(self.gone()) }
     }
 
     /// Tells a supervising process that all rows so far are in the file, and with `is_complete` that no row follows.
@@ -251,6 +244,10 @@ impl OutputFile {
     #[inline]
     pub(super) fn keep(&self, rows: &[u8], start: usize) -> bool {
         self.ledger.is_none_or(|ledger| ledger.keep(rows, start))
+    }
+
+    fn gone(&self) -> ResultsError {
+        ResultsError::Gone { path: self.path.clone() }
     }
 
     fn failed(&self, source: io::Error) -> ResultsError {

@@ -91,14 +91,14 @@ impl ParquetSink {
     /// one is full. With `last`, it also moves the tail so that the file has no unused bytes.
     fn write_rows(&mut self, last: bool) -> Result<(), ResultsError> {
         self.tail.file.verify()?;
-        let (rows, full) = (self.block.rows(), self.block.is_full());
+        let (rows, full) = (self.block.rows, self.block.is_full());
         let has_unused_bytes = self.tail.start() > self.end;
         if rows == self.written && !full && !(last && has_unused_bytes) {
             return Ok(());
         }
         let path = self.tail.file.path().to_owned();
         let failed = |error| write_error(&path, error);
-        let group = self.encode(rows).map_err(failed)?;
+        let group = self.encode().map_err(failed)?;
         let metadata = footer::at_offset(&group, self.end).map_err(failed)?;
         let footer = self.footer.render(Some(metadata.clone())).map_err(failed)?;
         // The end of the tail is rounded up.
@@ -122,7 +122,7 @@ impl ParquetSink {
         self.tail.file.record(false);
         if full {
             let size = self.bytes.len() as u64;
-            self.footer.add(metadata);
+            self.footer.groups.push(metadata);
             self.tail.detach_group(size);
             self.end += size;
             self.block.clear();
@@ -131,26 +131,30 @@ impl ParquetSink {
         Ok(())
     }
 
-    /// Encodes the first `rows` of the block as a row group to `bytes`; returns its metadata for offset 0.
-    fn encode(&mut self, rows: usize) -> Result<Arc<RowGroupMetaData>, ParquetError> {
+    /// Encodes the block as a row group to `bytes`; returns its metadata for offset 0.
+    fn encode(&mut self) -> Result<Arc<RowGroupMetaData>, ParquetError> {
         self.bytes.clear();
         let mut bytes = TrackedWrite::new(std::mem::take(&mut self.bytes));
-        let schema = self.footer.schema();
+        let schema = self.footer.schema.clone();
         let mut group =
             SerializedRowGroupWriter::new(schema, self.properties.clone(), &mut bytes, 0, None);
-        let mut reader = self.block.reader(rows);
+        let block = &self.block;
+        let (mut reals, mut integers) =
+            (block.columns(&block.reals), block.columns(&block.integers));
+        let (mut longs, mut booleans) =
+            (block.columns(&block.longs), block.columns(&block.booleans));
+        let mut strings = (0..).map(|number| block.texts(number));
         let mut clocked = self.clocked.iter();
         while let Some(mut column) = group.next_column()? {
-            let levels =
-                clocked.next().copied().flatten().map(|number| self.block.levels(number, rows));
+            let levels = clocked.next().copied().flatten().map(|number| block.levels(number));
             let levels = levels.as_deref();
             match column.untyped() {
-                ColumnWriter::DoubleColumnWriter(writer) => write(writer, reader.reals(), levels),
-                ColumnWriter::Int32ColumnWriter(writer) => write(writer, reader.integers(), levels),
-                ColumnWriter::Int64ColumnWriter(writer) => write(writer, reader.longs(), levels),
-                ColumnWriter::BoolColumnWriter(writer) => write(writer, reader.booleans(), levels),
+                ColumnWriter::DoubleColumnWriter(writer) => write(writer, reals.next(), levels),
+                ColumnWriter::Int32ColumnWriter(writer) => write(writer, integers.next(), levels),
+                ColumnWriter::Int64ColumnWriter(writer) => write(writer, longs.next(), levels),
+                ColumnWriter::BoolColumnWriter(writer) => write(writer, booleans.next(), levels),
                 ColumnWriter::ByteArrayColumnWriter(writer) => {
-                    write(writer, &reader.strings(), levels)
+                    write(writer, strings.next().as_deref(), levels)
                 }
                 _ => Err(ParquetError::General("a column of another type".to_owned())),
             }?;
@@ -202,9 +206,10 @@ fn clocked(columns: &[Column]) -> Vec<Option<usize>> {
 /// Writes the values of a column. A value whose level is 0 is null; without levels none is.
 fn write<T: DataType>(
     writer: &mut ColumnWriterImpl<'_, T>,
-    values: &[T::T],
+    values: Option<&[T::T]>,
     levels: Option<&[i16]>,
 ) -> Result<(), ParquetError> {
+    let values = values.unwrap_or_default();
     let written = if let Some(levels) = levels {
         let present = values.iter().zip(levels).filter(|(_, level)| **level > 0);
         let present: Vec<T::T> = present.map(|(value, _)| value.clone()).collect();

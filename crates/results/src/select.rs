@@ -172,40 +172,26 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_selection_selects_everything_in_order() {
-        assert_eq!(chosen(&[], &[]).unwrap(), NAMES);
-    }
-
-    #[test]
-    fn each_name_is_selected_once_in_the_order_of_the_patterns() {
-        let patterns = ["plant.theta", "plant.x_p", "plant.*"];
-        assert_eq!(chosen(&patterns, &[]).unwrap(), ["plant.theta", "plant.x_p"]);
-    }
-
-    #[test]
-    fn brackets_match_themselves_also_with_wildcards() {
-        assert_eq!(chosen(&["ctrl.x_hat[1]"], &[]).unwrap(), ["ctrl.x_hat[1]"]);
-        assert_eq!(chosen(&["*.x_hat[?]"], &[]).unwrap(), ["ctrl.x_hat[1]", "ctrl.x_hat[2]"]);
-        assert_eq!(chosen(&["*[2]"], &[]).unwrap(), ["ctrl.x_hat[2]"]);
-    }
-
-    #[test]
-    fn a_star_crosses_points_and_a_question_mark_is_one_letter() {
-        assert_eq!(chosen(&["ctrl.*y"], &[]).unwrap(), ["ctrl.inner.y"]);
+    fn patterns_select_each_name_once_in_their_order_except_those_that_are_excluded() {
+        let cases: [(&[&str], &[&str], &[&str]); 10] = [
+            (&[], &[], &NAMES),
+            (&["plant.theta", "plant.x_p", "plant.*"], &[], &["plant.theta", "plant.x_p"]),
+            // Brackets match themselves, also with wildcards.
+            (&["ctrl.x_hat[1]"], &[], &["ctrl.x_hat[1]"]),
+            (&["*.x_hat[?]"], &[], &["ctrl.x_hat[1]", "ctrl.x_hat[2]"]),
+            (&["*[2]"], &[], &["ctrl.x_hat[2]"]),
+            // A star crosses points, and a question mark is one letter.
+            (&["ctrl.*y"], &[], &["ctrl.inner.y"]),
+            (&["plant.?_p"], &[], &["plant.x_p"]),
+            (&["*theta*"], &[], &["plant.theta", "der(plant.theta)"]),
+            // A name with a star in it means that name.
+            (&["'a*b'"], &[], &["'a*b'"]),
+            (&[], &["*theta*", "*.x_hat[*]"], &["plant.x_p", "ctrl.inner.y", "'a*b'"]),
+        ];
+        for (include, exclude, expected) in cases {
+            assert_eq!(chosen(include, exclude).unwrap(), expected);
+        }
         assert!(chosen(&["plant.x_?p"], &[]).is_err());
-        assert_eq!(chosen(&["plant.?_p"], &[]).unwrap(), ["plant.x_p"]);
-        assert_eq!(chosen(&["*theta*"], &[]).unwrap(), ["plant.theta", "der(plant.theta)"]);
-    }
-
-    #[test]
-    fn a_name_with_a_star_in_it_means_that_name() {
-        assert_eq!(chosen(&["'a*b'"], &[]).unwrap(), ["'a*b'"]);
-    }
-
-    #[test]
-    fn excluded_names_are_left_out() {
-        let kept = ["plant.x_p", "ctrl.inner.y", "'a*b'"];
-        assert_eq!(chosen(&[], &["*theta*", "*.x_hat[*]"]).unwrap(), kept);
         assert_eq!(chosen(&["plant.*"], &["plant.*"]), Err(SelectionError::Empty));
     }
 

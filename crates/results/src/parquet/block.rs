@@ -17,15 +17,15 @@ const PADDING: usize = 8;
 #[derive(Debug)]
 pub(super) struct Block {
     /// Number of rows.
-    rows: usize,
+    pub(super) rows: usize,
     /// Capacity in rows.
-    room: usize,
-    reals: Vec<f64>,
-    integers: Vec<i32>,
-    longs: Vec<i64>,
+    pub(super) room: usize,
+    pub(super) reals: Vec<f64>,
+    pub(super) integers: Vec<i32>,
+    pub(super) longs: Vec<i64>,
     /// For each value of [`Row::integers`], whether its column is a Long.
     is_long: Vec<bool>,
-    booleans: Vec<bool>,
+    pub(super) booleans: Vec<bool>,
     texts: Vec<u8>,
     /// End of each text in `texts`.
     ends: Vec<usize>,
@@ -64,15 +64,6 @@ impl Block {
             present: Vec::new(),
             clocked: columns.iter().filter(|column| column.clocked).count(),
         }
-    }
-
-    #[cfg(test)]
-    pub(super) fn room(&self) -> usize {
-        self.room
-    }
-
-    pub(super) fn rows(&self) -> usize {
-        self.rows
     }
 
     pub(super) fn is_full(&self) -> bool {
@@ -117,63 +108,24 @@ impl Block {
         self.rows += 1;
     }
 
-    /// Returns the definition levels of the first `rows` of the clocked column number `clocked`: 0 for null, else 1.
-    pub(super) fn levels(&self, clocked: usize, rows: usize) -> Vec<i16> {
+    /// Returns the definition levels of the clocked column number `clocked`: 0 for null, else 1.
+    pub(super) fn levels(&self, clocked: usize) -> Vec<i16> {
         let flags = self.present.iter().skip(clocked).step_by(self.clocked.max(1));
-        flags.take(rows).map(|present| i16::from(*present)).collect()
+        flags.map(|present| i16::from(*present)).collect()
     }
 
-    /// Returns a reader of the first `rows` of the columns, or of all rows if there are fewer.
-    pub(super) fn reader(&self, rows: usize) -> Reader<'_> {
-        let rows = rows.min(self.rows);
-        Reader { block: self, rows, reals: 0, integers: 0, longs: 0, booleans: 0, strings: 0 }
-    }
-}
-
-/// A reader that returns the columns of each type one after another; a call beyond the last column panics.
-pub(super) struct Reader<'a> {
-    block: &'a Block,
-    rows: usize,
-    reals: usize,
-    integers: usize,
-    longs: usize,
-    booleans: usize,
-    strings: usize,
-}
-
-impl Reader<'_> {
-    pub(super) fn reals(&mut self) -> &[f64] {
-        column(&self.block.reals, &mut self.reals, self.block, self.rows)
+    /// Iterates over the columns whose values are in `values`, an array of this block.
+    pub(super) fn columns<'a, T>(&'a self, values: &'a [T]) -> impl Iterator<Item = &'a [T]> {
+        values.chunks(self.room + PADDING).map(move |column| &column[..self.rows])
     }
 
-    pub(super) fn integers(&mut self) -> &[i32] {
-        column(&self.block.integers, &mut self.integers, self.block, self.rows)
+    /// Returns the texts of the String column number `number`.
+    pub(super) fn texts(&self, number: usize) -> Vec<ByteArray> {
+        let text = |row| {
+            let place = row * self.strings + number;
+            let start = if place == 0 { 0 } else { self.ends[place - 1] };
+            ByteArray::from(self.texts[start..self.ends[place]].to_vec())
+        };
+        (0..self.rows).map(text).collect()
     }
-
-    pub(super) fn longs(&mut self) -> &[i64] {
-        column(&self.block.longs, &mut self.longs, self.block, self.rows)
-    }
-
-    pub(super) fn booleans(&mut self) -> &[bool] {
-        column(&self.block.booleans, &mut self.booleans, self.block, self.rows)
-    }
-
-    pub(super) fn strings(&mut self) -> Vec<ByteArray> {
-        let first = self.strings;
-        self.strings += 1;
-        let ends = &self.block.ends;
-        (0..self.rows)
-            .map(|row| {
-                let place = row * self.block.strings + first;
-                let start = if place == 0 { 0 } else { ends[place - 1] };
-                ByteArray::from(self.block.texts[start..ends[place]].to_vec())
-            })
-            .collect()
-    }
-}
-
-fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block, rows: usize) -> &'a [T] {
-    let start = *next * (block.room + PADDING);
-    *next += 1;
-    &values[start..start + rows]
 }

@@ -27,9 +27,10 @@ const VERSION: i32 = 1;
 /// The content of the footer, for any number of row groups.
 #[derive(Debug)]
 pub(super) struct Footer {
-    schema: SchemaDescPtr,
+    pub(super) schema: SchemaDescPtr,
     metadata: Vec<KeyValue>,
-    groups: Vec<RowGroupMetaData>,
+    /// The row groups of all later footers.
+    pub(super) groups: Vec<RowGroupMetaData>,
 }
 
 impl Footer {
@@ -54,16 +55,7 @@ impl Footer {
         Ok(Self { schema, metadata, groups: Vec::new() })
     }
 
-    pub(super) fn schema(&self) -> SchemaDescPtr {
-        self.schema.clone()
-    }
-
-    /// Adds a row group to all later footers.
-    pub(super) fn add(&mut self, group: RowGroupMetaData) {
-        self.groups.push(group);
-    }
-
-    /// Renders the footer with all row groups that were added, and with `last` behind them in this footer only.
+    /// Renders the footer with all row groups so far, and with `last` behind them in this footer only.
     pub(super) fn render(
         &mut self,
         last: Option<RowGroupMetaData>,

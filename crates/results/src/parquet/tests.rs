@@ -100,7 +100,7 @@ fn row_groups_are_bounded_and_contiguous_with_any_flushes_in_between() {
     }
     sink.finish().unwrap();
     let sizes = groups(&path);
-    let room = i64::try_from(block::Block::new(&columns).room()).unwrap();
+    let room = i64::try_from(block::Block::new(&columns).room).unwrap();
     assert_eq!(sizes, [room, room, 1300 - 2 * room]);
     let table = super::super::Table::open(&path).unwrap();
     let mut expected = 0..1300;

@@ -153,16 +153,13 @@ fn read(
     match reader {
         ColumnReader::DoubleColumnReader(reader) => batch(reader, cells, |value| *value),
         ColumnReader::FloatColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
-        ColumnReader::Int32ColumnReader(reader) if is_unsigned => {
-            batch(reader, cells, |value| f64::from(value.cast_unsigned()))
-        }
-        ColumnReader::Int32ColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
+        ColumnReader::Int32ColumnReader(reader) => batch(reader, cells, |value| {
+            if is_unsigned { value.cast_unsigned().into() } else { (*value).into() }
+        }),
         #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 a drawing shows no difference")]
-        ColumnReader::Int64ColumnReader(reader) if is_unsigned => {
-            batch(reader, cells, |value| value.cast_unsigned() as f64)
-        }
-        #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 a drawing shows no difference")]
-        ColumnReader::Int64ColumnReader(reader) => batch(reader, cells, |value| *value as f64),
+        ColumnReader::Int64ColumnReader(reader) => batch(reader, cells, |value| {
+            if is_unsigned { value.cast_unsigned() as f64 } else { *value as f64 }
+        }),
         ColumnReader::BoolColumnReader(reader) => {
             batch(reader, cells, |value| f64::from(u8::from(*value)))
         }

@@ -42,44 +42,38 @@ struct Matrix {
     precision: Precision,
 }
 
+/// The form of the numbers of a matrix.
 #[derive(Debug, Clone, Copy)]
-enum Precision {
-    Double,
-    Single,
-    Int32,
-    Int16,
-    Uint16,
-    Uint8,
+struct Precision {
+    /// Number of bytes of a number.
+    size: usize,
+    /// Returns the little-endian number in `size` bytes; NaN for another number of bytes.
+    number: fn(&[u8]) -> f64,
 }
 
 impl Precision {
-    fn size(self) -> usize {
-        match self {
-            Self::Double => 8,
-            Self::Single | Self::Int32 => 4,
-            Self::Int16 | Self::Uint16 => 2,
-            Self::Uint8 => 1,
+    /// Returns the form for the digit that a header states for it.
+    fn of(digit: u32) -> Option<Self> {
+        fn number<const N: usize, T: Into<f64>>(bytes: &[u8], number: fn([u8; N]) -> T) -> f64 {
+            bytes.try_into().map_or(f64::NAN, |bytes| number(bytes).into())
         }
-    }
-
-    /// Returns the little-endian number in [`Precision::size`] bytes; NaN for too few.
-    fn number(self, bytes: &[u8]) -> f64 {
-        let number = match self {
-            Self::Double => bytes.try_into().ok().map(f64::from_le_bytes),
-            Self::Single => bytes.try_into().ok().map(|bytes| f64::from(f32::from_le_bytes(bytes))),
-            Self::Int32 => bytes.try_into().ok().map(|bytes| f64::from(i32::from_le_bytes(bytes))),
-            Self::Int16 => bytes.try_into().ok().map(|bytes| f64::from(i16::from_le_bytes(bytes))),
-            Self::Uint16 => bytes.try_into().ok().map(|bytes| f64::from(u16::from_le_bytes(bytes))),
-            Self::Uint8 => bytes.first().map(|byte| f64::from(*byte)),
+        let (size, number): (_, fn(&[u8]) -> f64) = match digit {
+            0 => (8, |bytes| number(bytes, f64::from_le_bytes)),
+            1 => (4, |bytes| number(bytes, f32::from_le_bytes)),
+            2 => (4, |bytes| number(bytes, i32::from_le_bytes)),
+            3 => (2, |bytes| number(bytes, i16::from_le_bytes)),
+            4 => (2, |bytes| number(bytes, u16::from_le_bytes)),
+            5 => (1, |bytes| number(bytes, u8::from_le_bytes)),
+            _ => return None,
         };
-        number.unwrap_or(f64::NAN)
+        Some(Self { size, number })
     }
 }
 
 impl Matrix {
     /// Returns the number of bytes; `None` if it overflows.
     fn size(&self) -> Option<u64> {
-        let count = self.rows.checked_mul(self.columns)?.checked_mul(self.precision.size())?;
+        let count = self.rows.checked_mul(self.columns)?.checked_mul(self.precision.size)?;
         u64::try_from(count).ok()
     }
 }
@@ -118,16 +112,11 @@ impl<'a> Source<'a> {
         if header.starts_with(b"MATLAB") || header.starts_with(b"\x89HDF") {
             return Err(foreign("it is a MAT file of version 5 or later"));
         }
+        let (words, _) = header.as_chunks();
         let [kind, rows, columns, is_complex, length] =
-            std::array::from_fn(|at| header.get(4 * at..4 * at + 4).map_or(0, integer));
-        let precision = match kind / 10 {
-            0 => Precision::Double,
-            1 => Precision::Single,
-            2 => Precision::Int32,
-            3 => Precision::Int16,
-            4 => Precision::Uint16,
-            5 => Precision::Uint8,
-            _ => return Err(foreign("it is no MAT file of version 4 with little-endian numbers")),
+            std::array::from_fn(|at| u32::from_le_bytes(words[at]));
+        let Some(precision) = Precision::of(kind / 10) else {
+            return Err(foreign("it is no MAT file of version 4 with little-endian numbers"));
         };
         if kind % 10 > 1 || is_complex != 0 {
             return Err(foreign("it has a matrix that is sparse or complex"));
@@ -154,8 +143,8 @@ impl<'a> Source<'a> {
         let mut bytes = vec![0; usize::try_from(size).unwrap_or(0)];
         self.seek(matrix.offset)?;
         self.read(&mut bytes)?;
-        let numbers = bytes.chunks_exact(matrix.precision.size());
-        Ok(numbers.map(|bytes| matrix.precision.number(bytes)).collect())
+        let Precision { size, number } = matrix.precision;
+        Ok(bytes.chunks_exact(size).map(number).collect())
     }
 
     /// Reads the columns of a matrix of character codes as texts.
@@ -171,10 +160,6 @@ impl<'a> Source<'a> {
 /// The end of the message about a file that is not supported.
 const EXPECTED: &str = "expected results of Dymola or OpenModelica (version 4, binTrans); \
                         save others as CSV or Parquet first";
-
-fn integer(bytes: &[u8]) -> u32 {
-    bytes.try_into().map_or(0, u32::from_le_bytes)
-}
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a character code")]
 fn byte(number: f64) -> u8 {
@@ -269,21 +254,21 @@ pub(super) fn visit(
     }
     let mut source = Source::open(path)?;
     source.seek(varying.offset)?;
-    let size = varying.precision.size();
+    let Precision { size, number } = varying.precision;
     let mut bytes = vec![0; varying.rows * size];
     let mut row = vec![0.0; positions.len()];
     let mut clock = Clock::new(path, &columns[positions[0]].name);
-    for number in 1..=varying.columns {
+    for column in 1..=varying.columns {
         source.read(&mut bytes)?;
         for (value, position) in row.iter_mut().zip(positions) {
             *value = match places[*position] {
                 Place::Constant(value) => value,
                 Place::Varying(index, sign) => {
-                    sign * varying.precision.number(&bytes[index * size..(index + 1) * size])
+                    sign * number(&bytes[index * size..(index + 1) * size])
                 }
             };
         }
-        clock.check(row[0], || format!("row {number}"))?;
+        clock.check(row[0], || format!("row {column}"))?;
         visitor(row[0], &row[1..]);
     }
     Ok(())
