@@ -48,11 +48,8 @@ struct Writer {
 impl BusTrace {
     /// Starts a trace for the file at `path`, which [`BusTrace::create`] creates; the extension `.asc`, `.log` or
     /// `.pcapng` selects the format. During the run, the trace gets the frames of all CAN buses of `system`: the frames
-    /// that an FMU which simulates the bus passes on or, without such an FMU, the frames that the nodes send.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if the file has another extension, or if there is no CAN bus.
+    /// that an FMU which simulates the bus passes on or, without such an FMU, the frames that the nodes send. Returns
+    /// an error if the file has another extension, or if there is no CAN bus.
     pub(crate) fn start(path: &Path, system: &mut System) -> Result<Self, Error> {
         let format = Format::of(path)?;
         let senders = senders(system);
@@ -84,10 +81,6 @@ impl BusTrace {
 
     /// Creates the file and its folder, and writes the frames so far. Call it after the initialisation, so that a run
     /// that fails in it keeps the trace of an earlier one.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the path if the file cannot be written.
     pub(crate) fn create(&self) -> Result<(), Error> {
         let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let path = writer.path.clone();
@@ -97,11 +90,7 @@ impl BusTrace {
         writer.write().map_err(Error::file("write", &path))
     }
 
-    /// Checks that all frames so far were written.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the path if a frame could not be written; each error is returned once.
+    /// Checks that all frames so far were written; each error is returned once.
     pub(crate) fn finish(&self) -> Result<(), Error> {
         let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let failed = writer.failed.take();

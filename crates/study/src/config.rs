@@ -42,20 +42,20 @@ pub struct Config {
     #[serde(skip_serializing_if = "is_default")]
     pub compile: bool,
     /// Paths of FMUs by name.
-    #[serde(skip_serializing_if = "Ordered::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub fmus: Ordered<PathBuf>,
     /// The interfaces of FMUs, by name; default: the interface that the system structure states, otherwise
     /// co-simulation if the FMU offers it.
-    #[serde(skip_serializing_if = "Ordered::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub interface: Ordered<Interface>,
     /// The integration methods of FMUs that run by model exchange, by name; default: automatic.
-    #[serde(skip_serializing_if = "Ordered::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub solver: Ordered<Solver>,
     /// Connections. If neither they nor `system` are stated, variables of equal names are
     /// connected.
     pub connections: Option<Vec<Spanned<ConnectionEntry>>>,
     /// Values of variables, set before the initialization.
-    #[serde(skip_serializing_if = "Settings::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub settings: Settings,
     /// The algorithm.
     pub algorithm: AlgorithmRequest,

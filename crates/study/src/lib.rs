@@ -47,7 +47,7 @@ pub use log_fields::LogFields;
 pub use plan::{Plan, plan};
 pub use real_time::{Overruns, RealTime, RealTimeFactor};
 #[cfg(feature = "load")]
-pub use record::{Recorder, keep_results, select, unit};
+pub use record::{keep_results, select, unit};
 #[cfg(feature = "load")]
 pub use run::{Intervention, PreparedRun, Run, RunEnd, RunStatistics};
 #[cfg(feature = "load")]

@@ -169,18 +169,14 @@ fn propose_steps(
                 "{name} steps every {multiple} communication steps: the system structure proposes \
                  {proposed} s for it"
             ));
-            request.every.insert(name.clone(), count(multiple));
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "saturates"
+            )]
+            request.every.insert(name.clone(), multiple as u32);
         }
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "2 and more; saturates"
-)]
-fn count(multiple: f64) -> u32 {
-    multiple as u32
 }
 
 /// Returns start and stop time in s: stated by the user, otherwise by the system structure, otherwise the

@@ -36,7 +36,6 @@ impl std::str::FromStr for RealTimeFactor {
 /// later steps are not delayed until the run has caught up.
 #[derive(Clone, Debug)]
 pub struct RealTime {
-    factor: f64,
     start: Option<(f64, Instant)>,
     overruns: Overruns,
 }
@@ -75,7 +74,7 @@ impl RealTime {
     #[must_use]
     pub fn new(factor: RealTimeFactor) -> Self {
         let RealTimeFactor(factor) = factor;
-        Self { factor, start: None, overruns: Overruns { factor, ..Overruns::default() } }
+        Self { start: None, overruns: Overruns { factor, ..Overruns::default() } }
     }
 
     /// Waits until the instant of the simulated time `time` in s, or counts an overrun if it has
@@ -88,7 +87,7 @@ impl RealTime {
             return;
         };
         self.overruns.steps += 1;
-        let due = (time - first) / self.factor;
+        let due = (time - first) / self.overruns.factor;
         let passed = (now - start).as_secs_f64();
         if passed > due {
             self.overruns.count += 1;

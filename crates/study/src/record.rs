@@ -10,7 +10,7 @@ use std::thread;
 use std::time::Duration;
 
 use fmu_description::{Causality, Kind};
-use master::{Port, Readout, Simulation, SlowState, SlowValues, System};
+use master::{Port, Readout, Simulation, SlowValues, System};
 use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink};
 
 use crate::config::Every;
@@ -40,6 +40,7 @@ impl Files {
 }
 
 /// An open results file, shared by its recorder, [`write_stalled`] and [`keep_results`].
+#[derive(Default)]
 struct Recording {
     path: PathBuf,
     /// `None` after the file was completed or its recorder dropped, or after [`keep_results`].
@@ -53,11 +54,6 @@ struct Recording {
 }
 
 impl Recording {
-    fn new(sink: Box<dyn Sink>) -> Self {
-        let (path, sink) = (PathBuf::new(), Some(sink));
-        Self { path, sink, recent: false, pending: false, failed: None }
-    }
-
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError> {
         self.recent = true;
         self.failed.take().map_or(Ok(()), Err)?;
@@ -71,21 +67,19 @@ impl Recording {
 }
 
 /// The recorder of a run: writes the values of variables to a results file or another sink at a given interval.
-pub struct Recorder {
+pub(crate) struct Recorder {
     recording: Arc<Mutex<Recording>>,
-    due: Due,
-    readout: Readout,
-    slow: SlowValues,
+    /// The schedule of the next rows.
+    pub(crate) due: Due,
+    pub(crate) readout: Readout,
+    /// The values of slaves that step every several communication steps.
+    pub(crate) slow: SlowValues,
 }
 
 impl Recorder {
     /// Creates a recorder of `ports` to the file at `path` for a run that starts at `start` s; `None` if `every` is
     /// [`Every::Never`]. Leaves out variables that their FMUs refuse to read, with a warning for each.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if an FMU fails or if the file cannot be created.
-    pub fn create(
+    pub(crate) fn create(
         path: &Path,
         simulation: &mut Simulation,
         ports: &[Port],
@@ -109,11 +103,7 @@ impl Recorder {
 
     /// Like [`Recorder::create`], but writes to the sink that `make` returns for the columns of the variables.
     /// [`keep_results`] does not write these rows.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if an FMU fails or if `make` fails.
-    pub fn with_sink(
+    pub(crate) fn with_sink(
         simulation: &mut Simulation,
         ports: &[Port],
         every: Every,
@@ -130,61 +120,16 @@ impl Recorder {
         let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
-        let recording = Arc::new(Mutex::new(Recording::new(make(&columns)?)));
+        let recording = Recording { sink: Some(make(&columns)?), ..Recording::default() };
+        let recording = Arc::new(Mutex::new(recording));
         Ok(Some(Self { recording, due, readout, slow }))
     }
 
-    /// Restores the schedule of the next rows in a resumed run.
-    pub fn set_due(&mut self, due: &Due) {
-        self.due = due.clone();
-    }
-
-    /// Returns the schedule of the next rows.
-    #[must_use]
-    pub fn due(&self) -> &Due {
-        &self.due
-    }
-
     /// Records a row if one is due at the time of `simulation`. Call it once for each communication point, in order.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if an FMU fails or if the file cannot be written.
     #[inline]
-    pub fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
+    pub(crate) fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
         if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
-    }
-
-    /// Reads the values of slaves that step every several communication steps, if their step starts now. Call it before
-    /// every [`Simulation::step`].
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if an FMU fails.
-    #[inline]
-    pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
-        Ok(self.slow.before_step(simulation)?)
-    }
-
-    /// Makes the rows show the values of all variables that the scenario drives now. Call it after a change of the
-    /// scenario.
-    pub(crate) fn follow(&mut self, simulation: &Simulation) {
-        simulation.follow(&mut self.readout);
-    }
-
-    /// Returns the recorded values of slaves that step every several communication steps, for a checkpoint.
-    pub fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
-        self.slow.state(simulation.system())
-    }
-
-    /// Restores the state that [`Recorder::slow_state`] returned, in a resumed run.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if an FMU fails.
-    pub fn restore(&mut self, simulation: &mut Simulation, state: &SlowState) -> Result<(), Error> {
-        Ok(self.slow.restore(simulation, state)?)
     }
 
     fn record(&mut self, simulation: &mut Simulation, time: f64) -> Result<(), Error> {
@@ -195,21 +140,14 @@ impl Recorder {
         Ok(lock(&self.recording).row(time, &row)?)
     }
 
-    /// Writes all rows recorded so far to the file.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if the file cannot be written now or could not be written since the last call.
-    pub fn flush(&mut self) -> Result<(), Error> {
+    /// Writes all rows recorded so far to the file. Returns an error if the file cannot be written now or could not be
+    /// written since the last call.
+    pub(crate) fn flush(&mut self) -> Result<(), Error> {
         Ok(lock(&self.recording).flush()?)
     }
 
-    /// Completes the file. Does nothing after [`keep_results`].
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] if the file cannot be written now or could not be written since the last call.
-    pub fn finish(self) -> Result<(), Error> {
+    /// Completes the file, with the errors of [`Recorder::flush`]. Does nothing after [`keep_results`].
+    pub(crate) fn finish(self) -> Result<(), Error> {
         let mut recording = lock(&self.recording);
         let failed = recording.failed.take().map_or(Ok(()), Err);
         let finished = recording.sink.take().map_or(Ok(()), Sink::finish);
@@ -309,10 +247,7 @@ fn column(system: &System, port: Port) -> Column {
 /// Returns the unit of a variable, if it has one.
 #[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
-    match &system.variable(port).kind {
-        Kind::Real(real) | Kind::Float32(real) => real.unit.clone(),
-        _ => None,
-    }
+    system.variable(port).kind.as_real().and_then(|real| real.unit.clone())
 }
 
 /// Returns the variables selected by `record` and not by `exclude`; without `record`, all inputs, outputs and locals. A

@@ -142,7 +142,7 @@ impl PreparedRun {
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {
             None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
-            Some(saved) => resume(system, &plan, scenario, saved.checkpoint())?,
+            Some(saved) => resume(system, &plan, scenario, &saved.checkpoint)?,
         };
         if let Some(early) = simulation.early_end() {
             tracing::warn!("{early}");
@@ -152,9 +152,9 @@ impl PreparedRun {
         let mut recorder = recorder.inspect_err(|error| crash::note(error.sentence()))?;
         let due = saved.and_then(|saved| saved.due(plan.every));
         if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
-            recorder.restore(&mut simulation, saved.slow())?;
+            recorder.slow.restore(&mut simulation, &saved.slow)?;
             if let Some(due) = due {
-                recorder.set_due(due);
+                recorder.due = due.clone();
             }
         }
         trace.as_ref().map_or(Ok(()), BusTrace::create)?;
@@ -334,7 +334,7 @@ impl Run {
         }
         while flow.is_continue() && !self.simulation.is_finished() {
             if let Some(recorder) = &mut self.recorder {
-                recorder.before_step(&mut self.simulation)?;
+                recorder.slow.before_step(&mut self.simulation)?;
             }
             let before = self.simulation.time();
             self.simulation.step()?;
@@ -377,11 +377,11 @@ impl Run {
         let (mut due, mut slow) = (None, SlowState::default());
         if let Some(recorder) = &mut self.recorder {
             recorder.flush()?;
-            due = Some((checkpoints.every, recorder.due().clone()));
-            slow = recorder.slow_state(&mut self.simulation);
+            due = Some((checkpoints.every.to_string(), recorder.due.clone()));
+            slow = recorder.slow.state(self.simulation.system());
         }
-        let saved = SavedRun::new(&checkpoints.text, self.simulation.checkpoint()?, due, slow);
-        saved.write(&checkpoints.path)
+        let (text, checkpoint) = (checkpoints.text.clone(), self.simulation.checkpoint()?);
+        SavedRun { text, checkpoint, due, slow }.write(&checkpoints.path)
     }
 
     /// Returns the number of steps so far, and the wall-clock time of [`Run::advance`] after it has returned.

@@ -22,27 +22,16 @@ const ADVICE: &str = "resume another one, or repeat the run from its start with 
 #[derive(Serialize, Deserialize)]
 pub struct SavedRun {
     /// The complete configuration, a `system.toml` with absolute paths.
-    text: String,
-    checkpoint: Checkpoint,
+    pub(crate) text: String,
+    /// The state of the simulation.
+    pub(crate) checkpoint: Checkpoint,
     /// Interval between rows as text, and the schedule of the next rows; `None` if nothing is recorded.
-    due: Option<(String, Due)>,
-    slow: SlowState,
+    pub(crate) due: Option<(String, Due)>,
+    /// The recorded values of FMUs that step every several communication steps.
+    pub(crate) slow: SlowState,
 }
 
 impl SavedRun {
-    /// Creates a saved run from the state `checkpoint`, the configuration `text` and the state of
-    /// the recording.
-    #[must_use]
-    pub fn new(
-        text: &str,
-        checkpoint: Checkpoint,
-        due: Option<(Every, Due)>,
-        slow: SlowState,
-    ) -> Self {
-        let due = due.map(|(every, due)| (every.to_string(), due));
-        Self { text: text.to_owned(), checkpoint, due, slow }
-    }
-
     /// Writes the file atomically.
     ///
     /// # Errors
@@ -97,18 +86,6 @@ impl SavedRun {
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;
         (*text == every.to_string()).then_some(due)
-    }
-
-    /// Returns the recorded values of FMUs that step every several communication steps.
-    #[must_use]
-    pub fn slow(&self) -> &SlowState {
-        &self.slow
-    }
-
-    /// Returns the state of the simulation.
-    #[must_use]
-    pub fn checkpoint(&self) -> &Checkpoint {
-        &self.checkpoint
     }
 
     /// Returns the time reached in s.

@@ -63,8 +63,7 @@ impl Serialize for Every {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Seconds(seconds) => serializer.serialize_f64(*seconds),
-            Self::Step => serializer.serialize_str(STEP),
-            Self::Never => serializer.serialize_str(NEVER),
+            Self::Step | Self::Never => serializer.collect_str(self),
         }
     }
 }

@@ -20,12 +20,6 @@ impl<T> Default for Ordered<T> {
 }
 
 impl<T> Ordered<T> {
-    /// Whether there are no entries.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Returns the value of `name`, if there is one.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&T> {
@@ -102,12 +96,6 @@ impl fmt::Display for SettingValue {
 pub struct Settings(pub Vec<(String, SettingValue, Place)>);
 
 impl Settings {
-    /// Whether there are no settings.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Adds a setting of the command line after all others, and removes an earlier one of the same name.
     pub fn push(&mut self, name: String, value: String) {
         self.0.retain(|(known, _, _)| *known != name);

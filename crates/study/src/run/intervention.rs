@@ -70,7 +70,7 @@ impl Run {
         let resolved = scenario.resolve(self.simulation.system(), &setup)?;
         self.simulation.change_scenario(resolved.scenario)?;
         if let Some(recorder) = &mut self.recorder {
-            recorder.follow(&self.simulation);
+            self.simulation.follow(&mut recorder.readout);
         }
         self.config.scenario = scenario;
         if let Some(checkpoints) = &mut self.checkpoints {

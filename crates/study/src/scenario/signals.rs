@@ -262,23 +262,18 @@ fn column_signal(
         return Err(Reason::Column { path, name, known: first_names(&table.names) });
     };
     let (kind, description) = (&target.variable.kind, target.description);
-    let wrong = match kind {
+    let (fits, expected): (&dyn Fn(f64) -> bool, String) = match kind {
         Kind::Boolean(_) | Kind::Clock(_) => {
-            values.iter().position(|value| ![0.0, 1.0].contains(value))
+            (&|value| [0.0, 1.0].contains(&value), "0 or 1".to_owned())
         }
-        _ if target.is_real() => values.iter().position(|value| !value.is_finite()),
+        _ if target.is_real() => (&f64::is_finite, "a finite number".to_owned()),
         _ if kind.as_integer().is_some() => {
-            values.iter().position(|&value| !fits_integer(value, kind, description))
+            (&|value| fits_integer(value, kind, description), integers(kind, description))
         }
         _ => return Err(unfit("csv", target, "constant or steps")),
     };
-    if let Some(row) = wrong {
+    if let Some(row) = values.iter().position(|value| !fits(*value)) {
         let actual = format!("{} in row {} of {}", values[row], row + 1, path.display());
-        let expected = match kind {
-            Kind::Boolean(_) | Kind::Clock(_) => "0 or 1".to_owned(),
-            _ if target.is_real() => "a finite number".to_owned(),
-            _ => integers(kind, description),
-        };
         return Err(Reason::Value { name: target.name.clone(), actual, expected });
     }
     let interpolation = match kind {
