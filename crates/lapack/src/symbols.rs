@@ -18,19 +18,27 @@ fn code(answer: Result<(), i32>) -> i32 {
     answer.err().unwrap_or(0)
 }
 
-/// Defines all functions for numbers of one type.
-macro_rules! symbols {
-    (
-        $number:ty: $gemm:ident $gemv:ident $symv:ident $syrk:ident $syr2k:ident
-        $potrf:ident $potrs:ident $gesv:ident $syevr:ident $gesdd:ident $gesvd:ident
-    ) => {
-        /// C := alpha op(A) op(B) + beta C.
+/// Exports functions, each with its first line of documentation.
+macro_rules! exported {
+    ($(#[doc = $operation:literal] fn $name:ident($($argument:ident: $type:ty),* $(,)?) $body:block)*) => {$(
+        #[doc = $operation]
         ///
         /// # Safety
         ///
         /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $gemm(
+        pub unsafe extern "C" fn $name($($argument: $type),*) $body
+    )*};
+}
+
+/// Defines all functions for numbers of one type.
+macro_rules! symbols {
+    (
+        $number:ty: $gemm:ident $gemv:ident $symv:ident $syrk:ident $syr2k:ident
+        $potrf:ident $potrs:ident $gesv:ident $syevr:ident $gesdd:ident $gesvd:ident
+    ) => { exported! {
+        /// C := alpha op(A) op(B) + beta C.
+        fn $gemm(
             transa: &u8,
             transb: &u8,
             m: &i32,
@@ -54,12 +62,7 @@ macro_rules! symbols {
         }
 
         /// y := alpha op(A) x + beta y.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $gemv(
+        fn $gemv(
             trans: &u8,
             m: &i32,
             n: &i32,
@@ -80,12 +83,7 @@ macro_rules! symbols {
         }
 
         /// y := alpha A x + beta y with A symmetric.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $symv(
+        fn $symv(
             uplo: &u8,
             n: &i32,
             alpha: &$number,
@@ -105,12 +103,7 @@ macro_rules! symbols {
         }
 
         /// A triangle of C := alpha op(A) op(A)' + beta C.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $syrk(
+        fn $syrk(
             uplo: &u8,
             trans: &u8,
             n: &i32,
@@ -130,12 +123,7 @@ macro_rules! symbols {
         }
 
         /// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $syr2k(
+        fn $syr2k(
             uplo: &u8,
             trans: &u8,
             n: &i32,
@@ -158,12 +146,7 @@ macro_rules! symbols {
         }
 
         /// Replaces A by its Cholesky factor.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $potrf(
+        fn $potrf(
             uplo: &u8,
             n: &i32,
             a: *mut $number,
@@ -175,12 +158,7 @@ macro_rules! symbols {
         }
 
         /// Solves A X = B with the Cholesky factor of A.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $potrs(
+        fn $potrs(
             uplo: &u8,
             n: &i32,
             nrhs: &i32,
@@ -197,12 +175,7 @@ macro_rules! symbols {
         }
 
         /// Solves A X = B by elimination with partial pivoting.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $gesv(
+        fn $gesv(
             n: &i32,
             nrhs: &i32,
             a: *mut $number,
@@ -218,12 +191,7 @@ macro_rules! symbols {
         }
 
         /// Computes eigenvalues and eigenvectors of a symmetric A.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $syevr(
+        fn $syevr(
             jobz: &u8,
             range: &u8,
             uplo: &u8,
@@ -260,12 +228,7 @@ macro_rules! symbols {
         }
 
         /// Computes the singular value decomposition of A, with one option for both sides.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $gesdd(
+        fn $gesdd(
             jobz: &u8,
             m: &i32,
             n: &i32,
@@ -296,12 +259,7 @@ macro_rules! symbols {
         }
 
         /// Computes the singular value decomposition of A, with one option for each side.
-        ///
-        /// # Safety
-        ///
-        /// The arrays have the sizes that the reference implementation requires.
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $gesvd(
+        fn $gesvd(
             jobu: &u8,
             jobvt: &u8,
             m: &i32,
@@ -330,7 +288,7 @@ macro_rules! symbols {
             // SAFETY: the caller guarantees it.
             *info = code(unsafe { singular_values(*m, *n, matrix, &to, 3) });
         }
-    };
+    } };
 }
 
 symbols!(f64: dgemm_ dgemv_ dsymv_ dsyrk_ dsyr2k_ dpotrf_ dpotrs_ dgesv_ dsyevr_ dgesdd_ dgesvd_);
