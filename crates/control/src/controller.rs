@@ -68,23 +68,14 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     })
 }
 
-/// The system from y to the estimates of the faults: A and B of [`controller`], and C and D of `f_hat`.
+/// The system from y to the estimates of the faults: A and B of `system`, the [`controller`], and C and D of `f_hat`.
 ///
 /// ```text
 /// f_hat = ([0, I] - P_f [C_p, 0]) z + P_f y
 /// ```
 ///
 /// with the corrected z = W z + M y for a current estimator; `P_f` is zero without a direct term.
-///
-/// # Errors
-///
-/// Same as [`controller`].
-pub fn fault_estimates(
-    plant: &FaultyPlant,
-    gains: &Gains,
-    domain: Domain,
-) -> Result<StateSpace, Error> {
-    let system = controller(plant, gains, domain)?;
+fn fault_estimates(plant: &FaultyPlant, gains: &Gains, system: &StateSpace) -> StateSpace {
     let (n, q) = plant.f_a.shape();
     let mut c = DMatrix::identity(q, q).insert_columns(0, n, 0.0);
     let mut d = DMatrix::zeros(q, plant.c.nrows());
@@ -97,7 +88,7 @@ pub fn fault_estimates(
         c -= &corrected * plant.augmented_output();
         d += corrected;
     }
-    Ok(StateSpace { c, d, ..system })
+    StateSpace { c, d, ..system.clone() }
 }
 
 /// A controller from the measurements, as the sensors give them, to the commands.
@@ -133,7 +124,7 @@ pub fn complete_controller(
 ) -> Result<CompleteController, Error> {
     let system = controller(plant, gains, domain)?;
     let mut commands = filtered(&system, filter)?;
-    let mut estimates = filtered(&fault_estimates(plant, gains, domain)?, filter)?;
+    let mut estimates = filtered(&fault_estimates(plant, gains, &system), filter)?;
     if let Some(integral) = &gains.integral {
         let b = plant.b.clone().resize_vertically(system.a.nrows(), 0.0);
         let filters = commands.a.nrows() - system.a.nrows();
@@ -197,10 +188,7 @@ pub fn with_feedthrough(
     check::shape("B", &controller.b, (k, p))?;
     check::shape("C of the commands", commands, (m, k))?;
     let direct = controller.d.amax();
-    if direct > 0.0 {
-        let name = "the controller's D";
-        return Err(Error::OutOfRange { name, value: direct, rule: "zero" });
-    }
+    check::that(direct <= 0.0, "the controller's D", direct, "zero")?;
     let b_d = &controller.b * feedthrough;
     if controller.domain == Domain::Continuous {
         return Ok(StateSpace { a: &controller.a - b_d * commands, ..controller.clone() });
