@@ -191,74 +191,65 @@ mod tests {
         DMatrix::from_element(1, 1, value)
     }
 
-    /// G = 1 / (s - 1), K = -k: T = k / (s - 1 + k) has the norm k / (k - 1), K S the norm k.
-    #[test]
-    fn complementary_sensitivity_against_effort_has_the_gain_of_its_closed_form()
-    -> Result<(), Error> {
-        let domain = Domain::Continuous;
-        let plant = StateSpace { a: one(1.0), b: one(1.0), c: one(1.0), d: one(0.0), domain };
-        let controller = |parameters: &DVector<f64>| {
-            let d = one(-parameters[0]);
-            Ok(StateSpace { a: one(-1.0), b: one(0.0), c: one(0.0), d, domain })
-        };
-        let term = |transfer, weight| Term { transfer, weight: Weight::constant(weight) };
-        let tuning = Tuning {
-            plant,
-            controller: &controller,
-            references: DMatrix::zeros(0, 1),
-            terms: vec![
-                term(Transfer::Complementary(Point::Output), 1.0),
-                term(Transfer::Effort, 0.25),
-            ],
-            instability: -0.01,
-            is_allowed: &|_| true,
-            rate: 1.0,
-            is_over: &|| false,
-        };
-        let refused = tuning.tuned(&DVector::zeros(1), &DVector::zeros(2));
-        assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
-        // k / (k - 1) = k / 4.
-        let tuned = tuning.tuned(&DVector::from_element(1, 2.0), &DVector::from_element(1, 2.0))?;
-        assert!((tuned.parameters[0] - 5.0).abs() < 0.02, "{tuned:?}");
-        assert!((tuned.peak.gamma - 1.25).abs() < 5e-3, "{tuned:?}");
-        Ok(())
+    fn term(transfer: Transfer, weight: f64) -> Term {
+        Term { transfer, weight: Weight::constant(weight) }
     }
 
-    /// x+ = x / 2 + u each second, K = -k from k = 0.2: S = (z - 0.5) / (z - 0.5 + k).
-    fn sampled(terms: Vec<Term>, rate: f64) -> Result<Tuned, Error> {
-        let domain = Domain::Sampled { period: 1.0 };
+    /// The tuned k of K = -k for y' = a y + u, in sampled time for y[k+1] = a y[k] + u[k].
+    fn tuned(
+        a: f64,
+        domain: Domain,
+        terms: &[Term],
+        rate: f64,
+        [start, scales]: [DVector<f64>; 2],
+    ) -> Result<Tuned, Error> {
         let controller = |parameters: &DVector<f64>| {
-            let d = one(-parameters[0]);
-            Ok(StateSpace { a: one(0.0), b: one(0.0), c: one(0.0), d, domain })
+            let (a, d) = (one(domain.constant() - 1.0), one(-parameters[0]));
+            Ok(StateSpace { a, b: one(0.0), c: one(0.0), d, domain })
         };
         let tuning = Tuning {
-            plant: StateSpace { a: one(0.5), b: one(1.0), c: one(1.0), d: one(0.0), domain },
+            plant: StateSpace { a: one(a), b: one(1.0), c: one(1.0), d: one(0.0), domain },
             controller: &controller,
             references: DMatrix::zeros(0, 1),
-            terms,
+            terms: terms.to_vec(),
             instability: -0.01,
             is_allowed: &|_| true,
             rate,
             is_over: &|| false,
         };
-        tuning.tuned(&DVector::from_element(1, 0.2), &DVector::from_element(1, 1.0))
+        tuning.tuned(&start, &scales)
+    }
+
+    /// G = 1 / (s - 1), K = -k: T = k / (s - 1 + k) has the norm k / (k - 1), K S the norm k.
+    #[test]
+    fn complementary_sensitivity_against_effort_has_the_gain_of_its_closed_form() {
+        let terms =
+            [term(Transfer::Complementary(Point::Output), 1.0), term(Transfer::Effort, 0.25)];
+        let tuned = |start| tuned(1.0, Domain::Continuous, &terms, 1.0, start);
+        let refused = tuned([1, 2].map(DVector::zeros));
+        assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
+        // k / (k - 1) = k / 4.
+        let tuned = tuned([2.0, 2.0].map(|value| DVector::from_element(1, value))).unwrap();
+        assert!((tuned.parameters[0] - 5.0).abs() < 0.02, "{tuned:?}");
+        assert!((tuned.peak.gamma - 1.25).abs() < 5e-3, "{tuned:?}");
+    }
+
+    /// From k = 0.2 for y[k+1] = y[k] / 2 + u[k] each second: S = (z - 0.5) / (z - 0.5 + k).
+    fn sampled(terms: &[Term], rate: f64) -> Tuned {
+        let start = [0.2, 1.0].map(|value| DVector::from_element(1, value));
+        tuned(0.5, Domain::Sampled { period: 1.0 }, terms, rate, start).unwrap()
     }
 
     #[test]
-    fn without_terms_the_parameters_stay() -> Result<(), Error> {
-        let tuned = sampled(Vec::new(), 0.1)?;
-        assert_eq!(tuned.parameters, DVector::from_element(1, 0.2));
-        Ok(())
+    fn without_terms_the_parameters_stay() {
+        assert_eq!(sampled(&[], 0.1).parameters, DVector::from_element(1, 0.2));
     }
 
     /// The mean of ln |S| over the circle is zero, so that its maximum is at least 1; at the start it is 1.5 / 1.3.
     #[test]
-    fn a_bandwidth_far_above_the_sampling_rate_is_examined_at_half_of_that_rate()
-    -> Result<(), Error> {
-        let weight = Weight::constant(1.0);
-        let terms = vec![Term { transfer: Transfer::Sensitivity(Point::Output), weight }];
-        let gamma = sampled(terms, 1e8)?.peak.gamma;
+    fn a_bandwidth_far_above_the_sampling_rate_is_examined_at_half_of_that_rate() {
+        let sensitivity = term(Transfer::Sensitivity(Point::Output), 1.0);
+        let gamma = sampled(&[sensitivity], 1e8).peak.gamma;
         assert!((0.999..1.155).contains(&gamma), "{gamma}");
-        Ok(())
     }
 }

@@ -131,12 +131,8 @@ mod tests {
         for n in [1_u32, 2, 3, 8, 20, 31] {
             let size = n as usize;
             let one = Complex::from_polar(1.0, 0.01);
-            let shifted = |i: usize, j: usize| (i + 1) % size == j;
-            let m = DMatrix::from_fn(
-                size,
-                size,
-                |i, j| if shifted(i, j) { one } else { Complex::ZERO },
-            );
+            let entry = |i: usize, j| if (i + 1) % size == j { one } else { Complex::ZERO };
+            let m = DMatrix::from_fn(size, size, entry);
             let angle = |k: u32| 0.01 + TAU * f64::from(k) / f64::from(n);
             let expected = sorted((0..n).map(|k| Complex::from_polar(1.0, angle(k))).collect());
             let eigenvalues = sorted(complex_eigenvalues(&m).unwrap());
@@ -160,10 +156,8 @@ mod tests {
         let mut eigenvalues = complex_eigenvalues(&m).unwrap();
         eigenvalues.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
         assert!(eigenvalues[0].norm() < 1e-12);
-        assert!(
-            eigenvalues[1..].iter().all(|one| (one - Complex::ONE).norm() < 1e-10),
-            "{eigenvalues:?}"
-        );
+        let is_one = |value: &Complex<f64>| (value - Complex::ONE).norm() < 1e-10;
+        assert!(eigenvalues[1..].iter().all(is_one), "{eigenvalues:?}");
     }
 
     #[test]

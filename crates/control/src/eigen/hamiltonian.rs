@@ -132,19 +132,30 @@ impl Square {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::eigen::eigenvalues;
+
+    /// Numbers from -1/2 to 1/2, the same in every run.
+    pub(crate) fn random(mut seed: f64) -> impl FnMut() -> f64 {
+        move || {
+            seed = (seed * 997.0 + 0.123).fract();
+            seed - 0.5
+        }
+    }
+
+    /// Removes the number nearest to `value`; returns its distance.
+    pub(crate) fn remove_nearest(numbers: &mut Vec<Complex<f64>>, value: Complex<f64>) -> f64 {
+        let distance = |at: &usize| (numbers[*at] - value).norm();
+        let nearest = (0..numbers.len()).min_by(|x, y| distance(x).total_cmp(&distance(y)));
+        (numbers.swap_remove(nearest.unwrap()) - value).norm()
+    }
 
     #[test]
     fn the_eigenvalues_are_those_of_the_whole_matrix() {
         let sizes = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
         for n in [1, 2, 3, 7, 30] {
-            let mut seed = 1.0_f64;
-            let mut random = || {
-                seed = (seed * 997.0 + 0.123).fract();
-                seed - 0.5
-            };
+            let mut random = random(1.0);
             let a = DMatrix::from_fn(n, n, |i, j| random() * sizes[(i + 2 * j) % 9]);
             let mut symmetric = || {
                 let half = DMatrix::from_fn(n, n, |_, _| random());
@@ -156,11 +167,7 @@ mod tests {
             let mut expected = eigenvalues(&block_2x2([&a, &g], [&q, &-a.transpose()])).unwrap();
             assert_eq!(2 * roots.len(), expected.len());
             for value in roots.iter().flat_map(|value| [*value, -value]) {
-                let distance = |other: &Complex<f64>| (other - value).norm();
-                let nearest = (0..expected.len())
-                    .min_by(|x, y| distance(&expected[*x]).total_cmp(&distance(&expected[*y])))
-                    .unwrap();
-                let error = distance(&expected.swap_remove(nearest));
+                let error = remove_nearest(&mut expected, value);
                 let norm = hamiltonian.norm();
                 assert!(error < 1e-12 * norm * norm / value.norm(), "{n}: {value} {error}");
             }

@@ -65,14 +65,11 @@ impl RankOne {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eigen::hamiltonian::tests::{random, remove_nearest};
 
     #[test]
     fn the_eigenvalues_are_those_of_the_matrix_with_the_feedback() {
-        let mut seed = 0.3_f64;
-        let mut random = || {
-            seed = (seed * 997.0 + 0.123).fract();
-            seed - 0.5
-        };
+        let mut random = random(0.3);
         for n in [1, 2, 3, 8, 60] {
             let a = DMatrix::from_fn(n, n, |i, j| random() * [1.0, 50.0, 0.02][(i + 2 * j) % 3]);
             let b = DMatrix::from_fn(n, 1, |_, _| random());
@@ -83,11 +80,7 @@ mod tests {
                 // By nalgebra's Schur form.
                 let mut expected = whole.complex_eigenvalues().as_slice().to_vec();
                 for value in family.eigenvalues(gain).unwrap() {
-                    let distance = |other: &Complex<f64>| (other - value).norm();
-                    let nearest = (0..expected.len())
-                        .min_by(|x, y| distance(&expected[*x]).total_cmp(&distance(&expected[*y])))
-                        .unwrap();
-                    let error = distance(&expected.swap_remove(nearest));
+                    let error = remove_nearest(&mut expected, value);
                     assert!(error < 1e-11 * whole.norm(), "{n}, {gain}: {value} {error}");
                 }
             }

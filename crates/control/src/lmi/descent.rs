@@ -143,11 +143,8 @@ impl GainNorm<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lower_bound::tests::row;
     use super::*;
-
-    fn row(entries: &[f64]) -> DMatrix<f64> {
-        DMatrix::from_row_slice(1, entries.len(), entries)
-    }
 
     #[test]
     fn the_derivative_is_that_of_a_difference_quotient() {
@@ -156,27 +153,20 @@ mod tests {
         let (c, d) = (row(&[1.0, 0.0, 0.2]), row(&[0.0, 0.1]));
         let e = DMatrix::from_row_slice(2, 3, &[0.0, 1.0, 0.3, 0.1, 0.0, 1.0]);
         let region = Region::default();
-        let loops = GainNorm {
-            a: &a,
-            b: &b,
-            c: &c,
-            d: &d,
-            e: &e,
-            region: &region,
-            domain: Domain::Continuous,
-        };
+        let domain = Domain::Continuous;
+        let (region, [a, b, c, d, e]) = (&region, [&a, &b, &c, &d, &e]);
+        let loops = GainNorm { a, b, c, d, e, region, domain };
         let gain = DMatrix::from_row_slice(2, 1, &[2.0, 1.5]);
-        let (_, derivative) = loops.value(&gain).unwrap();
+        let (value, derivative) = loops.value(&gain).unwrap();
         for at in 0..2 {
-            let mut moved = gain.clone();
-            moved[at] += 1e-3;
-            let more = loops.value(&moved).unwrap().0;
-            moved[at] -= 2e-3;
-            let less = loops.value(&moved).unwrap().0;
-            let expected = (more - less) / 2e-3;
+            let moved = |by: f64| {
+                let mut moved = gain.clone();
+                moved[at] += by;
+                loops.value(&moved).unwrap().0
+            };
+            let expected = (moved(1e-3) - moved(-1e-3)) / 2e-3;
             assert!((derivative[at] - expected).abs() < 0.02 * derivative.norm(), "{at}");
         }
-        let lower = loops.value(&loops.descend(&gain)).unwrap().0;
-        assert!(lower < loops.value(&gain).unwrap().0);
+        assert!(loops.value(&loops.descend(&gain)).unwrap().0 < value);
     }
 }

@@ -170,12 +170,12 @@ fn slowest_rate(disc: Disc, decay: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Norm;
-    use super::super::noiseless::tests::{filtered_fault, matrix};
+    use super::super::noiseless::tests::{filtered_fault, matrix, without_noise};
+    use super::super::synthesis::strictly_proper;
     use super::*;
+    use crate::Domain;
     use crate::response::h_infinity;
     use crate::robustness::random_deviations;
-    use crate::{Domain, StateSpace};
 
     /// The gain of Ackermann's formula.
     fn placed(a: &DMatrix<f64>, c: &DMatrix<f64>, poles: &[Complex<f64>]) -> DMatrix<f64> {
@@ -198,9 +198,7 @@ mod tests {
 
     fn norm(a: DMatrix<f64>, performance: &Performance) -> f64 {
         let (b, c) = (performance.disturbance.clone(), performance.output.clone());
-        let d = DMatrix::zeros(c.nrows(), b.ncols());
-        let system = StateSpace { a, b, c, d, domain: Domain::Continuous };
-        h_infinity(&system, 1e-4).unwrap().lower
+        h_infinity(&strictly_proper(a, b, c, Domain::Continuous), 1e-4).unwrap().lower
     }
 
     /// Random eigenvalues in a disc; the nearest norm is that of eigenvalues at the far end of the disc.
@@ -220,22 +218,14 @@ mod tests {
             let least = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
             let mut nearest = f64::INFINITY;
             for case in &cases {
-                let pole = |at: usize| {
+                let pair = |at: usize| {
                     let angle = std::f64::consts::PI * (1.0 - case[at + 1].abs());
                     let size = case[at].abs().sqrt() * radius;
-                    Complex::new(center, 0.0) + Complex::from_polar(size, angle)
+                    let pole = center + Complex::from_polar(size, angle);
+                    let is_real = pole.im.abs() < 1e-9;
+                    if is_real { [pole.re.into(); 2] } else { [pole, pole.conj()] }
                 };
-                let poles: Vec<_> = [0, 2]
-                    .into_iter()
-                    .flat_map(|at| {
-                        let pole = pole(at);
-                        if pole.im.abs() < 1e-9 {
-                            [Complex::new(pole.re, 0.0); 2]
-                        } else {
-                            [pole, pole.conj()]
-                        }
-                    })
-                    .collect();
+                let poles = [pair(0), pair(2)].concat();
                 let norm = norm(&a - placed(&a, &c, &poles) * &c, &performance);
                 assert!(norm > least, "{poles:?}: {norm} {least}");
                 nearest = nearest.min(norm);
@@ -248,13 +238,8 @@ mod tests {
     #[test]
     fn with_more_measurements_than_faults_the_bound_is_that_of_the_determinant() {
         let a = matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]);
-        let performance = Performance {
-            disturbance: matrix(2, 1, &[0.0, 1.0]),
-            output: matrix(1, 2, &[0.0, 1.0]),
-            feedthrough: DMatrix::zeros(2, 1),
-            norm: Norm::HInfinity,
-            gamma: None,
-        };
+        let fault = [0.0, 1.0];
+        let performance = without_noise(matrix(2, 1, &fault), matrix(1, 2, &fault), 2);
         let c = DMatrix::identity(2, 2);
         let disc = Disc { center: -3.0, radius: 2.0 };
         let bound = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();

@@ -248,80 +248,51 @@ fn null_space(projector: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::Norm;
     use super::*;
 
-    fn row(entries: &[f64]) -> DMatrix<f64> {
+    pub(crate) fn row(entries: &[f64]) -> DMatrix<f64> {
         DMatrix::from_row_slice(1, entries.len(), entries)
     }
 
-    fn performance(b: DMatrix<f64>, e: DMatrix<f64>, d: DMatrix<f64>) -> Performance {
+    /// The error of x with x' = B w, y = x + D w.
+    pub(crate) fn scalar_error(disturbance: &[f64], feedthrough: &[f64]) -> Performance {
         Performance {
-            disturbance: b,
-            output: e,
-            feedthrough: d,
+            disturbance: row(disturbance),
+            output: row(&[1.0]),
+            feedthrough: row(feedthrough),
             norm: Norm::HInfinity,
             gamma: None,
         }
     }
 
+    fn scalar_bound(a: f64, performance: &Performance, domain: Domain) -> Option<f64> {
+        observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), performance, domain).unwrap()
+    }
+
     /// For x' = a x + w, y = x + v, z = x: 0 = 2 a X - (1 - `1/gamma^2`) X^2 + 1 has a positive stabilising
-    /// solution for `gamma^2` above 1 / (1 + a^2).
+    /// solution for `gamma^2` above 1 / (1 + a^2); for an unstable mode, a > 0, X is positive for `gamma^2` above 1.
+    /// X = a^2 / (1 / X + 1 - `1/gamma^2`) + 1 of x[k+1] = a x[k] + w[k] has a solution with X below `gamma^2` for
+    /// `gamma^2` above a^2 + 1.
     #[test]
     fn the_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
-        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
-        for a in [-20.0_f64, -1.0, 0.0] {
-            let outcome = observer_norm_lower_bound(
-                &row(&[a]),
-                &row(&[1.0]),
-                &performance,
-                Domain::Continuous,
-            );
-            let least = 1.0 / (1.0 + a * a).sqrt();
-            let bound = outcome.unwrap().unwrap();
-            assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
-        }
-    }
-
-    /// An unstable mode: `gamma^2` must make X of 0 = 2 a X - (1 - `1/gamma^2`) X^2 + 1 positive; gamma = 1.
-    #[test]
-    fn the_bound_with_an_unstable_mode_is_above_that_at_each_frequency() {
-        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
-        let outcome =
-            observer_norm_lower_bound(&row(&[3.0]), &row(&[1.0]), &performance, Domain::Continuous);
-        let bound = outcome.unwrap().unwrap();
-        assert!(bound <= 1.0 && bound > 0.9999, "{bound}");
-    }
-
-    /// X = a^2 / (1 / X + 1 - `1/gamma^2`) + 1 of x[k+1] = a x[k] + w[k], y = x + v, z = x has a solution with X below
-    /// `gamma^2` for `gamma^2` above a^2 + 1.
-    #[test]
-    fn the_sampled_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
-        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
-        for a in [0.5_f64, -1.0, 1.0, 2.0] {
-            let domain = Domain::Sampled { period: 1.0 };
-            let outcome = observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &performance, domain);
-            let least = (1.0 + a * a).sqrt();
-            let bound = outcome.unwrap().unwrap();
-            assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
+        let performance = scalar_error(&[1.0, 0.0], &[0.0, 1.0]);
+        let stable = [-20.0_f64, -1.0, 0.0].map(|a| (a, Domain::Continuous, 1.0 / a.hypot(1.0)));
+        let sampled = Domain::Sampled { period: 1.0 };
+        let sampled = [0.5_f64, -1.0, 1.0, 2.0].map(|a| (a, sampled, a.hypot(1.0)));
+        let unstable = (3.0, Domain::Continuous, 1.0);
+        for (a, domain, least) in stable.into_iter().chain(sampled).chain([unstable]) {
+            let bound = scalar_bound(a, &performance, domain).unwrap();
+            assert!(bound <= least && bound > 0.9999 * least, "{a} {domain:?}: {bound}, {least}");
         }
     }
 
     #[test]
-    fn a_measurement_without_noise_has_no_bound() {
-        let performance = performance(row(&[1.0]), row(&[1.0]), row(&[0.0]));
-        let outcome =
-            observer_norm_lower_bound(&row(&[0.0]), &row(&[1.0]), &performance, Domain::Continuous);
-        assert_eq!(outcome.unwrap(), None);
-    }
-
-    #[test]
-    fn a_disturbance_that_the_measurement_shows_completely_has_no_bound() {
-        let one = || row(&[1.0]);
-        let performance = performance(one(), one(), one());
-        let domain = Domain::Continuous;
-        let outcome = observer_norm_lower_bound(&row(&[-1.0]), &one(), &performance, domain);
-        assert_eq!(outcome, Ok(None));
+    fn measurements_without_noise_or_that_show_the_disturbance_completely_have_no_bound() {
+        for (a, feedthrough) in [(0.0, 0.0), (-1.0, 1.0)] {
+            let performance = scalar_error(&[1.0], &[feedthrough]);
+            assert_eq!(scalar_bound(a, &performance, Domain::Continuous), None);
+        }
     }
 }

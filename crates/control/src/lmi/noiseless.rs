@@ -204,18 +204,22 @@ pub(super) mod tests {
         DMatrix::from_row_slice(rows, columns, entries)
     }
 
+    /// The requirement for x' = B w, z = E x with measurements without noise.
+    pub(crate) fn without_noise(
+        disturbance: DMatrix<f64>,
+        output: DMatrix<f64>,
+        measurements: usize,
+    ) -> Performance {
+        let feedthrough = DMatrix::zeros(measurements, disturbance.ncols());
+        Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma: None }
+    }
+
     /// A, C and the performance for a fault f' = w that is measured as y = (c0 + c1 s + c2 s^2) / (s + 1)^3 f.
     pub(crate) fn filtered_fault(numerator: [f64; 3]) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
         let [c0, c1, c2] = numerator;
         let a = [0., 1., 0., 0., 0., 0., 1., 0., -1., -3., -3., 1., 0., 0., 0., 0.];
         let fault = |rows, columns| matrix(rows, columns, &[0., 0., 0., 1.]);
-        let performance = Performance {
-            disturbance: fault(4, 1),
-            output: fault(1, 4),
-            feedthrough: DMatrix::zeros(1, 1),
-            norm: Norm::HInfinity,
-            gamma: None,
-        };
+        let performance = without_noise(fault(4, 1), fault(1, 4), 1);
         (matrix(4, 4, &a), matrix(1, 4, &[c0, c1, c2, 0.0]), performance)
     }
 
@@ -278,13 +282,7 @@ pub(super) mod tests {
         a[(0, 0)] = 1.0;
         (1..n).for_each(|row| a[(row, row - 1)] = 1.0);
         let unit = |at: usize| DMatrix::from_fn(n, 1, |row, _| f64::from(u8::from(row == at)));
-        let performance = Performance {
-            disturbance: unit(0),
-            output: unit(0).transpose(),
-            feedthrough: DMatrix::zeros(1, 1),
-            norm: Norm::HInfinity,
-            gamma: None,
-        };
+        let performance = without_noise(unit(0), unit(0).transpose(), 1);
         let domain = Domain::Sampled { period: 0.1 };
         let c = unit(n - 1).transpose();
         noiseless_norm_lower_bound(&a, &c, &performance, domain).unwrap().unwrap()

@@ -234,24 +234,15 @@ fn kalman_gain(norm: &GainNorm<'_>, n: usize) -> Option<DMatrix<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lower_bound::tests::{row, scalar_error};
     use super::*;
-    use crate::lmi::{Norm, observer_norm_lower_bound};
+    use crate::lmi::observer_norm_lower_bound;
     use crate::response::h_infinity;
     use crate::weight::{Weight, diagonal};
 
-    fn row(entries: &[f64]) -> DMatrix<f64> {
-        DMatrix::from_row_slice(1, entries.len(), entries)
-    }
-
-    /// x' = w, y = x + v with weights: a fault seen through noise.
-    fn fault_through_noise() -> Performance {
-        Performance {
-            disturbance: row(&[1.0, 0.0]),
-            output: row(&[1.0]),
-            feedthrough: row(&[0.0, 1.0]),
-            norm: Norm::HInfinity,
-            gamma: None,
-        }
+    /// x' = step w, y = x + v: a fault seen through noise.
+    fn fault_through_noise(step: f64) -> Performance {
+        scalar_error(&[step, 0.0], &[0.0, 1.0])
     }
 
     fn weights(noise: &Weight, output: &Weight, domain: Domain) -> ChannelWeights {
@@ -262,27 +253,17 @@ mod tests {
     /// The norm of the scalar loop for every gain on a grid: the search is near the least one.
     #[test]
     fn the_weighted_gain_of_a_scalar_observer_is_near_the_best_of_a_search_over_all_gains() {
-        for domain in [Domain::Continuous, Domain::Sampled { period: 0.1 }] {
+        for (domain, a, step) in
+            [(Domain::Continuous, 0.0, 1.0), (Domain::Sampled { period: 0.1 }, 1.0, 0.1)]
+        {
             let noise = Weight::lead_lag(0.1, 3.0, 10.0, 1).unwrap();
             let error = Weight::lead_lag(20.0, 0.3, 0.2, 2).unwrap();
             let weights = weights(&noise, &error, domain);
-            let mut performance = fault_through_noise();
-            let a = match domain {
-                Domain::Continuous => row(&[0.0]),
-                Domain::Sampled { .. } => row(&[1.0]),
-            };
-            if domain != Domain::Continuous {
-                performance.disturbance *= 0.1;
-            }
-            let c = row(&[1.0]);
+            let performance = fault_through_noise(step);
+            let (a, c) = (row(&[a]), row(&[1.0]));
             let norm = |gain: f64| {
-                let closed = StateSpace {
-                    a: &a - row(&[gain]),
-                    b: &performance.disturbance - &performance.feedthrough * gain,
-                    c: row(&[1.0]),
-                    d: DMatrix::zeros(1, 2),
-                    domain,
-                };
+                let b = &performance.disturbance - &performance.feedthrough * gain;
+                let closed = strictly_proper(&a - row(&[gain]), b, row(&[1.0]), domain);
                 h_infinity(&weights.around(&closed), 1e-4).map_or(f64::INFINITY, |norm| norm.upper)
             };
             let best = (0..400).map(|k| norm(1e-3 * 1.03_f64.powi(k))).fold(f64::MAX, f64::min);
@@ -304,7 +285,7 @@ mod tests {
     fn weights_without_states_are_factors_of_the_norm() {
         let domain = Domain::Continuous;
         let weights = weights(&Weight::constant(2.0), &Weight::constant(3.0), domain);
-        let performance = Performance { gamma: Some(9.0), ..fault_through_noise() };
+        let performance = Performance { gamma: Some(9.0), ..fault_through_noise(1.0) };
         let region = Region { decay: Some(1.0), ..Region::default() };
         let (a, c) = (row(&[0.0]), row(&[1.0]));
         let outcome = weights.observer_gain(&a, &c, &region, &performance, domain);

@@ -282,10 +282,10 @@ mod tests {
         for a in [0.0, 0.5, -1.0, 1.0, 2.0_f64] {
             let (filter, least) = (scalar(a, SAMPLED), (1.0 + a * a).sqrt());
             for gain in [filter.gain(1.001 * least).unwrap(), filter.iterate(1.05 * least)] {
-                let gain = gain.unwrap();
+                let gain = gain.unwrap()[0];
                 let error = StateSpace {
-                    a: row(&[a - gain[(0, 0)]]),
-                    b: row(&[1.0, -gain[(0, 0)]]),
+                    a: row(&[a - gain]),
+                    b: row(&[1.0, -gain]),
                     c: row(&[1.0]),
                     d: row(&[0.0, 0.0]),
                     domain: SAMPLED,

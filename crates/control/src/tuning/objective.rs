@@ -216,22 +216,18 @@ fn largest(x: &ComplexMatrix) -> Option<(f64, ComplexMatrix, ComplexMatrix)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blocks::beside;
     use crate::tuning::Term;
     use crate::weight::Weight;
 
     /// A controller of second order for two channels and a reference, whose entries are the parameters.
     fn controller(parameters: &DVector<f64>, domain: Domain) -> StateSpace {
         let part = |at: usize| DMatrix::from_row_slice(2, 2, &parameters.as_slice()[at..at + 4]);
-        let with = |m: DMatrix<f64>, at: usize| {
-            let column = [parameters[at], parameters[at + 1]];
-            m.insert_columns(2, 1, 0.0)
-                + DMatrix::from_columns(&[
-                    DVector::zeros(2),
-                    DVector::zeros(2),
-                    DVector::from_column_slice(&column),
-                ])
+        let with = |at: usize, column: usize| {
+            let column = &parameters.as_slice()[column..column + 2];
+            beside(&part(at), &DMatrix::from_column_slice(2, 1, column))
         };
-        StateSpace { a: part(0), b: with(part(4), 16), c: part(8), d: with(part(12), 18), domain }
+        StateSpace { a: part(0), b: with(4, 16), c: part(8), d: with(12, 18), domain }
     }
 
     #[test]
@@ -257,24 +253,20 @@ mod tests {
             ];
             let weight = Weight::lead_lag(2.0, 1.0, 0.5, 1)?;
             let term = |transfer| Term { transfer, weight: weight.clone() };
-            let terms = transfers.map(term).to_vec();
-            let (rate, is_over) = (1.0, &|| false);
-            let references = DMatrix::from_row_slice(1, 2, &[0.8, -0.3]);
             let tuning = Tuning {
                 plant,
                 controller: &build,
-                references,
-                terms,
+                references: DMatrix::from_row_slice(1, 2, &[0.8, -0.3]),
+                terms: transfers.map(term).to_vec(),
                 instability: 0.0,
                 is_allowed: &|_| true,
-                rate,
-                is_over,
+                rate: 1.0,
+                is_over: &|| false,
             };
             let grid = Grid::new(&tuning)?;
-            let start = [pole, 0.1, 0.2, pole / 2.0, 0.4, -0.3, 0.2, 0.5, 0.1, 0.3, -0.2, 0.4];
-            let mut start = start.to_vec();
-            start.extend([-0.1, 0.2, 0.05, -0.15, 0.3, 0.2, -0.1, 0.4]);
-            let start = DVector::from_vec(start);
+            let first = [pole, 0.1, 0.2, pole / 2.0, 0.4, -0.3, 0.2, 0.5, 0.1, 0.3, -0.2, 0.4];
+            let rest = [-0.1, 0.2, 0.05, -0.15, 0.3, 0.2, -0.1, 0.4];
+            let start = DVector::from_vec([first.as_slice(), &rest].concat());
             let moved = |at: usize, by: f64| {
                 let mut parameters = start.clone();
                 parameters[at] += by;
@@ -291,17 +283,15 @@ mod tests {
             let differences: Vec<_> = (0..start.len()).map(slope).collect();
             let nominal = controller(&start, domain);
             let values = |k: &StateSpace| grid.values(k).ok_or(Error::Overflow { what: "S" });
+            let node = 80;
             for term in 0..transfers.len() {
-                let node = 80;
                 let place = Place { term, node };
                 let Cut { value, gradient } =
                     grid.gradient(&nominal, &differences, place).expect("a gradient");
                 assert!((value - values(&nominal)?[term][node]).abs() < 1e-8 * value);
                 for at in 0..start.len() {
-                    let step = 1e-5;
-                    let above = values(&moved(at, step))?[term][node];
-                    let below = values(&moved(at, -step))?[term][node];
-                    let expected = (above - below) / (2.0 * step);
+                    let after = |by: f64| Ok::<_, Error>(values(&moved(at, by))?[term][node]);
+                    let expected = (after(1e-5)? - after(-1e-5)?) / 2e-5;
                     let error = (gradient[at] - expected).abs();
                     assert!(error < 1e-6 * (1.0 + expected.abs()), "{term} {at}: {error}");
                 }
