@@ -176,11 +176,8 @@ impl Equation {
         Ok(Solution { p, residual, defect })
     }
 
-    /// Computes P for a stable A and a symmetric Q, without a check of the arguments or of the residual.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`] when the Schur form is not found; [`Error::Overflow`].
+    /// Computes P for a stable A and a symmetric Q, without a check of the arguments or of the residual;
+    /// [`Error::NotConverged`] when the Schur form is not found, [`Error::Overflow`].
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Balance { matrix, scale } = Balance::new(a);
         let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);

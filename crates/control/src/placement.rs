@@ -224,11 +224,7 @@ impl PlacementProblem<'_> {
     }
 
     /// Assigns the eigenvalues by the chosen eigenvectors, by those of the standard methods and, with
-    /// [`Extent::Alternatives`], by others.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`place`].
+    /// [`Extent::Alternatives`], by others, with the errors of [`place`].
     pub(crate) fn alternatives(
         &self,
         coordinates: &Coordinates<'_>,

@@ -32,11 +32,7 @@ pub(crate) struct Svd {
 }
 
 impl Svd {
-    /// Decomposes `m`.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`] after 60 sweeps; also for entries that are not finite.
+    /// Decomposes `m`; [`Error::NotConverged`] after 60 sweeps, and for entries that are not finite.
     pub(crate) fn new(m: &DMatrix<f64>) -> Result<Self, Error> {
         let cols = m.ncols();
         let unit = power_of_two(m.amax());

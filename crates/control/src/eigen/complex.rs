@@ -18,11 +18,8 @@ const PATIENCE: usize = 20;
 /// rounding of its norm. Symmetries of the matrix, and clusters of eigenvalues beside larger entries, do not stop it.
 ///
 /// Source: J. H. Wilkinson, The algebraic eigenvalue problem (1965), chapter 8; exceptional shifts: LAPACK's
-/// `zlahqr`.
-///
-/// # Errors
-///
-/// [`Error::NotConverged`] after 120 sweeps for one eigenvalue; also for entries that are not finite.
+/// `zlahqr`. The error is [`Error::NotConverged`], after 120 sweeps for one eigenvalue and for entries that are not
+/// finite.
 pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
     let n = m.nrows();
     let failed = || Error::NotConverged { what: QR_ALGORITHM, iterations: SWEEPS };

@@ -45,11 +45,7 @@ impl RankOne {
         Self { hessenberg, row: row * q * image }
     }
 
-    /// The eigenvalues of A + g b c, in no particular order.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`eigenvalues`].
+    /// The eigenvalues of A + g b c, in no particular order, with the errors of [`eigenvalues`].
     pub(crate) fn eigenvalues(&self, gain: f64) -> Result<Vec<Complex<f64>>, Error> {
         let mut matrix = self.hessenberg.clone();
         let added = &self.row * gain;

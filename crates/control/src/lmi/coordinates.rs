@@ -31,10 +31,7 @@ impl Coordinates {
     /// Coordinates in which the norm of A - c I is little more than its spectral radius: in balanced
     /// coordinates T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
     /// eigenvalues, s 1.2 times the largest distance from it, at least 0.1 |c|, and the norm of A if
-    /// all eigenvalues are zero. The unit is near |c| + s. None if rounding errors hide that P > 0.
-    ///
-    /// # Errors
-    ///
+    /// all eigenvalues are zero. The unit is near |c| + s. None if rounding errors hide that P > 0;
     /// [`Error::NotConverged`] when eigenvalues are not found.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
@@ -59,11 +56,7 @@ impl Coordinates {
     /// eigenvalues are at a distance [`speed`] from the eigenvalues of A: T'T is the sum of (C
     /// `M^k`)' (C `M^k`), k from 0 to n - 1, with M = (A - c I) / speed, c the mean of the
     /// eigenvalues of A. Weakly observable directions are stretched by at most 1e11. The unit of frequency is the speed
-    /// in continuous time, 1 in sampled time.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`].
+    /// in continuous time, 1 in sampled time. The error is [`Error::NotConverged`].
     pub(super) fn of_observation(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,

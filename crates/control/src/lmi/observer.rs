@@ -1,15 +1,7 @@
 //! The semidefinite program for an observer gain, and the coordinates in which it is solved.
 //!
-//! The inequalities for A - L C contain the product P L of two unknowns. With Z = P L they are
-//! linear:
-//!
-//! ```text
-//! P (A - L C) = P A - Z C,  P (B - L D_y) = P B - Z D_y,  L = P^-1 Z
-//! ```
-//!
-//! Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
-//! approach, IEEE Trans. Autom. Control 41 (1996), section IV, for the dual problem of state
-//! feedback.
+//! The inequalities of [`super::observer_gain`] contain the product P L of two unknowns; they are linear in P and
+//! Z = P L.
 
 use super::affine::Affine;
 use super::coordinates::{Coordinates, row_units, unit_near};

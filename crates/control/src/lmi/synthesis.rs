@@ -40,8 +40,9 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// [`certify_gain`], each with a P of its own. Conflicts name the requirements "decay", "disc",
 /// "sector" ("stability" when no region is given) and "gain".
 ///
-/// Source: M. Chilali and P. Gahinet (1996), section IV; M. Chilali, P. Gahinet, P. Apkarian,
-/// Robust pole placement in LMI regions, IEEE Trans. Autom. Control 44 (1999).
+/// Source: M. Chilali and P. Gahinet (1996, see [`certify_region`]), section IV, for the dual problem of state
+/// feedback; M. Chilali, P. Gahinet, P. Apkarian, Robust pole placement in LMI regions, IEEE Trans. Autom. Control 44
+/// (1999).
 ///
 /// # Example
 ///

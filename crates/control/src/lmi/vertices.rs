@@ -129,11 +129,7 @@ pub fn certify_common(
 
 /// The certificate of [`certify_common`], searched in the coordinates of the mean of the vertices and of the first one
 /// only, without a search for a contradiction. None if a vertex has an eigenvalue outside of the region, or if neither
-/// search succeeds, although a P may exist. There must be a vertex.
-///
-/// # Errors
-///
-/// Same as [`certify_common`], whose checks of the arguments it leaves out.
+/// search succeeds, although a P may exist. There must be a vertex; the arguments are not checked.
 pub(crate) fn find_common(
     vertices: &[DMatrix<f64>],
     region: &Region,

@@ -17,9 +17,7 @@ const DEPENDENT: f64 = 1e-14;
 /// K V = G alone loses as many digits of the eigenvalues as the condition number of V has. Here one
 /// eigenvalue, or pair, after the other is assigned in the part of the state space that is normal
 /// to the eigenvectors before it, so that in the orthonormal basis of these parts A + B K is block
-/// triangular to a few rounding errors of its norm: the deflation of G. S. Miminis and C. C.
-/// Paige, A direct algorithm for pole assignment of time-invariant multi-input linear systems using
-/// state feedback, Automatica 24 (1988).
+/// triangular to a few rounding errors of its norm: the deflation of Miminis and Paige, see [`super::place`].
 pub(crate) fn gain(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -27,9 +27,8 @@ struct Point {
 /// Minimises a function from the starting point zero; returns the point and its value (infinite if
 /// the function is undefined at zero). `tolerance`: decrease in ten iterations at which it ends.
 ///
-/// BFGS with a line search by bisection for the weak Wolfe conditions: A. S. Lewis and M. L.
-/// Overton, Nonsmooth optimization via quasi-Newton methods, Math. Program. 141 (2013), algorithms
-/// 2.1, 2.6.
+/// BFGS with a line search by bisection for the weak Wolfe conditions: Lewis and Overton (see [`super::place`]),
+/// algorithms 2.1, 2.6.
 pub(crate) fn minimise(
     function: &dyn Fn(&DVector<f64>) -> Evaluation,
     dimension: usize,

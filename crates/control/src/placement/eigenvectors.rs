@@ -77,7 +77,7 @@ fn start_directions(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<
 }
 
 /// Replaces each eigenvector, or pair, in turn by the one that spans the largest volume with the
-/// others, in 20 sweeps; ends early if the eigenvectors become dependent.
+/// others, in 20 sweeps from a start; ends early if the eigenvectors become dependent.
 ///
 /// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
 /// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the

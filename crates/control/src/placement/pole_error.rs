@@ -13,11 +13,8 @@ use nalgebra::{Complex, DMatrix};
 const ALLOWED: f64 = 1e-2;
 
 impl PlacementProblem<'_> {
-    /// The largest relative error, with requested and assigned eigenvalues paired, nearest first.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::PolesMissed`] if it is above 1e-2; [`Error::NotConverged`].
+    /// The largest relative error, with requested and assigned eigenvalues paired, nearest first;
+    /// [`Error::PolesMissed`] if it is above 1e-2, [`Error::NotConverged`] if eigenvalues are not found.
     pub(super) fn pole_error(&self, gain: &DMatrix<f64>) -> Result<f64, Error> {
         let mut assigned = eigenvalues(&(self.a + self.b * gain))?;
         let mut requested: Vec<_> = self.poles.iter().copied().zip(self.references()).collect();

@@ -25,10 +25,7 @@ const EIGEN_ITERATIONS: usize = 1000;
 ///
 /// Both methods enlarge the determinant of the eigenvectors of length one; the first changes one of them at a
 /// time, the second two. The result depends on the start. It is scipy's, for each eigenvalue the sum of the basis
-/// of its subspace from Householder reflections, so that the results are scipy's up to rounding.
-///
-/// # Errors
-///
+/// of its subspace from Householder reflections, so that the results are scipy's up to rounding. The error is
 /// [`Error::NotConverged`].
 ///
 /// Sources: see [`super::place`]; the start: scipy 1.17, `scipy.signal.place_poles`.

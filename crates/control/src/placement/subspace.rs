@@ -38,10 +38,7 @@ pub(crate) struct AssignableSubspace {
 }
 
 impl AssignableSubspaces {
-    /// Computes the subspaces for `a`, n x n, and `b`, n x r of rank r, a controllable pair.
-    ///
-    /// # Errors
-    ///
+    /// Computes the subspaces for `a`, n x n, and `b`, n x r of rank r, a controllable pair; the error is
     /// [`Error::NotConverged`].
     pub(crate) fn new(
         a: &DMatrix<f64>,

@@ -13,11 +13,7 @@ const METHOD: &str = "structured doubling";
 /// positive semidefinite.
 ///
 /// After k steps `h` is the solution over 2^k samples of the finite horizon. For an indefinite G the caller checks
-/// whether P is the solution that it needs.
-///
-/// # Errors
-///
-/// [`Error::NotConverged`].
+/// whether P is the solution that it needs. The error is [`Error::NotConverged`].
 pub(super) fn sampled(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,
@@ -48,11 +44,8 @@ pub(super) fn sampled(
 ///
 /// The Cayley transform with gamma maps an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
 /// (s - gamma). With gamma the geometric mean of the smallest modulus above zero and the largest one,
-/// both converge equally fast.
-///
-/// # Errors
-///
-/// [`Error::NotConverged`]; [`Error::NotFinite`] if the Hamiltonian matrix is not finite.
+/// both converge equally fast. The errors are [`Error::NotConverged`], and [`Error::NotFinite`] if the
+/// Hamiltonian matrix is not finite.
 pub(super) fn continuous(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,

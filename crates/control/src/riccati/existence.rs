@@ -16,11 +16,8 @@ const NEAR: f64 = 1e-12;
 /// appear in Q: about the root of the residual of P.
 const MOVED: f64 = 1e-4;
 
-/// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q.
-///
-/// # Errors
-///
-/// [`Error::NotStabilisable`] with the eigenvalue; [`Error::Unweighted`] with the point of the limit;
+/// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q; otherwise
+/// [`Error::NotStabilisable`] with the eigenvalue, [`Error::Unweighted`] with the point of the limit, or
 /// [`Error::NotConverged`].
 pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
     let (a, b, domain) = (&problem.decoupled_a, &problem.equation.b, problem.equation.domain);
@@ -36,14 +33,10 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
 }
 
 /// Checks that the modes at the eigenvalues of A + B K appear in Q if these are so near to the stability limit that
-/// rounding errors may have moved them from there.
+/// rounding errors may have moved them from there; otherwise [`Error::Unweighted`] or [`Error::NotConverged`].
 ///
 /// Rounding splits a multiple eigenvalue of A, so that [`require`] may miss a mode on the limit. A + B K keeps it as a
 /// simple eigenvalue if it does not appear in Q.
-///
-/// # Errors
-///
-/// [`Error::Unweighted`]; [`Error::NotConverged`].
 pub(super) fn require_closed(
     problem: &ScaledProblem,
     closed: &[Complex<f64>],

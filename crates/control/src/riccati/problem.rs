@@ -31,13 +31,8 @@ pub(super) struct ScaledProblem {
 }
 
 impl ScaledProblem {
-    /// Checks the matrices and scales the problem.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::NotSymmetric`] for a bad matrix;
-    /// [`Error::NotPositiveDefinite`] for R; [`Error::NotPositiveSemidefinite`] for Q - N R^-1 N';
-    /// [`Error::Overflow`]; [`Error::NotConverged`].
+    /// Checks the matrices and scales the problem, with the errors of [`super::lqr`] for bad matrices and weights,
+    /// [`Error::Overflow`] and [`Error::NotConverged`].
     pub(super) fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
@@ -77,11 +72,7 @@ impl ScaledProblem {
     ///
     /// Doubling computes the least semidefinite solution, which does not stabilise an unstable mode
     /// that does not appear in Q. With Q + d I every mode appears, and Newton's method converges
-    /// from there to the stabilising solution.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`], [`Error::NotFinite`] when doubling fails for Q + d I, too.
+    /// from there to the stabilising solution. The errors are those of doubling for Q + d I.
     pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
         let effect = symmetric_part(&(&self.equation.b * self.equation.b.transpose()));
         let solve = |q: &DMatrix<f64>| match self.equation.domain {
@@ -99,12 +90,8 @@ impl ScaledProblem {
     }
 
     /// Applies Newton's method until its step or the residual is within rounding errors; returns the P of the
-    /// smallest residual.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotConverged`] if the method ends before that, after 60 steps or because a step cannot be computed,
-    /// and the residual is not allowed either.
+    /// smallest residual. [`Error::NotConverged`] if the method ends before that, after 60 steps or because a step
+    /// cannot be computed, and the residual is not allowed either.
     pub(super) fn refine(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let (mut best, mut residual) = (start.clone(), self.equation.entrywise_residual(start));
         let mut p = start.clone();

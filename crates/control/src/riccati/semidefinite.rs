@@ -7,12 +7,9 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// A negative eigenvalue of the scaled weight counts as rounding up to this size, times the number of states.
 const SEMIDEFINITE: f64 = 1e-13;
 
-/// Checks that `m`, Q - N R^-1 N', is positive semidefinite up to rounding. `q` is the weight Q, whose diagonal
-/// gives the size of the rounding errors.
-///
-/// # Errors
-///
-/// [`Error::NotPositiveSemidefinite`]; [`Error::NotConverged`] when eigenvalues are not found.
+/// Checks that `m`, Q - N R^-1 N', is positive semidefinite up to rounding; otherwise
+/// [`Error::NotPositiveSemidefinite`], or [`Error::NotConverged`] when eigenvalues are not found. `q` is the weight Q,
+/// whose diagonal gives the size of the rounding errors.
 pub(super) fn require_semidefinite(m: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<(), Error> {
     let n = m.nrows();
     let indefinite = Error::NotPositiveSemidefinite { matrix: "Q - N R^-1 N'" };

@@ -79,7 +79,7 @@ fn closed_loop(
     Ok(a_e + b_e * k)
 }
 
-/// Same as [`integral_feedforward`], for a controllable (A, B).
+/// Same as [`integral_feedforward`], for a controllable (A, B), `controlled` = `A_e` + `B_e` K and t integrals.
 fn of_controllable(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
