@@ -107,8 +107,7 @@ pub fn tracking_rank(
 
 /// Checks A, B and H C; returns the numbers of states, commands and references.
 fn sizes(a: &DMatrix<f64>, b: &DMatrix<f64>, output: &DMatrix<f64>) -> Result<[usize; 3], Error> {
-    let (n, m, t) = (check::square("A", a)?, b.ncols(), output.nrows());
-    check::shape("B", b, (n, m))?;
+    let (n, m, t) = (check::with_inputs(a, b)?, b.ncols(), output.nrows());
     check::shape("H C", output, (t, n))?;
     Ok([n, m, t])
 }
@@ -248,9 +247,7 @@ pub fn reference_system(
     action: &Action<'_>,
     domain: Domain,
 ) -> Result<StateSpace, Error> {
-    let n = check::square("A", a)?;
-    let m = b.ncols();
-    check::shape("B", b, (n, m))?;
+    let (n, m) = (check::with_inputs(a, b)?, b.ncols());
     check::shape("K_x", k_x, (m, n))?;
     let (a_e, b_e, k, entry, direct) = match action {
         Action::Integral { output, gain, feedforward } => {

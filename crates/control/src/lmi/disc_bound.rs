@@ -2,10 +2,10 @@
 
 use super::noiseless::{ROUNDING, check_observer};
 use super::{Disc, Performance};
-use crate::Error;
 use crate::check::as_number;
 use crate::svd::Svd;
 use crate::zeros::{Zeros, zeros};
+use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// The points s > 0 at which det H is considered: `POINTS` on each side of 1 / (least Re(-1 / s) of the region),
@@ -63,10 +63,8 @@ pub fn disc_norm_lower_bound(
     let Performance { disturbance: b, output: e, feedthrough, .. } = performance;
     let Disc { center, radius } = disc;
     let reach = radius - center;
-    if !(reach > 0.0 && radius > 0.0 && reach.is_finite()) {
-        let rule = "a disc that reaches the left half plane";
-        return Err(Error::OutOfRange { name: "the radius", value: radius, rule });
-    }
+    let reaches = reach > 0.0 && radius > 0.0 && reach.is_finite();
+    check::that(reaches, "the radius", radius, "a disc that reaches the left half plane")?;
     let product = e * b;
     let sizes = Svd::new(&product)?.values;
     let size = e.norm() * b.norm();

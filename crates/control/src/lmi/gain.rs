@@ -6,7 +6,7 @@ use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Outcome, Problem};
 use crate::stability::instability;
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// Levels, relative to the smallest, that are tried in turn when the P of the smallest cannot be
@@ -230,11 +230,9 @@ impl GainScaling {
 /// for a D other than zero where the norm is infinite, and for a bad period; [`Error::NotConverged`].
 pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound>, Error> {
     system.check()?;
-    let value = system.d.amax();
-    if system.domain == Domain::Continuous && norm != Norm::HInfinity && value > 0.0 {
-        let rule = "zero: the norm is infinite otherwise";
-        return Err(Error::OutOfRange { name: "D", value, rule });
-    }
+    let direct = system.d.amax();
+    let is_finite = system.domain != Domain::Continuous || norm == Norm::HInfinity || direct <= 0.0;
+    check::that(is_finite, "D", direct, "zero: the norm is infinite otherwise")?;
     if instability(&system.a, system.domain)? >= 0.0 {
         return Ok(Outcome::Infeasible { conflict: vec!["stability"] });
     }

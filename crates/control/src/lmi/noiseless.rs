@@ -116,8 +116,7 @@ pub(super) fn check_observer(
     c: &DMatrix<f64>,
     performance: &Performance,
 ) -> Result<(usize, usize, usize), Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
+    let n = check::with_outputs(a, c)?;
     let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
     performance.check(n, (c.nrows(), k))?;
     Ok((n, k, r))

@@ -68,22 +68,16 @@ impl Region {
         }
         if let Some(Disc { center, radius }) = self.disc {
             check::positive("disc radius", radius)?;
-            if !center.is_finite() {
-                let rule = "a finite number";
-                return Err(Error::OutOfRange { name: "disc center", value: center, rule });
-            }
+            check::that(center.is_finite(), "disc center", center, "a finite number")?;
         }
         domain.check()?;
-        let Some(value) = self.sector else { return Ok(()) };
+        let Some(angle) = self.sector else { return Ok(()) };
         let rule = match domain {
             Domain::Continuous => "an angle between 0 and pi/2",
             Domain::Sampled { .. } => "no sector in sampled time, but a disc",
         };
-        let sensible = value > 0.0 && value < std::f64::consts::FRAC_PI_2;
-        if sensible && domain == Domain::Continuous {
-            return Ok(());
-        }
-        Err(Error::OutOfRange { name: "sector", value, rule })
+        let is_in_range = angle > 0.0 && angle < std::f64::consts::FRAC_PI_2;
+        check::that(is_in_range && domain == Domain::Continuous, "sector", angle, rule)
     }
 
     /// The parts with the names by which a conflict reports them, with frequencies divided by `unit`.

@@ -75,13 +75,11 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
     });
     let singular = Error::Overflow { what: "the basis of Bernstein polynomials" };
     let inverse = basis.try_inverse().ok_or(singular)?;
-    let coefficient = |j: usize| match j {
-        0 => first.clone(),
-        j if j == degree => values[degree].clone(),
-        j => values
-            .iter()
-            .enumerate()
-            .fold(first * 0.0, |sum, (at, value)| sum + value * inverse[(j, at)]),
+    let coefficient = |j: usize| {
+        if j == 0 || j == degree {
+            return values[j].clone();
+        }
+        (0..=degree).fold(first * 0.0, |sum, at| sum + &values[at] * inverse[(j, at)])
     };
     Ok((0..=degree).map(coefficient).collect())
 }
@@ -138,10 +136,8 @@ pub fn certify_schedule(
     let shortest = check_intervals(intervals)?;
     domain.check()?;
     check::positive("change", change)?;
-    if domain != Domain::Continuous && change > shortest {
-        let rule = "at most the length of the shortest interval";
-        return Err(Error::OutOfRange { name: "change", value: change, rule });
-    }
+    let is_in_range = domain == Domain::Continuous || change <= shortest;
+    check::that(is_in_range, "change", change, "at most the length of the shortest interval")?;
     let Some(mut coordinates) = Coordinates::of_dynamics(&intervals[0].coefficients[0])? else {
         return Ok(None);
     };

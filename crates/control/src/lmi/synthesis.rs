@@ -75,8 +75,7 @@ pub fn observer_gain(
     performance: Option<&Performance>,
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
+    let n = check::with_outputs(a, c)?;
     region.check(domain)?;
     if let Some(performance) = performance {
         performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
@@ -117,8 +116,7 @@ pub fn state_feedback(
     performance: Option<&Performance>,
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
+    let n = check::with_inputs(a, b)?;
     region.check(domain)?;
     if let Some(performance) = performance {
         performance.check(n, (performance.output.nrows(), b.ncols()))?;

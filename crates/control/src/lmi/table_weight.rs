@@ -54,17 +54,14 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
         check::positive("frequency", frequency)?;
         check::positive("magnitude", magnitude)?;
     }
-    if let Some(pair) = table.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
-        let rule = "above the frequency before it";
-        return Err(Error::OutOfRange { name: "frequency", value: pair[1].0, rule });
+    for pair in table.windows(2) {
+        let (before, frequency) = (pair[0].0, pair[1].0);
+        check::that(frequency > before, "frequency", frequency, "above the frequency before it")?;
     }
     let [(first, _), .., (last, _)] = table else {
         return Err(Error::Empty { matrix: "table", actual: (table.len(), 2) });
     };
-    if !(1..=2).contains(&order) {
-        let value = as_number(order);
-        return Err(Error::OutOfRange { name: "order", value, rule: "1 or 2" });
-    }
+    check::that((1..=2).contains(&order), "order", as_number(order), "1 or 2")?;
     let unit = (first * last).sqrt();
     let points = interpolated(table);
     let size = (points.iter().map(|(_, m)| m.ln()).sum::<f64>() / as_number(points.len())).exp();

@@ -153,10 +153,7 @@ pub(crate) fn find_common(
 
 /// The order of the first matrix of a family, which must be square; [`Error::Empty`] if there is none.
 pub(super) fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
-    match first {
-        Some(a) => check::square("A", a),
-        None => Err(Error::Empty { matrix: "A", actual: (0, 0) }),
-    }
+    check::square("A", first.ok_or(Error::Empty { matrix: "A", actual: (0, 0) })?)
 }
 
 /// The members that contradict each other, each of them necessary, the first ones if there is a choice;

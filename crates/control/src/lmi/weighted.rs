@@ -16,8 +16,6 @@ const LOOSE: f64 = 1.01;
 /// Of the gains with a norm up to this factor above the least one, the smallest gain is chosen.
 const NEARLY_LEAST: f64 = 1.05;
 
-const NOT_KEPT: &str = "no gain that keeps the bound was found";
-
 /// Weights of a norm from w to z: the norm is that of `output` G `input`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelWeights {
@@ -122,8 +120,7 @@ impl ChannelWeights {
         performance: &Performance,
         domain: Domain,
     ) -> Result<Outcome<Synthesis>, Error> {
-        let n = check::square("A", a)?;
-        check::shape("C", c, (c.nrows(), n))?;
+        let n = check::with_outputs(a, c)?;
         region.check(domain)?;
         performance.check(n, (c.nrows(), performance.disturbance.ncols()))?;
         let free = Performance { gamma: None, ..performance.clone() };
@@ -165,7 +162,7 @@ impl ChannelWeights {
             return Ok(by_norm);
         };
         if performance.gamma.is_some_and(|gamma| reached > gamma) {
-            return Ok(Outcome::Inconclusive(NOT_KEPT));
+            return Ok(Outcome::Inconclusive("no gain that keeps the bound was found"));
         }
         let b = &performance.disturbance - &synthesis.gain * &performance.feedthrough;
         let closed =

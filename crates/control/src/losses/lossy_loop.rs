@@ -175,11 +175,10 @@ impl LossyLoop {
     fn check(&self, largest: &[f64]) -> Result<(), Error> {
         check::column("the largest losses", largest, self.effects.len())?;
         let rule = "from zero to one, above zero for at least one input";
-        let bad = largest.iter().copied().find(|loss| !(0.0..=1.0).contains(loss));
-        match bad.or_else(|| largest.iter().all(|loss| *loss <= 0.0).then_some(0.0)) {
-            Some(value) => Err(Error::OutOfRange { name: "the largest loss", value, rule }),
-            None => Ok(()),
+        for &loss in largest {
+            check::that((0.0..=1.0).contains(&loss), "the largest loss", loss, rule)?;
         }
+        check::that(largest.iter().any(|loss| *loss > 0.0), "the largest loss", 0.0, rule)
     }
 }
 

@@ -67,8 +67,7 @@ pub fn kalman(
     v: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<KalmanFilter, Error> {
-    let (n, p) = (check::square("A", a)?, c.nrows());
-    check::shape("C", c, (p, n))?;
+    let (n, p) = (check::with_outputs(a, c)?, c.nrows());
     check::shape("W", w, (n, n))?;
     check::shape("V", v, (p, p))?;
     let weights = Weights { q: w.clone(), r: v.clone(), n: None };

@@ -88,8 +88,7 @@ impl NormFilter {
     /// measurement has no noise; otherwise same as [`kalman`].
     pub fn new(problem: &NormFilterProblem<'_>, domain: Domain) -> Result<Self, Error> {
         let NormFilterProblem { a, c, disturbance: b, feedthrough: d, output } = *problem;
-        let (n, p, k) = (check::square("A", a)?, c.nrows(), b.ncols());
-        check::shape("C", c, (p, n))?;
+        let (n, p, k) = (check::with_outputs(a, c)?, c.nrows(), b.ncols());
         check::shape("B", b, (n, k))?;
         check::shape("D", d, (p, k))?;
         check::shape("E", output, (output.nrows(), n))?;

@@ -39,8 +39,7 @@ impl ScaledProblem {
         weights: &Weights,
         domain: Domain,
     ) -> Result<Self, Error> {
-        let (order, inputs) = (check::square("A", a)?, b.ncols());
-        check::shape("B", b, (order, inputs))?;
+        let (order, inputs) = (check::with_inputs(a, b)?, b.ncols());
         check::shape("Q", &weights.q, (order, order))?;
         check::shape("R", &weights.r, (inputs, inputs))?;
         lyapunov::symmetric("Q", &weights.q)?;
