@@ -55,6 +55,7 @@ pub use gain::{GainBound, Norm, certify_gain};
 pub use limit::{Ending, ending, until};
 pub use lower_bound::{feedback_norm_lower_bound, observer_norm_lower_bound};
 pub use noiseless::noiseless_norm_lower_bound;
+pub(crate) use observer::norm_below;
 pub use problem::Problem;
 pub use reachable::{ReachableSet, common_reachable_set};
 pub use region::{Disc, Region, RegionCertificate, certify_region};

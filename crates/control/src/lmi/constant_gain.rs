@@ -1,7 +1,6 @@
 //! A constant gain for a family of systems.
 
-use super::observer::norm_below;
-use super::{Affine, Problem};
+use super::{Affine, Problem, norm_below};
 use crate::blocks::to_complex;
 use crate::response::{frequency_response, h_infinity};
 use crate::{Domain, Error, StateSpace, check};
@@ -127,21 +126,19 @@ fn minimum(
     let units: Vec<f64> =
         (0..r).map(|row| if length(row) > 0.0 { length(row) } else { 1.0 }).collect();
     let mut problem = Problem::new();
-    let level = problem.scalar();
+    let level = problem.level(None);
     let mut gain = Affine::zeros(s, r);
     for row in 0..s {
         for column in 0..r {
-            let fixed = fixed.iter().find(|entry| (entry.0, entry.1) == (row, column));
             let mut entry = DMatrix::zeros(s, r);
             entry[(row, column)] = 1.0;
-            let value = match fixed {
+            let value = match fixed.iter().find(|entry| (entry.0, entry.1) == (row, column)) {
                 Some(&(_, _, value)) => Affine::constant(&(entry * value)),
                 None => problem.scalar().times(&(entry / units[column])),
             };
             gain = &gain + &value;
         }
     }
-    problem.minimise(&level);
     for g in points {
         let real = &(&gain * &g.map(|entry| entry.re)) - &Affine::constant(target);
         let imaginary = &gain * &g.map(|entry| entry.im);

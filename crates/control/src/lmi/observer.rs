@@ -24,7 +24,6 @@ pub(super) const REFINEMENTS: usize = 3;
 const LARGEST: f64 = 1e6;
 
 const OUT_OF_RANGE: &str = "a gain exists, but none could be proven in double precision";
-const NOT_DEFINITE: &str = "P is not positive definite in double precision";
 
 /// A gain that the solver found, not yet proven, and coordinates in which its P is the identity.
 pub(super) struct Candidate {
@@ -146,7 +145,7 @@ impl Program {
             let (p, z) = (solution.value(&self.p), solution.value(&self.z));
             let parts = p.clone().cholesky().zip(coordinates.refined(&p));
             let Some((factor, refined)) = parts else {
-                return Ok(Outcome::Inconclusive(NOT_DEFINITE));
+                return Ok(Outcome::Inconclusive("P is not positive definite in double precision"));
             };
             let gain = coordinates.gain(&divide_columns(&factor.solve(&z), units));
             Ok(Outcome::Optimal(Candidate { gain, coordinates: refined }))
@@ -289,7 +288,7 @@ impl<'a> ObserverProgram<'a> {
 }
 
 /// [t I, Z; Z', t I], which is positive semidefinite if and only if the norm of Z is at most t.
-pub(super) fn norm_below(z: &Affine, t: &Affine) -> Affine {
+pub(crate) fn norm_below(z: &Affine, t: &Affine) -> Affine {
     let (rows, cols) = z.shape();
     let t_identity = |order: usize| t.times(&DMatrix::identity(order, order));
     Affine::blocks(&[&[&t_identity(rows), z], &[&z.transpose(), &t_identity(cols)]])

@@ -155,7 +155,7 @@ impl Problem {
     }
 
     /// A known number; for None an unknown that is minimised. Of one row and column.
-    pub(super) fn level(&mut self, value: Option<f64>) -> Affine {
+    pub(crate) fn level(&mut self, value: Option<f64>) -> Affine {
         if let Some(value) = value {
             return Affine::identity(1, value);
         }

@@ -170,18 +170,18 @@ struct Reachability {
 impl Reachability {
     /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for it.
     fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
-        let spread = &self.b * self.b.transpose();
-        let (equation, shifted, part) = match self.domain {
+        let (n, part) = (a.nrows(), self.part());
+        let (equation, shifted) = match self.domain {
             Domain::Continuous => {
-                let shift = DMatrix::from_diagonal_element(a.nrows(), a.nrows(), 0.5 * self.rate);
-                (&CONTINUOUS, a + shift, self.rate)
+                (&CONTINUOUS, a + DMatrix::from_diagonal_element(n, n, 0.5 * self.rate))
             }
-            Domain::Sampled { .. } => (&DISCRETE, a / (1.0 - self.part()).sqrt(), self.part()),
+            Domain::Sampled { .. } => (&DISCRETE, a / (1.0 - part).sqrt()),
         };
         if instability(&shifted, self.domain)? >= 0.0 {
             return Ok(None);
         }
-        equation.solve(&shifted.transpose(), &(spread / part)).map(Some)
+        let spread = &self.b * self.b.transpose() / part;
+        equation.solve(&shifted.transpose(), &spread).map(Some)
     }
 
     /// 1 - exp(-lambda period); lambda in continuous time.

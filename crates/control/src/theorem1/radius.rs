@@ -2,7 +2,7 @@
 
 use super::{ENLARGEMENTS, check_system};
 use crate::lmi::definite::{AccurateProduct, margin};
-use crate::lmi::{Affine, Outcome, Problem};
+use crate::lmi::{Affine, Outcome, Problem, norm_below};
 use crate::lyapunov::lyapunov;
 use crate::stability::instability;
 use crate::svd::norm_2;
@@ -116,16 +116,9 @@ fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64
             scaled_y = &scaled_y + &y.times(&unit(row, col));
         }
     }
-    let t = problem.scalar();
-    let t_identity = |order: usize| t.times(&DMatrix::identity(order, order));
-    let (rows, cols) = of_identity.shape();
     problem.constrain(&scaled_y, 0.0);
-    let norm_below_t = Affine::blocks(&[
-        &[&t_identity(rows), &scaled_p_g],
-        &[&scaled_p_g.transpose(), &t_identity(cols)],
-    ]);
-    problem.constrain(&norm_below_t, 0.0);
-    problem.minimise(&t);
+    let t = problem.level(None);
+    problem.constrain(&norm_below(&scaled_p_g, &t), 0.0);
     let Some((_, unknowns)) = problem.minimum() else { return Ok(None) };
     let scaled_y = scaled_y.evaluate(&unknowns);
     Ok(Some(DMatrix::from_fn(n, n, |i, j| {
