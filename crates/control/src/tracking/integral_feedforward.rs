@@ -1,6 +1,7 @@
 //! The feedforward of references beside integral action.
 
 use super::{extended_pair, integration, require_residual};
+use crate::blocks::beside;
 use crate::eigen::eigenvalues;
 use crate::rank::controllable_part;
 use crate::svd::Svd;
@@ -55,15 +56,13 @@ pub fn integral_feedforward(
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
     let controlled = closed_loop(a, b, output, k, domain)?;
     crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
-    let part = controllable_part(a, b)?;
+    let (n, t, part) = (a.nrows(), output.nrows(), controllable_part(a, b)?);
     if part.fixed.is_empty() {
-        return of_controllable(a, b, output, k, domain);
+        return of_controllable(&controlled, b, t, domain);
     }
-    let (n, t, order) = (a.nrows(), output.nrows(), part.a.nrows());
-    let mut gain = DMatrix::zeros(b.ncols(), order + t);
-    gain.columns_mut(0, order).copy_from(&(k.columns(0, n) * &part.basis));
-    gain.columns_mut(order, t).copy_from(&k.columns(n, t));
-    of_controllable(&part.a, &part.b, &(output * &part.basis), &gain, domain)
+    let gain = beside(&(k.columns(0, n) * &part.basis), &k.columns(n, t).into());
+    let controlled = closed_loop(&part.a, &part.b, &(output * &part.basis), &gain, domain)?;
+    of_controllable(&controlled, &part.b, t, domain)
 }
 
 /// `A_e` + `B_e` K.
@@ -81,24 +80,22 @@ fn closed_loop(
 
 /// Same as [`integral_feedforward`], for a controllable (A, B), `controlled` = `A_e` + `B_e` K and t integrals.
 fn of_controllable(
-    a: &DMatrix<f64>,
+    controlled: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    output: &DMatrix<f64>,
-    k: &DMatrix<f64>,
+    t: usize,
     domain: Domain,
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let controlled = closed_loop(a, b, output, k, domain)?;
-    let (n, t) = (a.nrows(), output.nrows());
-    let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
+    let n = b.nrows();
+    let Some(silent) = slowest(&eigenvalues(controlled)?, t, domain) else {
         return Ok(Err(
             "the slowest eigenvalues of the feedback, one for each integral, end with half of a complex \
              pair; expected a real eigenvalue slower than this pair, or as slow",
         ));
     };
-    let w = left_invariant(&controlled, &silent)?;
-    let dynamics = w.transpose() * &controlled * &w;
+    let w = left_invariant(controlled, &silent)?;
+    let dynamics = w.transpose() * controlled * &w;
     let residual =
-        (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
+        (w.transpose() * controlled - &dynamics * w.transpose()).norm() / controlled.norm();
     require_residual("W' (A_e + B_e K) = S W'", residual, 1e-8)?;
     let input = w.rows(0, n).transpose() * b;
     let svd = Svd::new(&input.transpose())?;
@@ -124,17 +121,11 @@ fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<
     upper.sort_by(|x, y| {
         domain.excess(*y).total_cmp(&domain.excess(*x)).then(x.im.total_cmp(&y.im))
     });
-    let mut slow = Vec::new();
-    for value in upper {
-        if slow.len() >= count {
-            break;
-        }
-        slow.push(value);
-        if value.im > 0.0 {
-            slow.push(value.conj());
-        }
-    }
-    (slow.len() == count).then_some(slow)
+    let with_conjugate =
+        |value: Complex<f64>| std::iter::once(value).chain((value.im > 0.0).then(|| value.conj()));
+    let slow: Vec<_> = upper.into_iter().flat_map(with_conjugate).take(count).collect();
+    let ends_with_half_a_pair = slow.last().is_some_and(|last| last.im > 0.0);
+    (slow.len() == count && !ends_with_half_a_pair).then_some(slow)
 }
 
 /// An orthonormal basis W of the left invariant subspace of `a` for the eigenvalues `values`, which contain both

@@ -36,22 +36,18 @@ impl LossyLoop {
         self.check(largest)?;
         let prove = |factor: f64| {
             let scaled: Vec<f64> = largest.iter().map(|loss| loss * factor).collect();
-            find_common(&self.corners(&scaled), &Region::default(), self.domain)
+            let certificate = find_common(&self.corners(&scaled), &Region::default(), self.domain)?;
+            Ok::<_, Error>(certificate.is_some().then_some(CertifiedLoss { factor, certificate }))
         };
-        let (mut low, mut high) = (CertifiedLoss { factor: 0.0, certificate: None }, most);
-        if let Some(certificate) = prove(most)? {
-            return Ok(CertifiedLoss { factor: most, certificate: Some(certificate) });
+        if let Some(whole) = prove(most)? {
+            return Ok(whole);
         }
-        while high - low.factor > WIDTH * high {
+        let (mut low, mut high) = (CertifiedLoss { factor: 0.0, certificate: None }, most);
+        while high - low.factor > WIDTH * high && high >= WIDTH * most {
             let middle = 0.5 * (low.factor + high);
             match prove(middle)? {
-                Some(certificate) => {
-                    low = CertifiedLoss { factor: middle, certificate: Some(certificate) };
-                }
+                Some(proven) => low = proven,
                 None => high = middle,
-            }
-            if high < WIDTH * most {
-                break;
             }
         }
         Ok(low)
