@@ -6,6 +6,7 @@
 
 use crate::Error;
 use crate::balance::power_of_two;
+use crate::check::as_number;
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Largest number of sweeps; 5 to 10 are usual.
@@ -161,18 +162,14 @@ fn rotation(m: &DMatrix<f64>, first: usize, second: usize, negligible: f64) -> O
         return Some((0.0, -1.0));
     }
     let cosine = a.dot(&b) / (length_a * length_b);
-    if cosine.abs() <= f64::EPSILON * rounding_growth(m.nrows()) {
-        return if length_b > length_a { Some((0.0, -1.0)) } else { None };
+    // The rounding error of a dot product grows with its length.
+    if cosine.abs() <= f64::EPSILON * as_number(m.nrows().max(4)) {
+        return (length_b > length_a).then_some((0.0, -1.0));
     }
     let zeta = (length_b / length_a - length_a / length_b) / (2.0 * cosine);
     let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
     let c = 1.0 / tangent.hypot(1.0);
     Some((c, c * tangent))
-}
-
-/// The rounding error of a dot product of this length, in units of rounding: the length, at least 4.
-fn rounding_growth(length: usize) -> f64 {
-    f64::from(u32::try_from(length.max(4)).unwrap_or(u32::MAX))
 }
 
 /// Replaces columns a and b by c a - s b and s a + c b.

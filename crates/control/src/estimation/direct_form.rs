@@ -172,9 +172,5 @@ fn scaled_rank(c: &DMatrix<f64>, f_a: &DMatrix<f64>) -> Result<usize, Error> {
 
 /// Orthonormal rows that span the left null space of a matrix of rank `rank`.
 fn left_null_space(m: &DMatrix<f64>, rank: usize) -> Result<DMatrix<f64>, Error> {
-    let rows = m.nrows();
-    if rank == rows {
-        return Ok(DMatrix::zeros(0, rows));
-    }
-    Ok(Svd::new(&m.transpose())?.right.columns(rank, rows - rank).transpose())
+    Ok(Svd::new(&m.transpose())?.right.columns(rank, m.nrows() - rank).transpose())
 }

@@ -27,7 +27,7 @@ pub(crate) type Directions = Vec<DVector<f64>>;
 /// The directions of largest volume from each of several fixed starts.
 pub(crate) fn widest_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
-    (0..starts).map(|start| enlarge_volume(problem, start_directions(problem, start))).collect()
+    (0..starts).map(|start| enlarge_volume(problem, start)).collect()
 }
 
 /// The directions of largest volume from further starts; none above the order `LARGEST_DESCENT`, and none with one
@@ -35,7 +35,7 @@ pub(crate) fn widest_directions(problem: &AssignableSubspaces) -> Result<Vec<Dir
 pub(crate) fn more_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let small = problem.scale.len() <= LARGEST_DESCENT && problem.inputs() > 1;
     let further = if small { STARTS..2 * STARTS } else { 0..0 };
-    further.map(|start| enlarge_volume(problem, start_directions(problem, start))).collect()
+    further.map(|start| enlarge_volume(problem, start)).collect()
 }
 
 /// The directions of least condition number that descents from the first three `starts` find; above the order
@@ -65,7 +65,7 @@ pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
 }
 
 /// Quasi-random directions: the fractional parts of 1000 sqrt(k), another range of k for each start.
-fn start_directions(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
+fn start_directions(problem: &AssignableSubspaces, start: usize) -> Directions {
     let count = problem.scale.len() * problem.inputs();
     let mut seed = (2 + start * count..).map(|k| (1000.0 * as_number(k).sqrt()).fract() - 0.5);
     let mut direction = |space: &AssignableSubspace| {
@@ -82,12 +82,9 @@ fn start_directions(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<
 /// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
 /// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the
 /// others a volume in proportion to v1' (p q' - q p') v2 with two vectors p, q normal to them,
-/// greatest at an eigenvector of a symmetric matrix: A. L. Tits and Y. Yang, Globally convergent
-/// algorithms for robust pole assignment by state feedback, IEEE Trans. Autom. Control 41 (1996).
-fn enlarge_volume(
-    problem: &AssignableSubspaces,
-    mut directions: Vec<DVector<f64>>,
-) -> Result<Vec<DVector<f64>>, Error> {
+/// greatest at an eigenvector of a symmetric matrix: Tits and Yang. Sources: see [`super::place`].
+fn enlarge_volume(problem: &AssignableSubspaces, start: usize) -> Result<Directions, Error> {
+    let mut directions = start_directions(problem, start);
     for _ in 0..SWEEPS {
         let mut column = 0;
         for (number, space) in problem.spaces.iter().enumerate() {

@@ -202,17 +202,15 @@ impl Iteration {
 
     /// The directions of the eigenvectors, in the order of the spaces of the problem.
     fn directions(&self, problem: &AssignableSubspaces) -> Directions {
-        let mut ordered: Vec<Vec<DVector<f64>>> = vec![vec![]; self.order.len()];
-        let mut column = 0;
+        let mut columns = vec![0..0; self.order.len()];
+        let mut first = 0;
         for &number in &self.order {
-            ordered[number].push(self.vectors.column(column).into());
-            if problem.spaces[number].poles.count() == 2 {
-                ordered[number].push(self.vectors.column(column + 1).into());
-            }
-            column += problem.spaces[number].poles.count();
+            let next = first + problem.spaces[number].poles.count();
+            columns[number] = first..next;
+            first = next;
         }
-        let columns: Vec<_> = ordered.into_iter().flatten().collect();
-        problem.directions_of(&DMatrix::from_columns(&columns))
+        let columns: Vec<_> = columns.into_iter().flatten().collect();
+        problem.directions_of(&self.vectors.select_columns(&columns))
     }
 }
 
