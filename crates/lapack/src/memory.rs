@@ -104,48 +104,52 @@ impl Layout {
     }
 }
 
-/// A vector of `length` entries at distances of `increment`; a negative one runs backwards.
-#[derive(Clone, Copy)]
-pub(crate) struct Vector {
+/// A vector argument with its option INC: `length` entries at distances of `increment`; a negative one runs backwards.
+pub(crate) struct Vector<P> {
+    data: P,
     length: usize,
     increment: i32,
 }
 
-impl Vector {
+impl<P> Vector<P> {
     /// None when the length is negative or the increment zero.
-    pub(crate) fn new(length: i32, increment: i32) -> Option<Self> {
+    pub(crate) fn new(data: P, length: i32, increment: i32) -> Option<Self> {
         let length = usize::try_from(length).ok()?;
-        (increment != 0).then_some(Self { length, increment })
+        (increment != 0).then_some(Self { data, length, increment })
     }
 
     /// The distance of entry `at`, from 0, from the pointer of the vector, in entries.
-    fn offset(self, at: usize) -> usize {
+    fn offset(&self, at: usize) -> usize {
         let step = self.increment.unsigned_abs() as usize;
         if self.increment < 0 { (self.length - 1 - at) * step } else { at * step }
     }
+}
 
+impl<T: Number> Vector<*const T> {
     /// Reads the vector as a column.
     ///
     /// # Safety
     ///
-    /// `from` is valid for reads of the entries.
-    pub(crate) unsafe fn read<T: Number>(self, from: *const T) -> DMatrix<f64> {
+    /// The pointer is valid for reads of the entries.
+    pub(crate) unsafe fn read(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.length, 1, |at, _| {
             // SAFETY: the entry belongs to the vector, see above.
-            unsafe { from.add(self.offset(at)).read() }.wide()
+            unsafe { self.data.add(self.offset(at)).read() }.wide()
         })
     }
+}
 
+impl<T: Number> Vector<*mut T> {
     /// y := `product` + beta y; with beta = 0 y is not read.
     ///
     /// # Safety
     ///
-    /// `y` is valid for reads and writes of the entries; `product` is a column of them.
-    pub(crate) unsafe fn update<T: Number>(self, y: *mut T, product: &DMatrix<f64>, beta: T) {
+    /// The pointer is valid for reads and writes of the entries; `product` is a column of them.
+    pub(crate) unsafe fn update(&self, product: &DMatrix<f64>, beta: T) {
         for (at, &value) in product.iter().enumerate() {
             // SAFETY: the entry belongs to the vector, see above.
             unsafe {
-                let entry = y.add(self.offset(at));
+                let entry = self.data.add(self.offset(at));
                 let before =
                     if beta.wide() == 0.0 { 0.0 } else { beta.wide() * entry.read().wide() };
                 entry.write(T::narrow(value + before));

@@ -120,32 +120,16 @@ pub(crate) struct Symmetric<T> {
     pub(crate) n: i32,
 }
 
-/// A vector argument with its option INC.
-pub(crate) struct VectorOperand<T> {
-    pub(crate) data: *const T,
-    pub(crate) increment: i32,
-}
-
-/// The output vector y and the two factors.
-pub(crate) struct VectorTarget<T> {
-    pub(crate) data: *mut T,
-    pub(crate) increment: i32,
-    pub(crate) alpha: T,
-    pub(crate) beta: T,
-}
-
 /// y := alpha op(A) x + beta y; None, with y unchanged, if an argument is illegal.
 pub(crate) unsafe fn matrix_vector<T: Number>(
     a: &Operand<T>,
-    x: &VectorOperand<T>,
-    y: &VectorTarget<T>,
+    x: Option<Vector<*const T>>,
+    y: Option<Vector<*mut T>>,
+    [alpha, beta]: [T; 2],
 ) -> Option<()> {
-    let (input, output) = (Vector::new(a.cols, x.increment)?, Vector::new(a.rows, y.increment)?);
+    let (x, y) = x.zip(y)?;
     // SAFETY: the caller guarantees it.
-    unsafe {
-        let product = a.read()? * input.read(x.data);
-        output.update(y.data, &(product * y.alpha.wide()), y.beta);
-    }
+    unsafe { y.update(&(a.read()? * x.read() * alpha.wide()), beta) };
     Some(())
 }
 
@@ -153,17 +137,18 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
 /// an argument is illegal.
 pub(crate) unsafe fn symmetric_vector<T: Number>(
     a: &Symmetric<T>,
-    x: &VectorOperand<T>,
-    y: &VectorTarget<T>,
+    x: Option<Vector<*const T>>,
+    y: Option<Vector<*mut T>>,
+    [alpha, beta]: [T; 2],
 ) -> Option<()> {
     let (part, layout) = (Part::triangle(a.triangle)?, Layout::new(a.n, a.n, a.leading)?);
-    let (input, output) = (Vector::new(a.n, x.increment)?, Vector::new(a.n, y.increment)?);
+    let (x, y) = x.zip(y)?;
     // SAFETY: the caller guarantees it.
     unsafe {
         let half = layout.read(a.data, part);
         let mut whole = &half + half.transpose();
         whole.set_diagonal(&half.diagonal());
-        output.update(y.data, &(whole * input.read(x.data) * y.alpha.wide()), y.beta);
+        y.update(&(whole * x.read() * alpha.wide()), beta);
     }
     Some(())
 }

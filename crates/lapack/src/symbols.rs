@@ -4,10 +4,9 @@
 //! workspace query returns the size 1.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
-use crate::memory::{Number, Part};
+use crate::memory::{Number, Part, Vector};
 use crate::products::{
-    Operand, Symmetric, Target, VectorOperand, VectorTarget, general, matrix_vector, rank_2k,
-    rank_k, symmetric_vector,
+    Operand, Symmetric, Target, general, matrix_vector, rank_2k, rank_k, symmetric_vector,
 };
 use crate::routines::{
     Array, Factors, Spectrum, Vectors, gesv, potrf, potrs, singular_values, syevr,
@@ -76,10 +75,10 @@ macro_rules! symbols {
             incy: &i32,
         ) {
             let matrix = Operand::of_array(a, *lda, *trans, *m, *n);
-            let vector = VectorOperand { data: x, increment: *incx };
-            let target = VectorTarget { data: y, increment: *incy, alpha: *alpha, beta: *beta };
+            let input = Vector::new(x, matrix.cols, *incx);
+            let output = Vector::new(y, matrix.rows, *incy);
             // SAFETY: the caller guarantees it.
-            unsafe { matrix_vector(&matrix, &vector, &target) };
+            unsafe { matrix_vector(&matrix, input, output, [*alpha, *beta]) };
         }
 
         /// y := alpha A x + beta y with A symmetric.
@@ -96,10 +95,9 @@ macro_rules! symbols {
             incy: &i32,
         ) {
             let matrix = Symmetric { data: a, leading: *lda, triangle: *uplo, n: *n };
-            let vector = VectorOperand { data: x, increment: *incx };
-            let target = VectorTarget { data: y, increment: *incy, alpha: *alpha, beta: *beta };
+            let (input, output) = (Vector::new(x, *n, *incx), Vector::new(y, *n, *incy));
             // SAFETY: the caller guarantees it.
-            unsafe { symmetric_vector(&matrix, &vector, &target) };
+            unsafe { symmetric_vector(&matrix, input, output, [*alpha, *beta]) };
         }
 
         /// A triangle of C := alpha op(A) op(A)' + beta C.
