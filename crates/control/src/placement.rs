@@ -18,9 +18,10 @@ use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
 use crate::rank::require_controllable;
 use crate::svd::Svd;
 use crate::{Error, check};
-use alternatives::most_alternatives;
 use compromise::Search;
-use eigenvectors::{Directions, best_conditioned, condition, more_directions, widest_directions};
+use eigenvectors::{
+    Directions, LARGEST_DESCENT, best_conditioned, condition, more_directions, widest_directions,
+};
 use figures::FeedbackLoop;
 use nalgebra::{Complex, DMatrix, DVector};
 use pole_block::pole_blocks;
@@ -33,6 +34,8 @@ const DEPENDENT_INPUTS: f64 = 1e-13;
 /// The eigenvalue error of an alternative is at most `LESS_EXACT` times that of the chosen gain, or at most `EXACT`.
 const LESS_EXACT: f64 = 10.0;
 const EXACT: f64 = 1e-9;
+/// Largest number of alternatives above the order [`LARGEST_DESCENT`].
+const MOST_OF_LARGE: usize = 2;
 
 /// A state feedback u = K x with assigned eigenvalues.
 #[derive(Debug, Clone, PartialEq)]
@@ -280,7 +283,8 @@ impl PlacementProblem<'_> {
             (None, None) => placement(&assignable, &directions, gain)?,
         };
         let allowed = (LESS_EXACT * chosen.quality.pole_error).max(EXACT);
-        let others = others.iter().take(most_alternatives(n)).filter_map(|directions| {
+        let most = if n <= LARGEST_DESCENT { usize::MAX } else { MOST_OF_LARGE };
+        let others = others.iter().take(most).filter_map(|directions| {
             let gain = assignable.gain(directions).ok()?;
             let other = placement(&assignable, directions, gain).ok()?;
             (other.quality.pole_error <= allowed).then_some(other)

@@ -142,13 +142,11 @@ pub fn certify_schedule(
         return Ok(None);
     };
     coordinates.unit = time_unit(domain, coordinates.unit);
-    let scaled_intervals: Vec<_> = intervals
-        .iter()
-        .map(|Interval { length, coefficients }| Interval {
-            length: *length,
-            coefficients: coefficients.iter().map(|a| coordinates.dynamics(a)).collect(),
-        })
-        .collect();
+    let scaled = |interval: &Interval| {
+        let coefficients = interval.coefficients.iter().map(|a| coordinates.dynamics(a)).collect();
+        Interval { coefficients, ..*interval }
+    };
+    let scaled_intervals: Vec<_> = intervals.iter().map(scaled).collect();
     let n = intervals[0].coefficients[0].nrows();
     let mut problem = Problem::new();
     let p: Vec<_> = (0..=intervals.len()).map(|_| problem.symmetric(n)).collect();

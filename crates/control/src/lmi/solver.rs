@@ -101,7 +101,14 @@ impl Program {
     fn solve(&self, ending: Option<Ending>) -> Option<(DVector<f64>, End)> {
         let Self { left, right, costs, cones } = self;
         let quadratic = CscMatrix::zeros((costs.len(), costs.len()));
-        let solver = DefaultSolver::new(&quadratic, costs, left, right, cones, settings());
+        let settings = DefaultSettings {
+            verbose: false,
+            max_threads: 1,
+            direct_solve_method: "qdldl".to_owned(),
+            chordal_decomposition_enable: false,
+            ..DefaultSettings::default()
+        };
+        let solver = DefaultSolver::new(&quadratic, costs, left, right, cones, settings);
         let mut solver = solver.ok()?;
         if let Some(ending) = ending {
             solver.set_termination_callback(move |_: &_| ending());
@@ -115,16 +122,6 @@ impl Program {
         };
         let finite = solution.x.iter().all(|value| value.is_finite());
         finite.then(|| (DVector::from_column_slice(&solution.x), end))
-    }
-}
-
-fn settings() -> DefaultSettings<f64> {
-    DefaultSettings {
-        verbose: false,
-        max_threads: 1,
-        direct_solve_method: "qdldl".to_owned(),
-        chordal_decomposition_enable: false,
-        ..DefaultSettings::default()
     }
 }
 

@@ -1,13 +1,10 @@
 //! Feedbacks with the same eigenvalues and different eigenvectors.
 
-use super::eigenvectors::LARGEST_DESCENT;
 use super::{Coordinates, Extent, Placement, PlacementProblem};
 use crate::Error;
 use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
 
-/// Largest number of alternatives above the order `LARGEST_DESCENT`.
-const MOST_OF_LARGE: usize = 2;
 /// The factor by which condition number and gain of a candidate for a pair may exceed the lower ones of
 /// the standard methods.
 const NEAR: f64 = 1.09;
@@ -130,9 +127,4 @@ pub fn alternatives_discrete(
 ) -> Result<Alternatives, Error> {
     let problem = PlacementProblem { a, b, poles, sampled: true };
     problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
-}
-
-/// The largest number of alternatives for `n` states; not limited up to the order `LARGEST_DESCENT`.
-pub(super) fn most_alternatives(n: usize) -> usize {
-    if n <= LARGEST_DESCENT { usize::MAX } else { MOST_OF_LARGE }
 }

@@ -9,7 +9,6 @@ use nalgebra::DMatrix;
 const FLOOR: f64 = 1e-6;
 
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct RiccatiEquation {
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,

@@ -135,7 +135,9 @@ impl Structure<'_> {
             let mut next = best.clone();
             for at in free {
                 let size = best[*at].abs().max(least);
-                next[*at] += length * size * normal(&mut random);
+                // A sum of twelve uniform numbers is nearly normally distributed.
+                let normal = (0..12).map(|_| uniform(&mut random)).sum::<f64>() - 6.0;
+                next[*at] += length * size * normal;
             }
             // A step that overflows is no success.
             let next_value = value_of(&next).unwrap_or(f64::INFINITY);
@@ -175,11 +177,6 @@ fn reached(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Vec<usize> {
         }
     }
     (0..n).filter(|&at| is_reached[at]).collect()
-}
-
-/// A number that is nearly normally distributed: a sum of twelve uniform ones.
-fn normal(random: &mut u64) -> f64 {
-    (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0
 }
 
 #[cfg(test)]
