@@ -3,7 +3,7 @@
 mod events;
 mod model_exchange;
 
-use std::fmt::Debug;
+use std::fmt::{Arguments, Debug};
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -211,7 +211,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     fn call<T>(
         &mut self,
         function: &str,
-        arguments: &str,
+        arguments: Arguments<'_>,
         call: impl FnOnce(&mut S) -> Result<T, CallError>,
         results: impl FnOnce(&T) -> String,
     ) -> Result<T, CallError> {
@@ -223,7 +223,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     }
 
     /// Writes the start of a line: instance, function of FMI 2.0 in the version of the FMU, and arguments.
-    fn begin(&self, function: &str, arguments: &str) {
+    fn begin(&self, function: &str, arguments: Arguments<'_>) {
         let function = self.name(function);
         self.write(&format!("{} {function}({arguments})", self.instance));
     }
@@ -243,7 +243,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     fn read<T: Debug>(
         &mut self,
         function: &str,
-        arguments: &str,
+        arguments: Arguments<'_>,
         values: &mut [T],
         get: impl FnOnce(&mut S, &mut [T]) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
@@ -255,7 +255,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     fn plain(
         &mut self,
         function: &str,
-        arguments: &str,
+        arguments: Arguments<'_>,
         call: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         self.call(function, arguments, call, |()| String::new())
@@ -269,7 +269,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     ) -> Result<(), CallError> {
         match self.version {
             Version::V1 => call(self.slave.as_mut()),
-            Version::V2 | Version::V3 => self.plain(function, "", call),
+            Version::V2 | Version::V3 => self.plain(function, format_args!(""), call),
         }
     }
 }
@@ -282,34 +282,65 @@ impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     }
 }
 
-/// Defines the methods that get and set values.
-macro_rules! values {
-    ($($get:ident $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
-        $(fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
-            let get = |slave: &mut S, values: &mut [$type]| slave.$get(references, values);
-            self.read($get_name, &format!("{references:?}"), values, get)
-        }
-
-        fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
-            let set = |slave: &mut S| slave.$set(references, values);
-            self.plain($set_name, &format!("{references:?}, {values:?}"), set)
+/// Defines methods without results: the function of FMI 2.0 that is logged, and its arguments as text.
+macro_rules! calls {
+    ($(fn $method:ident($($argument:ident: $type:ty),*) = $function:literal, $($text:expr),+;)*) => {
+        $(fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
+            self.plain($function, format_args!($($text),+), |slave| slave.$method($($argument),*))
         })*
     };
 }
+use calls;
+
+/// Like `calls`, for methods that fill a list of `$value`.
+macro_rules! reads {
+    ($(fn $method:ident($($argument:ident: $type:ty),*; $value:ty) = $function:literal, $text:literal;)*) => {
+        $(fn $method(
+            &mut self,
+            $($argument: $type,)*
+            values: &mut [$value],
+        ) -> Result<(), CallError> {
+            self.read($function, format_args!($text), values, |slave, values| {
+                slave.$method($($argument,)* values)
+            })
+        })*
+    };
+}
+use reads;
 
 impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn description(&self) -> &ModelDescription {
         self.slave.description()
     }
 
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.plain("fmi2SetDebugLogging", &on.to_string(), |slave| slave.set_debug_logging(on))
+    calls! {
+        fn set_debug_logging(on: bool) = "fmi2SetDebugLogging", "{on}";
+        fn configure(references: &[u32], values: &[i64]) =
+            "fmi3EnterConfigurationMode", "{references:?}, {values:?}";
+        fn set_real(references: &[u32], values: &[f64]) = "fmi2SetReal", "{references:?}, {values:?}";
+        fn set_integer(references: &[u32], values: &[i64]) =
+            "fmi2SetInteger", "{references:?}, {values:?}";
+        fn set_boolean(references: &[u32], values: &[i32]) =
+            "fmi2SetBoolean", "{references:?}, {values:?}";
+        fn set_string(references: &[u32], values: &[String]) =
+            "fmi2SetString", "{references:?}, {values:?}";
+        fn set_binary(references: &[u32], values: &[Vec<u8>]) =
+            "fmi3SetBinary", "{references:?}, {values:?}";
+        fn save_state(slot: usize) = "fmi2GetFMUstate", "state {slot}";
+        fn restore_state(slot: usize) = "fmi2SetFMUstate", "state {slot}";
+        fn deserialize_state(bytes: &[u8]) = "fmi2DeSerializeFMUstate", "{} bytes", bytes.len();
     }
 
-    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        let arguments = format!("{references:?}, {values:?}");
-        let call = |slave: &mut S| slave.configure(references, values);
-        self.plain("fmi3EnterConfigurationMode", &arguments, call)
+    reads! {
+        fn get_real(references: &[u32]; f64) = "fmi2GetReal", "{references:?}";
+        fn get_integer(references: &[u32]; i64) = "fmi2GetInteger", "{references:?}";
+        fn get_boolean(references: &[u32]; i32) = "fmi2GetBoolean", "{references:?}";
+        fn get_string(references: &[u32]; String) = "fmi2GetString", "{references:?}";
+        fn get_binary(references: &[u32]; Vec<u8>) = "fmi3GetBinary", "{references:?}";
+        fn get_output_derivatives(references: &[u32], orders: &[i32]; f64) =
+            "fmi2GetRealOutputDerivatives", "{references:?}, orders {orders:?}";
+        fn directional_derivative(unknowns: &[u32], knowns: &[u32], seed: &[f64]; f64) =
+            "fmi2GetDirectionalDerivative", "{unknowns:?}, {knowns:?}, {seed:?}";
     }
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
@@ -323,14 +354,14 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
             None => format!("no {what}"),
         };
         let (tolerance, stop) = (stated("tolerance", tolerance), stated("stop time", stop_time));
-        let arguments = format!("{tolerance}, start time {start_time:?}, {stop}");
         let call = |slave: &mut S| slave.setup_experiment(experiment);
-        self.plain("fmi2SetupExperiment", &arguments, call)
+        let arguments = format_args!("{tolerance}, start time {start_time:?}, {stop}");
+        self.plain("fmi2SetupExperiment", arguments, call)
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.enter_initialization_mode();
-        self.plain("fmi2EnterInitializationMode", "", call)
+        self.plain("fmi2EnterInitializationMode", format_args!(""), call)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
@@ -339,19 +370,11 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2Terminate", "", S::terminate)
+        self.plain("fmi2Terminate", format_args!(""), S::terminate)
     }
 
     fn free(&mut self) -> Result<(), CallError> {
         self.slave.free()
-    }
-
-    values! {
-        get_real set_real: f64 = "fmi2GetReal" "fmi2SetReal";
-        get_integer set_integer: i64 = "fmi2GetInteger" "fmi2SetInteger";
-        get_boolean set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
-        get_string set_string: String = "fmi2GetString" "fmi2SetString";
-        get_binary set_binary: Vec<u8> = "fmi3GetBinary" "fmi3SetBinary";
     }
 
     fn set_input_derivatives(
@@ -364,28 +387,16 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
             // No function of the FMU: it asks for its inputs within the step.
             return self.slave.set_input_derivatives(references, orders, values);
         }
-        let arguments = format!("{references:?}, orders {orders:?}, {values:?}");
-        self.plain("fmi2SetRealInputDerivatives", &arguments, |slave| {
+        let arguments = format_args!("{references:?}, orders {orders:?}, {values:?}");
+        self.plain("fmi2SetRealInputDerivatives", arguments, |slave| {
             slave.set_input_derivatives(references, orders, values)
-        })
-    }
-
-    fn get_output_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), CallError> {
-        let arguments = format!("{references:?}, orders {orders:?}");
-        self.read("fmi2GetRealOutputDerivatives", &arguments, values, |slave, values| {
-            slave.get_output_derivatives(references, orders, values)
         })
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         // The last argument of FMI 1.0 is `newStep`, which is always true.
         let flag = never_back || self.version == Version::V1;
-        self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {flag}"));
+        self.begin("fmi2DoStep", format_args!("{time:?}, {size:?}, {flag}"));
         let done = self.slave.do_step(time, size, never_back);
         match (&done, self.version) {
             (Ok(StepResult::Part { reached, .. }), Version::V1) => {
@@ -407,37 +418,10 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         done
     }
 
-    fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        changes: &mut [f64],
-    ) -> Result<(), CallError> {
-        let arguments = format!("{unknowns:?}, {knowns:?}, {seed:?}");
-        self.read("fmi2GetDirectionalDerivative", &arguments, changes, |slave, changes| {
-            slave.directional_derivative(unknowns, knowns, seed, changes)
-        })
-    }
-
-    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut S| slave.save_state(slot);
-        self.plain("fmi2GetFMUstate", &format!("state {slot}"), call)
-    }
-
-    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut S| slave.restore_state(slot);
-        self.plain("fmi2SetFMUstate", &format!("state {slot}"), call)
-    }
-
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         let call = |slave: &mut S| slave.serialize_state();
-        self.call("fmi2SerializeFMUstate", "", call, |bytes| format!(" {} bytes", bytes.len()))
-    }
-
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let call = |slave: &mut S| slave.deserialize_state(bytes);
-        self.plain("fmi2DeSerializeFMUstate", &format!("{} bytes", bytes.len()), call)
+        let results = |bytes: &Vec<u8>| format!(" {} bytes", bytes.len());
+        self.call("fmi2SerializeFMUstate", format_args!(""), call, results)
     }
 
     fn guard_arrays(&mut self) {

@@ -22,7 +22,7 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         let call = |slave: &mut S| events(slave)?.update_discrete_states();
-        self.call("fmi2NewDiscreteStates", "", call, |info| format!(" {info:?}"))
+        self.call("fmi2NewDiscreteStates", format_args!(""), call, |info| format!(" {info:?}"))
     }
 
     fn leave_event_mode(&mut self) -> Result<(), CallError> {

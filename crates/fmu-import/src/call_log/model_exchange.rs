@@ -2,7 +2,7 @@
 
 use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
-use super::LoggedSlave;
+use super::{LoggedSlave, calls, reads};
 
 /// The instances whose calls are logged here.
 type Equations = dyn ModelExchange;
@@ -24,36 +24,21 @@ impl ModelExchange for LoggedSlave<Equations> {
         self.slave.begin_communication_step();
     }
 
-    fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        self.plain("fmi2SetTime", &format!("{time:?}"), |slave| slave.set_time(time))
+    calls! {
+        fn set_time(time: f64) = "fmi2SetTime", "{time:?}";
+        fn set_continuous_states(states: &[f64]) = "fmi2SetContinuousStates", "{states:?}";
     }
 
-    fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
-        let call = |slave: &mut Equations| slave.set_continuous_states(states);
-        self.plain("fmi2SetContinuousStates", &format!("{states:?}"), call)
-    }
-
-    fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetContinuousStates", "", states, Equations::get_continuous_states)
-    }
-
-    fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetDerivatives", "", derivatives, Equations::get_derivatives)
-    }
-
-    fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetEventIndicators", "", indicators, Equations::get_event_indicators)
-    }
-
-    fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetNominalsOfContinuousStates", "", nominals, |slave, to| {
-            slave.get_nominals_of_continuous_states(to)
-        })
+    reads! {
+        fn get_continuous_states(; f64) = "fmi2GetContinuousStates", "";
+        fn get_derivatives(; f64) = "fmi2GetDerivatives", "";
+        fn get_event_indicators(; f64) = "fmi2GetEventIndicators", "";
+        fn get_nominals_of_continuous_states(; f64) = "fmi2GetNominalsOfContinuousStates", "";
     }
 
     fn completed_integrator_step(&mut self, never_back: bool) -> Result<CompletedStep, CallError> {
         let call = |slave: &mut Equations| slave.completed_integrator_step(never_back);
-        self.call("fmi2CompletedIntegratorStep", &never_back.to_string(), call, |done| {
+        self.call("fmi2CompletedIntegratorStep", format_args!("{never_back}"), call, |done| {
             let CompletedStep { enter_event_mode, terminate_simulation } = done;
             format!(
                 " enterEventMode {enter_event_mode}, terminateSimulation {terminate_simulation}"
@@ -68,7 +53,7 @@ impl ModelExchange for LoggedSlave<Equations> {
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         let call = |slave: &mut Equations| slave.update_discrete_states();
         let results = |info: &EventInfo| format!(" {info:?}");
-        self.call("fmi2NewDiscreteStates", "", call, results)
+        self.call("fmi2NewDiscreteStates", format_args!(""), call, results)
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
