@@ -12,8 +12,6 @@ mod place;
 mod signals;
 
 use std::fmt;
-#[cfg(unix)]
-use std::fmt::Write as _;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -240,55 +238,6 @@ fn cause() -> Cause {
     }
 }
 
-/// A line for standard error, built without heap allocation and cut at its capacity.
-#[cfg(unix)]
-struct Line {
-    bytes: [u8; 1024],
-    length: usize,
-}
-
-#[cfg(unix)]
-impl Line {
-    const fn new() -> Self {
-        Self { bytes: [b'\n'; 1024], length: 0 }
-    }
-}
-
-#[cfg(unix)]
-impl fmt::Write for Line {
-    fn write_str(&mut self, part: &str) -> fmt::Result {
-        for byte in part.bytes() {
-            *self.bytes.get_mut(self.length).ok_or(fmt::Error)? = byte;
-            self.length += 1;
-        }
-        Ok(())
-    }
-}
-
-/// Writes the text of the file of [`leave_file`]: cause, calls, and all FMUs of this process.
-#[cfg(unix)]
-fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
-    line.write_str("aso_ftc: ")?;
-    write_ending(line, place::calls(place), Cause::Signal(signal))?;
-    line.write_str("; FMUs that ran in this process:")?;
-    for name in place::instances() {
-        write!(line, " {name}")?;
-    }
-    line.write_str("; isolate=True runs each FMU in a process of its own")
-}
-
-/// Writes the message in place of the report of a crash function that crashes or does not return.
-#[cfg(unix)]
-fn write_fallback(line: &mut Line) -> fmt::Result {
-    line.write_str("error: ")?;
-    write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
-    if has_begun_steps() {
-        line.write_str("; this program could not shut down properly: the last rows may be lost")?;
-    }
-    line.write_str("; ")?;
-    line.write_str(ADVICE.get().copied().unwrap_or_default())
-}
-
 /// Wakes the thread of [`watch`] to report the end. Does nothing if the end has started already or [`watch`] was not
 /// called. Signal handlers call this function: it neither allocates nor locks.
 fn start_report(cause: i32, place: usize) {
@@ -358,16 +307,10 @@ pub(crate) fn be_supervised(supervisor: i32) {
 fn wake_supervisor() {
     use rustix::process::{Signal, getppid, kill_process};
     let supervisor = SUPERVISOR.load(Ordering::Relaxed);
-    if let Some(parent) = getppid().filter(|parent| parent.as_raw_nonzero().get() == supervisor) {
+    if let Some(parent) = getppid().filter(|parent| parent.as_raw_pid() == supervisor) {
         // A parent that has ended needs no signal.
         let _ = kill_process(parent, Signal::CHILD);
     }
-}
-
-/// Whether the program has finished its work.
-#[cfg(unix)]
-fn is_done() -> bool {
-    RECORD.done.load(Ordering::Acquire) != 0
 }
 
 /// Records that the first step starts.

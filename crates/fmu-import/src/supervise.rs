@@ -12,9 +12,12 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use libc::{c_int, pid_t, siginfo_t, sigset_t};
-
-use rustix::process::Signal;
+use libc::{c_int, siginfo_t, sigset_t};
+use rustix::io::Errno;
+use rustix::process::{
+    Pid, Signal, WaitOptions, getpgid, getpgrp, getpid, getppid, kill_process,
+    set_parent_process_death_signal, waitpid,
+};
 
 use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
 
@@ -78,23 +81,21 @@ pub fn split() -> io::Result<Option<Ended>> {
     share_record()?;
     share_memory()?;
     let signals = Signals::block()?;
-    // SAFETY: no conditions.
-    let supervisor = unsafe { libc::getpid() };
+    let supervisor = getpid();
     // SAFETY: this process has one thread.
-    match unsafe { libc::fork() } {
-        -1 => {
-            let error = io::Error::last_os_error();
-            signals.restore();
-            Err(error)
-        }
-        0 => {
-            signals.restore();
-            crash::be_supervised(supervisor);
-            end_with(supervisor);
-            Ok(None)
-        }
-        child => Ok(Some(Watch { child, signals, standstill: None }.end())),
+    let child = unsafe { libc::fork() };
+    if child < 0 {
+        let error = io::Error::last_os_error();
+        signals.restore();
+        return Err(error);
     }
+    if let Some(child) = Pid::from_raw(child) {
+        return Ok(Some(Watch { child, signals, standstill: None }.end()));
+    }
+    signals.restore();
+    crash::be_supervised(supervisor.as_raw_pid());
+    end_with(supervisor);
+    Ok(None)
 }
 
 /// Replaces the pages of [`RECORD`], which are still zero, by memory that a forked process shares.
@@ -136,11 +137,10 @@ pub fn memory() -> Option<&'static [AtomicU64]> {
 }
 
 /// Lets the system kill this process when its supervisor ends. Ends it at once if the supervisor has ended already.
-fn end_with(supervisor: pid_t) {
-    // SAFETY: no conditions.
-    unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
-    // SAFETY: no conditions.
-    if unsafe { libc::getppid() } != supervisor {
+fn end_with(supervisor: Pid) {
+    // Fails only for an invalid signal.
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    if getppid() != Some(supervisor) {
         crash::leave(1);
     }
 }
@@ -196,7 +196,7 @@ impl Signals {
 
 /// The supervision of one process.
 struct Watch {
-    child: pid_t,
+    child: Pid,
     signals: Signals,
     /// The calls of the process; `None` until an ending signal arrives.
     standstill: Option<Standstill>,
@@ -221,8 +221,8 @@ impl Watch {
             }
             let is_late = finished_at.is_some_and(|since| since.elapsed() > AFTER_WORK);
             if is_late || self.is_stuck() {
-                self.send(libc::SIGKILL);
-                self.wait_for_end();
+                self.send(Signal::KILL);
+                while let Err(Errno::INTR) = waitpid(Some(self.child), WaitOptions::empty()) {}
                 break End::Stuck;
             }
             let is_ending = finished_at.is_some() || self.standstill.is_some();
@@ -244,16 +244,17 @@ impl Watch {
         match signal {
             libc::SIGCHLD => {}
             libc::SIGTSTP => {
-                self.send(libc::SIGSTOP);
-                // SAFETY: this process stops until it gets SIGCONT.
-                unsafe { libc::raise(libc::SIGSTOP) };
-                self.send(libc::SIGCONT);
+                self.send(Signal::STOP);
+                // This process stops until it gets SIGCONT.
+                let _ = kill_process(getpid(), Signal::STOP);
+                self.send(Signal::CONT);
             }
             _ => {
-                // SAFETY: no conditions.
-                let together = unsafe { libc::getpgid(self.child) == libc::getpgrp() };
+                let together = getpgid(Some(self.child)) == Ok(getpgrp());
                 let by_terminal = by_kernel && [libc::SIGINT, libc::SIGHUP].contains(&signal);
-                if !(by_terminal && together) {
+                if let (false, Some(signal)) =
+                    (by_terminal && together, Signal::from_named_raw(signal))
+                {
                     self.send(signal);
                 }
                 let standstill = || Standstill { since: Instant::now(), calls: crash::calls() };
@@ -272,30 +273,20 @@ impl Watch {
         standstill.since.elapsed() > AFTER_SIGNAL
     }
 
-    fn send(&self, signal: c_int) {
-        // SAFETY: a child that has not been waited for.
-        unsafe { libc::kill(self.child, signal) };
-    }
-
-    fn wait_for_end(&self) {
-        let mut status = 0;
-        // SAFETY: a status to write to.
-        while unsafe { libc::waitpid(self.child, &raw mut status, 0) } == -1
-            && io::Error::last_os_error().kind() == io::ErrorKind::Interrupted
-        {}
+    /// Sends a signal to the process, which has not been waited for.
+    fn send(&self, signal: Signal) {
+        // Fails only if the process has ended.
+        let _ = kill_process(self.child, signal);
     }
 
     /// Returns how the process ended; `None` while it runs.
     fn reap(&self) -> Option<End> {
-        let mut status = 0;
-        // SAFETY: a status to write to.
-        match unsafe { libc::waitpid(self.child, &raw mut status, libc::WNOHANG) } {
-            0 => None,
-            -1 => Some(End::Exited(-1)),
-            _ if libc::WIFSIGNALED(status) => Some(End::Killed(libc::WTERMSIG(status))),
-            _ if libc::WIFEXITED(status) => Some(End::Exited(libc::WEXITSTATUS(status))),
-            _ => None,
-        }
+        let Ok(ended) = waitpid(Some(self.child), WaitOptions::NOHANG) else {
+            return Some(End::Exited(-1));
+        };
+        let (_, status) = ended?;
+        let killed = status.terminating_signal().map(End::Killed);
+        killed.or_else(|| status.exit_status().map(End::Exited))
     }
 }
 
@@ -306,29 +297,16 @@ fn chosen_status() -> Option<u8> {
 
 /// Returns the name of a signal, or "no common one".
 pub(crate) fn signal_name(signal: i32) -> &'static str {
-    let known = [
-        (Signal::HUP, "SIGHUP"),
-        (Signal::INT, "SIGINT"),
-        (Signal::QUIT, "SIGQUIT"),
-        (Signal::ILL, "SIGILL"),
-        (Signal::TRAP, "SIGTRAP"),
-        (Signal::ABORT, "SIGABRT"),
-        (Signal::BUS, "SIGBUS"),
-        (Signal::FPE, "SIGFPE"),
-        (Signal::KILL, "SIGKILL"),
-        (Signal::USR1, "SIGUSR1"),
-        (Signal::SEGV, "SIGSEGV"),
-        (Signal::USR2, "SIGUSR2"),
-        (Signal::PIPE, "SIGPIPE"),
-        (Signal::ALARM, "SIGALRM"),
-        (Signal::TERM, "SIGTERM"),
-        (Signal::XCPU, "SIGXCPU"),
-        (Signal::XFSZ, "SIGXFSZ"),
-        (Signal::VTALARM, "SIGVTALRM"),
-        (Signal::PROF, "SIGPROF"),
-        (Signal::IO, "SIGIO"),
-        (Signal::SYS, "SIGSYS"),
-    ];
-    let entry = known.iter().find(|(known, _)| known.as_raw() == signal);
-    entry.map_or("no common one", |(_, name)| name)
+    macro_rules! names {
+        ($($name:ident)*) => {
+            match signal {
+                $(libc::$name => stringify!($name),)*
+                _ => "no common one",
+            }
+        };
+    }
+    names! {
+        SIGHUP SIGINT SIGQUIT SIGILL SIGTRAP SIGABRT SIGBUS SIGFPE SIGKILL SIGUSR1 SIGSEGV SIGUSR2 SIGPIPE SIGALRM
+        SIGTERM SIGXCPU SIGXFSZ SIGVTALRM SIGPROF SIGIO SIGSYS
+    }
 }

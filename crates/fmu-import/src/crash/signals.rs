@@ -6,20 +6,21 @@
 
 use std::cell::Cell;
 use std::ffi::CString;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::io;
 use std::mem::MaybeUninit;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicU32, AtomicUsize, Ordering};
 use std::thread::Thread;
 use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
 
 use super::{
-    EXIT, Line, RECORD, REPORT_LIMIT, STATUS, is_done, last_of_this_thread, place, start_report,
+    ADVICE, Cause, EXIT, PLACE, RECORD, REPORT_LIMIT, STATUS, cause, has_begun_steps,
+    last_of_this_thread, place, start_report, write_ending,
 };
 
 /// The signals of a crash, each with its name and meaning.
@@ -50,7 +51,7 @@ thread_local! {
 }
 
 /// Identifier of the process that called `watch`; processes forked by an FMU are not handled.
-static PROCESS: AtomicI32 = AtomicI32::new(0);
+static PROCESS: AtomicU32 = AtomicU32::new(0);
 
 /// In a copy of the process that `fork` has made, the address of the slot that its thread had entered last; otherwise
 /// [`NOT_FORKED`].
@@ -59,8 +60,12 @@ const NOT_FORKED: usize = usize::MAX;
 
 /// Returns whether an FMU forked this process.
 fn is_forked() -> bool {
-    // SAFETY: no conditions.
-    unsafe { libc::getpid() != PROCESS.load(Ordering::Relaxed) }
+    std::process::id() != PROCESS.load(Ordering::Relaxed)
+}
+
+/// Whether the program has finished its work.
+fn is_done() -> bool {
+    RECORD.done.load(Ordering::Acquire) != 0
 }
 
 /// Returns whether SIGHUP is ignored, as `nohup` does it.
@@ -164,8 +169,7 @@ pub(super) fn mark_reporter() {
 /// Installs the handlers of signals, of `fork` and of `exit`, and an alternate signal stack for the calling thread.
 /// SIGXFSZ is ignored: a write beyond the file size limit (`ulimit -f`) returns an error.
 pub(super) fn install() -> io::Result<()> {
-    // SAFETY: no conditions.
-    PROCESS.store(unsafe { libc::getpid() }, Ordering::Relaxed);
+    PROCESS.store(std::process::id(), Ordering::Relaxed);
     // SAFETY: a function that may run in the copy of a process: it stores to an atomic.
     let error = unsafe { libc::pthread_atfork(None, None, Some(on_fork)) };
     if error != 0 {
@@ -231,18 +235,60 @@ fn wait() -> ! {
     }
     let mut line = Line::new();
     // A line that is too long is cut.
-    let _ = super::write_fallback(&mut line);
+    let _ = write_fallback(&mut line);
     line.print();
     super::leave(1)
 }
 
+/// A line for standard error, built without heap allocation and cut at its capacity.
+struct Line {
+    bytes: [u8; 1024],
+    length: usize,
+}
+
 impl Line {
+    const fn new() -> Self {
+        Self { bytes: [b'\n'; 1024], length: 0 }
+    }
+
     /// Prints the line on standard error.
     fn print(&mut self) {
         self.length = (self.length + 1).min(self.bytes.len());
         // SAFETY: `length` bytes to read.
         unsafe { libc::write(libc::STDERR_FILENO, self.bytes.as_ptr().cast(), self.length) };
     }
+}
+
+impl fmt::Write for Line {
+    fn write_str(&mut self, part: &str) -> fmt::Result {
+        for byte in part.bytes() {
+            *self.bytes.get_mut(self.length).ok_or(fmt::Error)? = byte;
+            self.length += 1;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the text of the file of [`leave_file`]: cause, calls, and all FMUs of this process.
+fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
+    line.write_str("aso_ftc: ")?;
+    write_ending(line, place::calls(place), Cause::Signal(signal))?;
+    line.write_str("; FMUs that ran in this process:")?;
+    for name in place::instances() {
+        write!(line, " {name}")?;
+    }
+    line.write_str("; isolate=True runs each FMU in a process of its own")
+}
+
+/// Writes the message in place of the report of a crash function that crashes or does not return.
+fn write_fallback(line: &mut Line) -> fmt::Result {
+    line.write_str("error: ")?;
+    write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
+    if has_begun_steps() {
+        line.write_str("; this program could not shut down properly: the last rows may be lost")?;
+    }
+    line.write_str("; ")?;
+    line.write_str(ADVICE.get().copied().unwrap_or_default())
 }
 
 /// The path of the file of [`leave_file`].
@@ -278,7 +324,7 @@ extern "C" fn write_file(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     if let Some(path) = CRASH_FILE.get().filter(|_| !is_copy()) {
         let mut line = Line::new();
         // A line that is too long is cut.
-        let _ = super::write_crash(&mut line, signal, last_of_this_thread());
+        let _ = write_crash(&mut line, signal, last_of_this_thread());
         line.print();
         let flags = libc::O_WRONLY | libc::O_CREAT | libc::O_TRUNC | libc::O_CLOEXEC;
         // SAFETY: a terminated path, and `length` bytes to read.

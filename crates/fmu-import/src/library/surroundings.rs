@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 use std::ffi::{CStr, OsString};
 use std::hint::black_box;
 
+use rustix::process::getpgrp;
+
 /// The surroundings of all libraries of a process.
 pub(crate) struct Surroundings {
     environment: BTreeMap<OsString, OsString>,
@@ -23,15 +25,13 @@ impl Surroundings {
         let locale = unsafe { libc::setlocale(libc::LC_ALL, std::ptr::null()).as_ref() };
         // SAFETY: a terminated string, which lives until the locale changes.
         let locale = locale.map(|name| unsafe { CStr::from_ptr(name) }.to_string_lossy());
-        // SAFETY: no conditions.
-        let group = unsafe { libc::getpgrp() };
         Self {
             environment: std::env::vars_os().collect(),
             others: [
                 ("working directory", folder),
                 ("rounding mode", rounding().to_owned()),
                 ("locale", locale.unwrap_or_default().into_owned()),
-                ("process group", group.to_string()),
+                ("process group", getpgrp().as_raw_pid().to_string()),
             ],
         }
     }
