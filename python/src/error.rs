@@ -113,7 +113,6 @@ fn fmu_kind(error: &fmu_import::FmuError) -> &'static str {
         E::Load(_) => "Load",
         E::NoCoSimulation { .. } => "NoCoSimulation",
         E::OnlyOnce { .. } => "OnlyOnce",
-        E::Version { .. } => "Version",
         E::NoInterface { .. } => "NoInterface",
         E::NeedsTool { .. } => "NeedsTool",
         _ => "Other",

@@ -1,6 +1,14 @@
-//! The error of a library that cannot be loaded or used.
+//! The error of a library that cannot be loaded or used, and that of a call that is refused.
 
 use std::path::PathBuf;
+
+use slave::{CallError, Failure};
+
+/// Returns the error of a call of `function` that is refused, or whose result is impossible, for the reason `what`.
+#[cold]
+pub(crate) fn refused(function: &'static str, what: String) -> CallError {
+    CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+}
 
 /// Why a library cannot be loaded or used.
 #[derive(Debug, thiserror::Error)]

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use fmu_description::location::{LocationError, file_uri};
+use fmu_description::location::LocationError;
 use fmu_description::package::{PackageError, Unpacked};
 use fmu_description::{Kind, ModelDescription, Version};
 
 use crate::error::LoadError;
-use crate::library::{Binding, Component, Interface, Library, Loading, Names, v1, v3};
+use crate::library::{Binding, Interface, Library, Loading, Names, v1, v3};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -42,16 +42,6 @@ pub enum FmuError {
         instance: String,
         /// `modelName`.
         model: String,
-    },
-    /// An action is not available for the version of the FMU.
-    #[error("{model} is an FMU of {}; expected {expected}", version.release())]
-    Version {
-        /// `modelName`.
-        model: String,
-        /// The version of the FMU.
-        version: Version,
-        /// What is expected.
-        expected: &'static str,
     },
     /// The FMU has no interface, or lacks the requested one.
     #[error("{path}: the FMU lacks an interface, expected the element {expected}")]
@@ -98,7 +88,7 @@ impl Drop for OnlyInstance {
 /// Fields are dropped in this order, which unloads the library before its file is removed.
 pub(crate) struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
-    pub(crate) library: Option<CoSimulation>,
+    library: Option<AnyLibrary>,
     pub(crate) unpacked: Unpacked,
     /// The name of its file or folder, for messages.
     name: String,
@@ -109,9 +99,9 @@ pub(crate) struct Content {
     names: OnceLock<HashMap<(char, u32), usize>>,
 }
 
-/// The library for co-simulation or scheduled execution of an FMU, in the version of the FMU.
+/// The library of an FMU for one interface, in the version of the FMU.
 #[derive(Clone)]
-pub(crate) enum CoSimulation {
+pub(crate) enum AnyLibrary {
     V1(Arc<v1::Library>),
     V2(Arc<Library>),
     V3(Arc<v3::Library>),
@@ -123,9 +113,7 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError`] if the FMU cannot be read, is not of version 1.0, 2.0 or 3.0, offers neither interface
-    /// ([`FmuError::NoCoSimulation`], [`FmuError::NoInterface`]), has no library for this platform, or if the library
-    /// does not load.
+    /// Same as [`Fmu::open_any`], and [`FmuError::NoCoSimulation`] if the FMU offers model exchange only.
     pub fn open(path: &Path) -> Result<Self, FmuError> {
         let fmu = Self::open_any(path)?;
         if fmu.content.library.is_none() {
@@ -134,24 +122,16 @@ impl Fmu {
         Ok(fmu)
     }
 
-    /// Opens an FMU like [`Fmu::open_any`], but does not log warnings about the archive and the
-    /// description.
+    /// Opens an FMU like [`Fmu::open_any`], but does not log warnings about the archive and the description.
     ///
     /// # Errors
     ///
     /// Same as [`Fmu::open_any`].
     pub fn open_quietly(path: &Path) -> Result<Self, FmuError> {
-        let unpacked =
-            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        Self::load(path, unpacked, Binding::Lenient)
+        Self::load(path, unpack(path)?, Binding::Lenient)
     }
 
-    /// Opens an unpacked FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library
-    /// defines.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`Fmu::open_any`], and [`LoadError::Refused`] for such a library.
+    /// Opens an unpacked FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library defines.
     #[cfg(target_os = "linux")]
     pub(crate) fn open_strictly(folder: &Path) -> Result<Self, FmuError> {
         Self::load(folder, Unpacked::in_folder(folder)?, Binding::Strict)
@@ -166,12 +146,8 @@ impl Fmu {
     /// ([`FmuError::NoInterface`]), or offers co-simulation or scheduled execution, but has no library for this
     /// platform or one that does not load.
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
-        let unpacked =
-            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        for warning in &unpacked.archive_warnings {
-            tracing::warn!("{}: {warning}", path.display());
-        }
-        for warning in &unpacked.warnings {
+        let unpacked = unpack(path)?;
+        for warning in warnings(&unpacked) {
             tracing::warn!("{}: {warning}", path.display());
         }
         Self::load(path, unpacked, Binding::Lenient)
@@ -188,7 +164,7 @@ impl Fmu {
         let library = stepped.map(|flags| {
             let library = unpacked.library(&flags.model_identifier)?;
             let loading = Loading { path: &library, fmu: &name, binding };
-            open_library(description, &loading, &flags.model_identifier)
+            open_library(description, &loading, &flags.model_identifier, Interface::CoSimulation)
         });
         let library = library.transpose()?;
         let (instantiated, names) = (AtomicBool::new(false), OnceLock::new());
@@ -225,10 +201,27 @@ impl Fmu {
         Ok(view.map_err(unsupported)?.description)
     }
 
-    /// Returns the error of an FMU without the `expected` element, with the name of its file: its folder may be
-    /// temporary.
-    pub(crate) fn no_interface(&self, expected: &'static str) -> FmuError {
-        FmuError::NoInterface { path: PathBuf::from(&self.content.name), expected }
+    /// Returns the library for `interface`. That for model exchange is loaded now. The error of an FMU without the
+    /// interface has the name of its file, as its folder may be temporary.
+    pub(crate) fn library(&self, interface: Interface) -> Result<AnyLibrary, FmuError> {
+        let Content { library, unpacked, name, binding, .. } = &*self.content;
+        let description = &unpacked.description;
+        let expected = match (interface, description.version()) {
+            (Interface::ModelExchange, _) => "ModelExchange",
+            (Interface::CoSimulation, Version::V3) => "CoSimulation or ScheduledExecution",
+            (Interface::CoSimulation, _) => "CoSimulation",
+        };
+        let missing = || FmuError::NoInterface { path: PathBuf::from(name), expected };
+        match interface {
+            Interface::CoSimulation => library.clone().ok_or_else(missing),
+            Interface::ModelExchange => {
+                let identifier =
+                    &description.model_exchange.as_ref().ok_or_else(missing)?.model_identifier;
+                let path = unpacked.library(identifier)?;
+                let loading = Loading { path: &path, fmu: name, binding: *binding };
+                open_library(description, &loading, identifier, interface)
+            }
+        }
     }
 
     /// Reserves an FMU that allows one instance only for the instance `name`; [`FmuError::OnlyOnce`] if it has one.
@@ -238,11 +231,6 @@ impl Fmu {
             return Err(FmuError::OnlyOnce { instance, model });
         }
         Ok(OnlyInstance(self.content.clone()))
-    }
-
-    /// Returns how the library at `path` is loaded.
-    pub(crate) fn loading<'a>(&'a self, path: &'a Path) -> Loading<'a> {
-        Loading { path, fmu: &self.content.name, binding: self.content.binding }
     }
 
     /// Returns the lookup of variable names for messages of the FMU. Of several aliases it returns the one declared
@@ -262,41 +250,6 @@ impl Fmu {
             by_reference.get(&(kind, reference)).map(|position| variables[*position].name.clone())
         })
     }
-
-    /// Creates an instance of an FMU of FMI 2.0 for `interface`, with access to its C functions. Does not check
-    /// `canBeInstantiatedOnlyOncePerProcess`.
-    ///
-    /// # Errors
-    ///
-    /// [`FmuError::Version`] for another version of FMI; [`FmuError::NoInterface`] if the FMU lacks `interface`;
-    /// [`FmuError::Package`] without a library for this platform; [`FmuError::Load`], or [`FmuError::NeedsTool`] if the
-    /// FMU declares to need a tool, if the library does not load or `fmi2Instantiate` fails; [`FmuError::Location`] if
-    /// the path of the resources is no URI.
-    pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
-        let unpacked = &self.content.unpacked;
-        let description = &unpacked.description;
-        let library = match (interface, &self.content.library, &description.model_exchange) {
-            _ if description.version() != Version::V2 => {
-                return Err(FmuError::Version {
-                    model: description.model_name.clone(),
-                    version: description.version(),
-                    expected: "FMI 2.0 for access to its C functions",
-                });
-            }
-            (Interface::CoSimulation, Some(CoSimulation::V2(library)), _) => library.clone(),
-            (Interface::ModelExchange, _, Some(flags)) => {
-                let library = unpacked.library(&flags.model_identifier)?;
-                let library = Library::open(&self.loading(&library), interface);
-                Arc::new(library.map_err(|error| with_tool_hint(description, error))?)
-            }
-            (Interface::CoSimulation, ..) => return Err(self.no_interface("CoSimulation")),
-            (Interface::ModelExchange, ..) => return Err(self.no_interface("ModelExchange")),
-        };
-        let resources = file_uri(&unpacked.resources())?;
-        let names = self.names();
-        let component = library.instantiate(interface, name, &description.guid, &resources, names);
-        component.map_err(|error| with_tool_hint(description, error))
-    }
 }
 
 /// Returns the letter of a type in the messages of an FMU (FMI 2.0.5, section 2.1.5).
@@ -309,39 +262,47 @@ fn letter(kind: &Kind) -> char {
     }
 }
 
-/// Opens the library for co-simulation or scheduled execution in the version of the FMU.
+/// Opens the library for `interface` in the version of the FMU.
 fn open_library(
     description: &ModelDescription,
     loading: &Loading<'_>,
     model_identifier: &str,
-) -> Result<CoSimulation, FmuError> {
+    interface: Interface,
+) -> Result<AnyLibrary, FmuError> {
     let library = match description.version() {
-        Version::V1 => v1::Library::open(loading, model_identifier, Interface::CoSimulation)
-            .map(Arc::new)
-            .map(CoSimulation::V1),
-        Version::V2 => {
-            Library::open(loading, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
-        }
+        Version::V1 => v1::Library::open(loading, model_identifier, interface).map(AnyLibrary::V1),
+        Version::V2 => Library::open(loading, interface).map(AnyLibrary::V2),
         Version::V3 => {
-            v3::Library::open(loading, stepped(description)).map(Arc::new).map(CoSimulation::V3)
+            let interface = interface_of_3(description, interface);
+            v3::Library::open(loading, interface).map(AnyLibrary::V3)
         }
     };
     library.map_err(|error| with_tool_hint(description, error))
 }
 
-/// Returns the interface of FMI 3.0 by which an FMU makes steps: co-simulation or, without it, scheduled execution.
-pub(crate) fn stepped(description: &ModelDescription) -> v3::Interface {
-    match description.co_simulation {
-        Some(_) => v3::Interface::CoSimulation,
-        None => v3::Interface::ScheduledExecution,
+/// Returns the interface of FMI 3.0: without co-simulation an FMU makes steps by scheduled execution.
+pub(crate) fn interface_of_3(
+    description: &ModelDescription,
+    interface: Interface,
+) -> v3::Interface {
+    match interface {
+        Interface::ModelExchange => v3::Interface::ModelExchange,
+        Interface::CoSimulation if description.co_simulation.is_some() => {
+            v3::Interface::CoSimulation
+        }
+        Interface::CoSimulation => v3::Interface::ScheduledExecution,
     }
 }
 
-/// Returns the `resourcePath` of FMI 3.0: absolute, with a trailing separator (section 2.3.1); `None` if
-/// the FMU has no resources.
-pub(crate) fn resource_path(folder: &Path) -> Option<String> {
-    let folder = std::path::absolute(folder).ok().filter(|folder| folder.is_dir())?;
-    Some(format!("{}{}", folder.display(), std::path::MAIN_SEPARATOR))
+/// Unpacks the FMU at `path`, an archive or a folder with an unpacked FMU.
+pub(crate) fn unpack(path: &Path) -> Result<Unpacked, PackageError> {
+    if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) }
+}
+
+/// Returns the warnings about the archive, then those about the description.
+pub(crate) fn warnings(unpacked: &Unpacked) -> impl Iterator<Item = String> {
+    let description = unpacked.warnings.iter().map(ToString::to_string);
+    unpacked.archive_warnings.iter().cloned().chain(description)
 }
 
 /// Converts `error`, with the tool that the FMU declares to need (`needsExecutionTool`), if any.

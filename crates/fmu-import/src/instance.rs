@@ -1,6 +1,6 @@
 //! An instance of an FMU in this process, which implements [`Slave`] for every version of FMI.
 
-mod co_simulation;
+mod create;
 mod model_exchange;
 
 use std::time::Duration;
@@ -9,7 +9,9 @@ use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
-use slave::{CallError, CallSink, CommunicationStep, Events, Slave, StepResult, absent};
+use slave::{
+    CallError, CallSink, CommunicationStep, Events, Slave, StepRequest, StepResult, absent,
+};
 
 /// An instance of an FMU in this process, for any interface.
 pub struct Instance {
@@ -28,10 +30,6 @@ pub(crate) enum Inner {
 }
 
 impl Instance {
-    fn new(inner: Inner, only: Option<OnlyInstance>, fmu: Fmu) -> Self {
-        Self { inner, _only: only, fmu }
-    }
-
     /// Returns the FMU of this instance.
     #[must_use]
     pub fn fmu(&self) -> &Fmu {
@@ -49,26 +47,34 @@ impl Instance {
     }
 }
 
-/// Calls a method of the instance in the version of its FMU, or of the listed part of it. Without a list of versions,
-/// calls a method of the component. In a version that is not listed, returns the error that `$absent` is missing.
+/// Calls a method of the instance in the version of its FMU, or of the listed part of it. In a version that is not listed,
+/// returns the error that `$absent` is missing.
 macro_rules! of_version {
-    ($instance:ident.$method:ident $arguments:tt) => {
-        of_version!(
-            $instance.$method $arguments,
-            V1.component, V2.component, V3.component
-        )
-    };
     (
         $instance:ident.$method:ident $arguments:tt,
-        $($version:ident$(.$part:ident)*),+ $(; $absent:literal)?
+        [$($version:ident$(.$part:ident)?),+] $($absent:literal)?
     ) => {
         match &mut $instance.inner {
-            $(Inner::$version(instance) => instance$(.$part)*.$method $arguments,)+
+            $(Inner::$version(instance) => instance$(.$part)?.$method $arguments,)+
             $(_ => Err(absent($absent)),)?
         }
     };
 }
 use of_version;
+
+/// Defines methods that call the method of the same name by `of_version`.
+macro_rules! methods {
+    ($(
+        fn $method:ident($($argument:ident: $type:ty),*) -> $result:ty =
+            $versions:tt $(else $absent:literal)?;
+    )*) => {
+        $(#[inline]
+        fn $method(&mut self, $($argument: $type),*) -> Result<$result, CallError> {
+            of_version!(self.$method($($argument),*), $versions $($absent)?)
+        })*
+    };
+}
+use methods;
 
 impl Slave for Instance {
     fn description(&self) -> &ModelDescription {
@@ -79,114 +85,41 @@ impl Slave for Instance {
         }
     }
 
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        of_version!(self.set_debug_logging(on), V1.component, V2.component, V3)
+    methods! {
+        fn set_debug_logging(on: bool) -> () = [V1.component, V2.component, V3];
+        fn setup_experiment(experiment: &Experiment) -> () = [V1, V2.component, V3];
+        fn enter_initialization_mode() -> () = [V1, V2.component, V3];
+        fn exit_initialization_mode() -> () = [V1, V2.component, V3];
+        fn terminate() -> () = [V1.component, V2.component, V3.component];
+        fn get_real(references: &[u32], values: &mut [f64]) -> () = [V1, V2.component, V3];
+        fn set_real(references: &[u32], values: &[f64]) -> () = [V1, V2.component, V3];
+        fn get_integer(references: &[u32], values: &mut [i64]) -> () = [V1, V2, V3];
+        fn set_integer(references: &[u32], values: &[i64]) -> () = [V1, V2, V3];
+        fn get_boolean(references: &[u32], values: &mut [i32]) -> () = [V1, V2.component, V3];
+        fn set_boolean(references: &[u32], values: &[i32]) -> () = [V1, V2.component, V3];
+        fn get_string(references: &[u32], values: &mut [String]) -> () =
+            [V1.component, V2.component, V3];
+        fn set_string(references: &[u32], values: &[String]) -> () = [V1, V2.component, V3];
+        fn get_binary(references: &[u32], values: &mut [Vec<u8>]) -> () = [V3] else "fmi3GetBinary";
+        fn set_binary(references: &[u32], values: &[Vec<u8>]) -> () = [V3] else "fmi3SetBinary";
+        fn set_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) -> () =
+            [V1, V2.component, V3];
+        fn get_output_derivatives(references: &[u32], orders: &[i32], values: &mut [f64]) -> () =
+            [V1, V2.component, V3];
+        fn directional_derivative(
+            unknowns: &[u32], knowns: &[u32], seed: &[f64], changes: &mut [f64]
+        ) -> () = [V2.component, V3] else "fmi2GetDirectionalDerivative";
+        fn save_state(slot: usize) -> () = [V2.component, V3] else "fmi2GetFMUstate";
+        fn restore_state(slot: usize) -> () = [V2.component, V3] else "fmi2SetFMUstate";
+        fn serialize_state() -> Vec<u8> = [V2.component, V3] else "fmi2SerializeFMUstate";
+        fn deserialize_state(bytes: &[u8]) -> () =
+            [V2.component, V3] else "fmi2DeSerializeFMUstate";
     }
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         match &mut self.inner {
             Inner::V3(instance) => instance.configure(self.fmu.description(), references, values),
             _ => Err(absent("fmi3EnterConfigurationMode")),
-        }
-    }
-
-    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.setup_experiment(experiment),
-            Inner::V2(instance) => return instance.component.setup_experiment(experiment),
-            Inner::V3(instance) => instance.setup_experiment(experiment),
-        }
-        Ok(())
-    }
-
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        of_version!(self.enter_initialization_mode(), V1, V2.component, V3)
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => {
-                instance.exit_initialization_mode();
-                Ok(())
-            }
-            Inner::V2(instance) => instance.component.exit_initialization_mode(),
-            Inner::V3(instance) => instance.exit_initialization_mode(),
-        }
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
-        of_version!(self.terminate())
-    }
-
-    #[inline]
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        of_version!(self.get_real(references, values), V1, V2.component, V3)
-    }
-
-    #[inline]
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        of_version!(self.set_real(references, values), V1, V2.component, V3)
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        of_version!(self.get_integer(references, values), V1, V2, V3)
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        of_version!(self.set_integer(references, values), V1, V2, V3)
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        of_version!(self.get_boolean(references, values), V1, V2.component, V3)
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        of_version!(self.set_boolean(references, values), V1, V2.component, V3)
-    }
-
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        of_version!(self.get_string(references, values), V1.component, V2.component, V3)
-    }
-
-    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        of_version!(self.set_string(references, values), V1, V2.component, V3)
-    }
-
-    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        of_version!(self.get_binary(references, values), V3; "fmi3GetBinary")
-    }
-
-    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        of_version!(self.set_binary(references, values), V3; "fmi3SetBinary")
-    }
-
-    fn set_input_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &[f64],
-    ) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.set_input_derivatives(references, orders, values),
-            Inner::V2(instance) => {
-                instance.component.set_real_input_derivatives(references, orders, values)
-            }
-            Inner::V3(instance) => instance.set_input_derivatives(references, orders, values),
-        }
-    }
-
-    fn get_output_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), CallError> {
-        match &mut self.inner {
-            Inner::V1(instance) => instance.get_output_derivatives(references, orders, values),
-            Inner::V2(instance) => {
-                instance.component.get_real_output_derivatives(references, orders, values)
-            }
-            Inner::V3(instance) => instance.get_output_derivatives(references, orders, values),
         }
     }
 
@@ -197,35 +130,6 @@ impl Slave for Instance {
             Inner::V2(instance) => instance.component.do_step(time, size, never_back),
             Inner::V3(instance) => instance.do_step(time, size, never_back),
         }
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        changes: &mut [f64],
-    ) -> Result<(), CallError> {
-        of_version!(
-            self.directional_derivative(unknowns, knowns, seed, changes),
-            V2.component, V3; "fmi2GetDirectionalDerivative"
-        )
-    }
-
-    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        of_version!(self.save_state(slot), V2.component, V3; "fmi2GetFMUstate")
-    }
-
-    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        of_version!(self.restore_state(slot), V2.component, V3; "fmi2SetFMUstate")
-    }
-
-    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        of_version!(self.serialize_state(), V2.component, V3; "fmi2SerializeFMUstate")
-    }
-
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        of_version!(self.deserialize_state(bytes), V2.component, V3; "fmi2DeSerializeFMUstate")
     }
 
     #[inline]
@@ -240,22 +144,14 @@ impl Slave for Instance {
         if let Inner::V2(instance) = &mut self.inner {
             return instance.component.pass(inputs, values, step, outputs, results);
         }
-        if !inputs.is_empty() {
-            self.set_real(inputs, values)?;
-        }
-        let done = self.do_step(step.time, step.size, step.never_back)?;
-        if !outputs.is_empty() {
-            self.get_real(outputs, results)?;
-        }
-        Ok(done)
+        self.advance(&mut StepRequest::held(inputs, values, step, outputs, results))
     }
 
     fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
-        Ok(if let Inner::V3(instance) = &mut self.inner {
-            instance.hand_over_events(stop)
-        } else {
-            false
-        })
+        match &mut self.inner {
+            Inner::V3(instance) => Ok(instance.hand_over_events(stop)),
+            Inner::V1(_) | Inner::V2(_) => Ok(false),
+        }
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {
@@ -263,20 +159,25 @@ impl Slave for Instance {
     }
 
     fn log_calls(&mut self, sink: CallSink) -> bool {
-        match &mut self.inner {
-            Inner::V1(_) | Inner::V2(_) => false,
-            Inner::V3(instance) => {
-                instance.component.base.log_calls(sink);
-                true
-            }
+        if let Inner::V3(instance) = &mut self.inner {
+            instance.component.base.log_calls(sink);
         }
+        matches!(self.inner, Inner::V3(_))
     }
 
     fn guard_arrays(&mut self) {
-        of_version!(self.guard_arrays(), V1.component.base, V2.component.base, V3.component.base);
+        match &mut self.inner {
+            Inner::V1(instance) => instance.component.base.guard_arrays(),
+            Inner::V2(instance) => instance.component.base.guard_arrays(),
+            Inner::V3(instance) => instance.component.base.guard_arrays(),
+        }
     }
 
     fn take_warning(&mut self) -> bool {
-        of_version!(self.take_warning(), V1.component.base, V2.component.base, V3.component.base)
+        match &self.inner {
+            Inner::V1(instance) => instance.component.base.take_warning(),
+            Inner::V2(instance) => instance.component.base.take_warning(),
+            Inner::V3(instance) => instance.component.base.take_warning(),
+        }
     }
 }

@@ -29,7 +29,7 @@ pub use described::{DescriptionError, described_as};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError};
 pub use instance::Instance;
-pub use library::{Component, Interface, describe, describe_as, preload};
+pub use library::{Interface, describe, preload};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

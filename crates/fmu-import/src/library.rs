@@ -40,6 +40,8 @@ pub(crate) use load::{Binding, Loading};
 pub(crate) use log::Names;
 use log::Sink;
 #[cfg(target_os = "linux")]
+pub(crate) use log::log_message;
+#[cfg(target_os = "linux")]
 pub(crate) use surroundings::Surroundings;
 
 /// Returns the model description of FMI 2.0 that a library exported by `fmu::export!` generates. `resources` is the
@@ -53,13 +55,12 @@ pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
     describe_as(path, resources, Version::V2)
 }
 
-/// Returns the model description that a library exported by `fmu::export!` generates: of FMI 3.0 if `version` is
-/// [`Version::V3`], otherwise of FMI 2.0.
-///
-/// # Errors
-///
-/// Same as [`describe`].
-pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<String, LoadError> {
+/// Like [`describe`], but the description is of FMI 3.0 if `version` is [`Version::V3`].
+pub(crate) fn describe_as(
+    path: &Path,
+    resources: &Path,
+    version: Version,
+) -> Result<String, LoadError> {
     unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
         // SAFETY: `context` is the buffer below; the library gives `length` bytes.
         unsafe {
@@ -84,6 +85,14 @@ pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<St
     } else {
         Err(LoadError::Describe { path: path.to_owned(), message: text })
     }
+}
+
+/// Returns the names of the C functions of all versions.
+#[cfg(target_os = "linux")]
+pub(crate) fn function_names() -> impl Iterator<Item = &'static str> {
+    let names =
+        [Functions::NAMES, v1::functions::Functions::NAMES, v3::functions::Functions::NAMES];
+    names.into_iter().flatten().copied()
 }
 
 /// Returns a C string of a text without its NUL characters.
@@ -152,12 +161,11 @@ pub(crate) type Library = Loaded<Functions>;
 
 impl Library {
     /// Loads the library, and checks its version and that it has the required functions of `interface`.
-    pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
-        let handle = loading.load()?;
-        let functions = Functions::load(&handle, "");
-        check_version(loading.path, functions.get_version, "fmi2GetVersion", "2.0")?;
-        functions.require(loading.path, "", &functions::required(interface))?;
-        Ok(Self::new(functions, loading.path, handle))
+    pub(crate) fn open(
+        loading: &Loading<'_>,
+        interface: Interface,
+    ) -> Result<Arc<Self>, LoadError> {
+        Functions::open(loading, "", &functions::required(interface))
     }
 
     /// Calls `fmi2Instantiate` for `interface`. `resources` is the URI of the resources.
@@ -231,9 +239,9 @@ struct Hot {
 /// loaded until then.
 ///
 /// Each call returns a [`slave::CallError`] if the library lacks the function, if its status is neither `fmi2OK` nor
-/// `fmi2Warning`, or if it writes beside a guarded array ([`Component::guard_arrays`]).
-pub struct Component {
-    /// The pointers that [`Component::pass`] needs.
+/// `fmi2Warning`, or if it writes beside a guarded array ([`Base::guard_arrays`]).
+pub(crate) struct Component {
+    /// The pointers that [`Component::pass`] needs, which takes no note of warnings and guards no arrays.
     hot: Hot,
     pub(crate) base: Base<Functions>,
 }
@@ -254,18 +262,5 @@ impl Drop for Component {
             unsafe { free_instance(self.base.pointer) };
             self.base.place.leave();
         }
-    }
-}
-
-impl Component {
-    /// Returns whether a call has returned `fmi2Warning` since the last call of this function.
-    /// Warnings in [`Component::pass`] do not count.
-    pub fn take_warning(&mut self) -> bool {
-        self.base.take_warning()
-    }
-
-    /// Lets the calls from now on, except [`Component::pass`], get copies of arrays with canaries.
-    pub fn guard_arrays(&mut self) {
-        self.base.guard_arrays();
     }
 }

@@ -3,8 +3,6 @@
 //! FMI 1.0 has no initialization mode: `fmiInitializeSlave` or `fmiInitialize` is called when the master enters it.
 //! Values set before are start values; afterwards inputs can be set, and parameters are fixed.
 
-mod equations;
-
 use std::collections::{HashMap, HashSet};
 use std::ffi::{c_char, c_int};
 
@@ -13,7 +11,7 @@ use fmu_description::{Causality, Experiment, Kind, ModelDescription};
 use crate::library::Interface;
 use crate::library::v1::Component;
 use crate::v2::narrow;
-use slave::{CallError, EventInfo, ValueType};
+use slave::{CallError, CompletedStep, EventInfo, ValueType};
 
 /// An instance of an FMU of FMI 1.0 in this process.
 pub(crate) struct Instance {
@@ -116,8 +114,10 @@ impl Instance {
         accepted
     }
 
-    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
+    #[expect(clippy::unnecessary_wraps, reason = "as in FMI 2.0")]
+    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.experiment = *experiment;
+        Ok(())
     }
 
     pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
@@ -133,8 +133,10 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn exit_initialization_mode(&mut self) {
+    #[expect(clippy::unnecessary_wraps, reason = "as in the later versions")]
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         self.in_initialization_mode = false;
+        Ok(())
     }
 
     /// Returns the description, in which negated aliases have value references of their own.
@@ -265,6 +267,33 @@ impl Instance {
             return Ok(());
         }
         self.component.set_string(list, values)
+    }
+
+    // FMI 1.0 has no modes in model exchange: `fmiEventUpdate` is an event as a whole.
+    pub(crate) fn completed_integrator_step(
+        &mut self,
+        _never_back: bool,
+    ) -> Result<CompletedStep, CallError> {
+        self.component.completed_integrator_step()
+    }
+
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as in the later versions")]
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    /// Calls `fmiEventUpdate`. The first call after `fmiInitialize` returns the result of that function instead, unless
+    /// a value has been set since or the FMU needs another iteration.
+    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        match self.initialized.take() {
+            Some(info) if !info.discrete_states_need_update => Ok(info),
+            _ => self.component.event_update(),
+        }
+    }
+
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as in the later versions")]
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
     }
 }
 

@@ -1,7 +1,8 @@
 //! FMUs of FMI 2.0 for co-simulation and for model exchange as slaves.
 
+use crate::error::refused;
 use crate::library::Component;
-use slave::{CallError, Failure};
+use slave::CallError;
 
 /// An instance of an FMU of FMI 2.0 in this process.
 pub(crate) struct Instance {
@@ -17,8 +18,7 @@ pub(crate) fn narrow<T: TryFrom<i64>>(
     value: i64,
 ) -> Result<T, CallError> {
     T::try_from(value).map_err(|_| {
-        let what = format!("cannot take the value {value}, expected {expected}");
-        CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+        refused(function, format!("cannot take the value {value}, expected {expected}"))
     })
 }
 

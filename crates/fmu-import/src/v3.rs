@@ -11,30 +11,25 @@ mod clocked;
 mod clocks;
 mod derivatives;
 mod elements;
-mod equations;
-mod mode;
 mod modes;
 mod plan;
-mod refusal;
-mod scheduled;
 mod states;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use fmu_description::abi::Status;
 use fmu_description::{CoSimulation, Experiment, ModelDescription};
 
-use crate::error::LoadError;
+use crate::error::{LoadError, refused};
 use crate::library::v3::{Component, Instantiation, Interface, Library};
 use buffer::Buffer;
 use clocked::ClockedRuns;
 use clocks::Clocks;
 pub(crate) use elements::ElementView;
-use mode::Mode;
-use modes::State;
+use modes::{Mode, State};
 use plan::Plans;
-use refusal::{keeps_mode, refused};
-use slave::CallError;
+use slave::{CallError, Failure};
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
 /// with `loggingOn = false` alone an FMU is silent about its errors.
@@ -60,6 +55,27 @@ pub(crate) struct Instance {
     slots: Vec<State>,
     /// Values of structural parameters, by value reference.
     sizes: HashMap<u32, u64>,
+}
+
+/// Defines methods that get and set values: by which methods, with the names of the functions in errors.
+macro_rules! values {
+    ($(
+        $get:ident $set:ident: $type:ty =
+            $read:ident($get_name:literal $(, $convert:expr)?)
+            $write:ident($set_name:literal $(, $put:expr)?);
+    )*) => {
+        $(pub(crate) fn $get(
+            &mut self,
+            list: &[u32],
+            values: &mut [$type],
+        ) -> Result<(), CallError> {
+            self.$read($get_name, list, values $(, $convert)?)
+        }
+
+        pub(crate) fn $set(&mut self, list: &[u32], values: &[$type]) -> Result<(), CallError> {
+            self.$write($set_name, list, values $(, $put)?)
+        })*
+    };
 }
 
 impl Instance {
@@ -174,7 +190,7 @@ impl Instance {
         self.state.memory.clear();
         self.clocked = ClockedRuns::new(&view);
         (self.view, self.sizes) = (view, sizes);
-        self.plans.clear();
+        self.plans = Plans::default();
         Ok(())
     }
 
@@ -182,9 +198,11 @@ impl Instance {
         self.component.set_debug_logging(on, &[])
     }
 
-    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
+    #[expect(clippy::unnecessary_wraps, reason = "as in FMI 2.0")]
+    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.experiment = *experiment;
         self.state.time = experiment.start_time;
+        Ok(())
     }
 
     pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
@@ -210,54 +228,45 @@ impl Instance {
         self.write("fmi3SetFloat64", list, values, Buffer::put_real)
     }
 
-    pub(crate) fn get_integer(
-        &mut self,
-        list: &[u32],
-        values: &mut [i64],
-    ) -> Result<(), CallError> {
-        self.read("fmi3GetInt64", list, values, Buffer::integer)
+    values! {
+        get_integer set_integer: i64 =
+            read("fmi3GetInt64", Buffer::integer) write("fmi3SetInt64", Buffer::put_integer);
+        get_boolean set_boolean: i32 =
+            read("fmi3GetBoolean", Buffer::boolean) write("fmi3SetBoolean", Buffer::put_boolean);
+        get_string set_string: String = read_list("fmi3GetString") write_list("fmi3SetString");
+        get_binary set_binary: Vec<u8> = read_list("fmi3GetBinary") write_list("fmi3SetBinary");
     }
+}
 
-    pub(crate) fn set_integer(&mut self, list: &[u32], values: &[i64]) -> Result<(), CallError> {
-        self.write("fmi3SetInt64", list, values, Buffer::put_integer)
-    }
+/// Returns the error of an access to a value reference that no variable has.
+fn unknown(function: &'static str, reference: u32) -> CallError {
+    refused(
+        function,
+        format!("cannot access the value reference {reference}, which no variable has"),
+    )
+}
 
-    pub(crate) fn get_boolean(
-        &mut self,
-        list: &[u32],
-        values: &mut [i32],
-    ) -> Result<(), CallError> {
-        let convert = |buffer: &Buffer, place| Some(i32::from(buffer.integer(place)? != 0));
-        self.read("fmi3GetBoolean", list, values, convert)
-    }
+/// Returns whether the FMU is in the same mode as before a call that failed: the call was refused, or returned
+/// `fmi3Discard` (FMI 3.0.2, section 2.2.4). After `fmi3Error` it is in state Terminated (section 2.3.1).
+fn keeps_mode(error: &CallError) -> bool {
+    use Failure as F;
+    matches!(error.failure, F::InvalidAnswer(_) | F::Missing | F::Status(Status::Discard))
+}
 
-    pub(crate) fn set_boolean(&mut self, list: &[u32], values: &[i32]) -> Result<(), CallError> {
-        let put =
-            |buffer: &mut Buffer, place, value| buffer.put_integer(place, i64::from(value != 0));
-        self.write("fmi3SetBoolean", list, values, put)
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    pub(crate) fn get_string(
-        &mut self,
-        list: &[u32],
-        values: &mut [String],
-    ) -> Result<(), CallError> {
-        self.read_list("fmi3GetString", list, values)
-    }
-
-    pub(crate) fn set_string(&mut self, list: &[u32], values: &[String]) -> Result<(), CallError> {
-        self.write_list("fmi3SetString", list, values)
-    }
-
-    pub(crate) fn get_binary(
-        &mut self,
-        list: &[u32],
-        values: &mut [Vec<u8>],
-    ) -> Result<(), CallError> {
-        self.read_list("fmi3GetBinary", list, values)
-    }
-
-    pub(crate) fn set_binary(&mut self, list: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        self.write_list("fmi3SetBinary", list, values)
+    #[test]
+    fn a_refused_or_discarded_value_keeps_the_mode_and_an_error_does_not() {
+        assert!(keeps_mode(&refused("fmi3SetUInt64", "cannot take the value -1".to_owned())));
+        let of_status = |status| CallError {
+            function: "fmi3SetUInt64",
+            failure: Failure::Status(status),
+            messages: Vec::new(),
+        };
+        assert!(keeps_mode(&of_status(Status::Discard)));
+        assert!(!keeps_mode(&of_status(Status::Error)));
+        assert!(!keeps_mode(&of_status(Status::Fatal)));
     }
 }

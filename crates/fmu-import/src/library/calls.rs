@@ -21,22 +21,12 @@ macro_rules! function {
 }
 pub(super) use function;
 
-/// The end of the documentation of a call.
-macro_rules! errors {
-    () => {
-        "\n\n# Errors\n\n[`CallError`] if the library lacks the function, if its status is neither OK nor a \
-         warning, or if it writes beside a guarded array."
-    };
-}
-pub(super) use errors;
-
 /// Defines a method for each function that changes the mode only.
 macro_rules! modes {
-    ($($visibility:vis fn $method:ident = $name:literal;)*) => {
+    ($(fn $method:ident = $name:literal;)*) => {
         impl Component {
-            $(#[doc = concat!("Calls `", $name, "`.", $crate::library::calls::errors!())]
-            #[inline]
-            $visibility fn $method(&mut self) -> Result<(), CallError> {
+            $(#[inline]
+            pub(crate) fn $method(&mut self) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
                 self.base.log_call($name, String::new);
                 // SAFETY: the instance is alive.
@@ -52,13 +42,12 @@ pub(super) use modes;
 /// names the number of values, which only the functions of FMI 3.0 get.
 macro_rules! values {
     ($(
-        $visibility:vis fn $get:ident, $set:ident: $type:ty =
+        fn $get:ident, $set:ident: $type:ty =
             $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
     )*) => {
         impl Component {
-            $(#[doc = concat!("Calls `", $get_name, "`.", $crate::library::calls::errors!())]
-            #[inline]
-            $visibility fn $get(
+            $(#[inline]
+            pub(crate) fn $get(
                 &mut self,
                 references: &[u32],
                 values: &mut [$type],
@@ -72,10 +61,8 @@ macro_rules! values {
                 let done = canary::read(self.base.guards, references, values, call);
                 self.base.check_guarded($get_name, done, || format!(" {values:?}"))
             }
-
-            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
             #[inline]
-            $visibility fn $set(
+            pub(crate) fn $set(
                 &mut self,
                 references: &[u32],
                 values: &[$type],
@@ -97,12 +84,11 @@ pub(super) use values;
 /// Defines the methods for Strings, with the parameters of `values`.
 macro_rules! strings {
     (
-        $visibility:vis fn $get:ident, $set:ident =
+        fn $get:ident, $set:ident =
             $get_name:literal $set_name:literal, $count:ident $($length:ident)?;
     ) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
-            $visibility fn $set(
+            pub(crate) fn $set(
                 &mut self,
                 references: &[u32],
                 values: &[String],
@@ -123,8 +109,8 @@ macro_rules! strings {
                 self.base.check_guarded($set_name, done, String::new)
             }
 
-            #[doc = concat!("Calls `", $get_name, "` and copies the strings.", $crate::library::calls::errors!())]
-            $visibility fn $get(
+            #[doc = concat!("Calls `", $get_name, "` and copies the strings.")]
+            pub(crate) fn $get(
                 &mut self,
                 references: &[u32],
                 values: &mut [String],
@@ -151,11 +137,10 @@ pub(super) use strings;
 
 /// Defines the methods for derivatives of inputs and outputs with respect to time, for FMI 1.0 and 2.0.
 macro_rules! derivatives {
-    ($visibility:vis fn $set:ident, $get:ident = $set_name:literal $get_name:literal;) => {
+    (fn $set:ident, $get:ident = $set_name:literal $get_name:literal;) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_name, "`.", $crate::library::calls::errors!())]
             #[inline]
-            $visibility fn $set(
+            pub(crate) fn $set(
                 &mut self,
                 references: &[u32],
                 orders: &[i32],
@@ -165,16 +150,16 @@ macro_rules! derivatives {
                 let (pointer, guards) = (self.base.pointer, self.base.guards);
                 let count = same_length(references, values);
                 let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
-                    // SAFETY: the instance is alive; as many references as orders and values.
-                    let call = |list, array| unsafe { function(pointer, list, count, orders, array) };
+                    let call = |list, array| {
+                        // SAFETY: the instance is alive; as many references as orders and values.
+                        unsafe { function(pointer, list, count, orders, array) }
+                    };
                     canary::write(guards, references, values, call)
                 });
                 self.base.check_guarded($set_name, done, String::new)
             }
-
-            #[doc = concat!("Calls `", $get_name, "`.", $crate::library::calls::errors!())]
             #[inline]
-            $visibility fn $get(
+            pub(crate) fn $get(
                 &mut self,
                 references: &[u32],
                 orders: &[i32],
@@ -184,8 +169,10 @@ macro_rules! derivatives {
                 let (pointer, guards) = (self.base.pointer, self.base.guards);
                 let count = same_length(references, values);
                 let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
-                    // SAFETY: the instance is alive; as many references as orders and values.
-                    let call = |list, array| unsafe { function(pointer, list, count, orders, array) };
+                    let call = |list, array| {
+                        // SAFETY: the instance is alive; as many references as orders and values.
+                        unsafe { function(pointer, list, count, orders, array) }
+                    };
                     canary::read(guards, references, values, call)
                 });
                 self.base.check_guarded($get_name, done, String::new)
@@ -199,14 +186,14 @@ pub(super) use derivatives;
 /// values, event indicators.
 macro_rules! equations {
     (
-        $time_visibility:vis fn set_time = $set_time:literal;
-        $states_visibility:vis fn set_continuous_states = $set_states:literal;
-        $($visibility:vis fn $get:ident = $name:literal;)*
+        fn set_time = $set_time:literal;
+        fn set_continuous_states = $set_states:literal;
+        $(fn $get:ident = $name:literal;)*
     ) => {
         impl Component {
-            #[doc = concat!("Calls `", $set_time, "`; `time` is in s.", $crate::library::calls::errors!())]
+            /// `time` is in s.
             #[inline]
-            $time_visibility fn set_time(&mut self, time: f64) -> Result<(), CallError> {
+            pub(crate) fn set_time(&mut self, time: f64) -> Result<(), CallError> {
                 let function = function!(self.set_time, $set_time);
                 self.base.log_call($set_time, || format!("{time:?}"));
                 self.base.place.set_time(time);
@@ -214,10 +201,8 @@ macro_rules! equations {
                 let status = unsafe { function(self.base.pointer, time) };
                 self.base.check($set_time, status)
             }
-
-            #[doc = concat!("Calls `", $set_states, "`.", $crate::library::calls::errors!())]
             #[inline]
-            $states_visibility fn set_continuous_states(
+            pub(crate) fn set_continuous_states(
                 &mut self,
                 states: &[f64],
             ) -> Result<(), CallError> {
@@ -229,9 +214,8 @@ macro_rules! equations {
                 self.base.check_guarded($set_states, done, String::new)
             }
 
-            $(#[doc = concat!("Calls `", $name, "`.", $crate::library::calls::errors!())]
-            #[inline]
-            $visibility fn $get(&mut self, values: &mut [f64]) -> Result<(), CallError> {
+            $(#[inline]
+            pub(crate) fn $get(&mut self, values: &mut [f64]) -> Result<(), CallError> {
                 let function = function!(self.$get, $name);
                 self.base.log_call($name, String::new);
                 let count = values.len();
@@ -246,35 +230,35 @@ macro_rules! equations {
 pub(super) use equations;
 
 modes! {
-    pub fn enter_initialization_mode = "fmi2EnterInitializationMode";
-    pub fn exit_initialization_mode = "fmi2ExitInitializationMode";
-    pub fn terminate = "fmi2Terminate";
-    pub fn enter_event_mode = "fmi2EnterEventMode";
-    pub fn enter_continuous_time_mode = "fmi2EnterContinuousTimeMode";
+    fn enter_initialization_mode = "fmi2EnterInitializationMode";
+    fn exit_initialization_mode = "fmi2ExitInitializationMode";
+    fn terminate = "fmi2Terminate";
+    fn enter_event_mode = "fmi2EnterEventMode";
+    fn enter_continuous_time_mode = "fmi2EnterContinuousTimeMode";
 }
 
 values! {
-    pub fn get_real, set_real: f64 = "fmi2GetReal" "fmi2SetReal", same_length;
-    pub fn get_integer, set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger", same_length;
-    pub fn get_boolean, set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean", same_length;
+    fn get_real, set_real: f64 = "fmi2GetReal" "fmi2SetReal", same_length;
+    fn get_integer, set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger", same_length;
+    fn get_boolean, set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean", same_length;
 }
 
 strings! {
-    pub fn get_string, set_string = "fmi2GetString" "fmi2SetString", same_length;
+    fn get_string, set_string = "fmi2GetString" "fmi2SetString", same_length;
 }
 
 derivatives! {
-    pub fn set_real_input_derivatives, get_real_output_derivatives =
+    fn set_input_derivatives, get_output_derivatives =
         "fmi2SetRealInputDerivatives" "fmi2GetRealOutputDerivatives";
 }
 
 equations! {
-    pub fn set_time = "fmi2SetTime";
-    pub fn set_continuous_states = "fmi2SetContinuousStates";
-    pub fn get_continuous_states = "fmi2GetContinuousStates";
-    pub fn get_derivatives = "fmi2GetDerivatives";
-    pub fn get_nominals = "fmi2GetNominalsOfContinuousStates";
-    pub fn get_event_indicators = "fmi2GetEventIndicators";
+    fn set_time = "fmi2SetTime";
+    fn set_continuous_states = "fmi2SetContinuousStates";
+    fn get_continuous_states = "fmi2GetContinuousStates";
+    fn get_derivatives = "fmi2GetDerivatives";
+    fn get_nominals_of_continuous_states = "fmi2GetNominalsOfContinuousStates";
+    fn get_event_indicators = "fmi2GetEventIndicators";
 }
 
 /// Returns the common length of both slices; panics if they differ.
@@ -284,19 +268,19 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     references.len()
 }
 
-#[expect(clippy::missing_errors_doc, reason = "the type documents the error of every call")]
 impl Component {
     /// Calls `fmi2SetDebugLogging` for all categories.
-    pub fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
         // SAFETY: the instance is alive; no categories.
         let status = unsafe { function(self.base.pointer, on.into(), 0, std::ptr::null()) };
         self.base.check(NAME, status)
     }
-
-    /// Calls `fmi2SetupExperiment`.
-    pub fn setup_experiment(&mut self, e: &fmu_description::Experiment) -> Result<(), CallError> {
+    pub(crate) fn setup_experiment(
+        &mut self,
+        e: &fmu_description::Experiment,
+    ) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =
@@ -309,9 +293,7 @@ impl Component {
         };
         self.base.check(NAME, status)
     }
-
-    /// Calls `fmi2NewDiscreteStates`.
-    pub fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
         let function = function!(self.new_discrete_states, NAME);
@@ -328,7 +310,7 @@ impl Component {
     }
 
     /// Calls `fmi2CompletedIntegratorStep`. `never_back` is `noSetFMUStatePriorToCurrentPoint`.
-    pub fn completed_integrator_step(
+    pub(crate) fn completed_integrator_step(
         &mut self,
         never_back: bool,
     ) -> Result<CompletedStep, CallError> {
@@ -341,9 +323,7 @@ impl Component {
         self.base.check(NAME, status)?;
         Ok(CompletedStep { enter_event_mode: event != 0, terminate_simulation: end != 0 })
     }
-
-    /// Calls `fmi2GetDirectionalDerivative`.
-    pub fn directional_derivative(
+    pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
         knowns: &[u32],
@@ -351,7 +331,7 @@ impl Component {
         changes: &mut [f64],
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi2GetDirectionalDerivative";
-        let function = function!(self.get_directional_derivative, NAME);
+        let function = function!(self.directional_derivative, NAME);
         let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
         let (pointer, guards) = (self.base.pointer, self.base.guards);
         let done = canary::constant(guards, canary::REFERENCES, knowns, |columns| {

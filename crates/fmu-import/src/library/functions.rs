@@ -14,7 +14,7 @@ use super::table::functions;
 type References = *const u32;
 
 functions! {
-    get_version = "fmi2GetVersion": fn() -> Text;
+    "2.0" = "fmi2GetVersion";
     instantiate = "fmi2Instantiate":
         fn(Text, c_int, Text, Text, *const fmi2CallbackFunctions, Boolean, Boolean) -> Component;
     free_instance = "fmi2FreeInstance": fn(Component);
@@ -40,11 +40,11 @@ functions! {
     serialize_state = "fmi2SerializeFMUstate": fn(Component, State, *mut c_char, usize) -> Status;
     deserialize_state = "fmi2DeSerializeFMUstate":
         fn(Component, *const c_char, usize, *mut State) -> Status;
-    get_directional_derivative = "fmi2GetDirectionalDerivative":
+    directional_derivative = "fmi2GetDirectionalDerivative":
         fn(Component, References, usize, References, usize, *const f64, *mut f64) -> Status;
-    set_real_input_derivatives = "fmi2SetRealInputDerivatives":
+    set_input_derivatives = "fmi2SetRealInputDerivatives":
         fn(Component, References, usize, *const c_int, *const f64) -> Status;
-    get_real_output_derivatives = "fmi2GetRealOutputDerivatives":
+    get_output_derivatives = "fmi2GetRealOutputDerivatives":
         fn(Component, References, usize, *const c_int, *mut f64) -> Status;
     do_step = "fmi2DoStep": fn(Component, f64, f64, Boolean) -> Status;
     cancel_step = "fmi2CancelStep": fn(Component) -> Status;
@@ -57,7 +57,7 @@ functions! {
     set_continuous_states = "fmi2SetContinuousStates": fn(Component, *const f64, usize) -> Status;
     get_continuous_states = "fmi2GetContinuousStates": fn(Component, *mut f64, usize) -> Status;
     get_derivatives = "fmi2GetDerivatives": fn(Component, *mut f64, usize) -> Status;
-    get_nominals = "fmi2GetNominalsOfContinuousStates": fn(Component, *mut f64, usize) -> Status;
+    get_nominals_of_continuous_states = "fmi2GetNominalsOfContinuousStates": fn(Component, *mut f64, usize) -> Status;
     set_time = "fmi2SetTime": fn(Component, f64) -> Status;
     get_event_indicators = "fmi2GetEventIndicators": fn(Component, *mut f64, usize) -> Status;
     completed_integrator_step = "fmi2CompletedIntegratorStep":
@@ -83,12 +83,7 @@ const COMMON: [&str; 5] = [
 impl Functions {
     /// Removes the functions of co-simulation: an instance for model exchange refuses them as missing.
     pub(super) fn without_co_simulation(self) -> Self {
-        Self {
-            do_step: None,
-            set_real_input_derivatives: None,
-            get_real_output_derivatives: None,
-            ..self
-        }
+        Self { do_step: None, set_input_derivatives: None, get_output_derivatives: None, ..self }
     }
 }
 

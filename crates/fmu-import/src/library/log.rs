@@ -6,6 +6,7 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 
 use fmu_description::abi::{Status, fmi2CallbackLogger};
+use tracing::Level;
 
 use super::foreign;
 use crate::crash::{Place, last_of_this_thread};
@@ -55,7 +56,8 @@ impl Sink {
             Some(names) => with_names(text, &**names),
             None => text.to_owned(),
         };
-        log_message(self.place.instance(), Some(self.place.time()), status, category, &text);
+        let (instance, time) = (self.place.instance(), Some(self.place.time()));
+        log_message(level_of(status), instance, category, time, &text);
         if let Ok(mut messages) = self.messages.lock() {
             if messages.len() == KEPT {
                 messages.pop_front();
@@ -65,15 +67,29 @@ impl Sink {
     }
 }
 
-fn log_message(instance: &str, time: Option<f64>, status: c_int, category: &str, text: &str) {
+/// Returns the level at which a message with this status is logged.
+fn level_of(status: c_int) -> Level {
     match Status::from_c(status) {
-        Some(Status::OK) => {
-            tracing::info!(target: "fmu", instance, category, time, "{text}");
-        }
-        Some(Status::Warning | Status::Discard | Status::Pending) => {
-            tracing::warn!(target: "fmu", instance, category, time, "{text}");
-        }
-        _ => tracing::error!(target: "fmu", instance, category, time, "{text}"),
+        Some(Status::OK) => Level::INFO,
+        Some(Status::Warning | Status::Discard | Status::Pending) => Level::WARN,
+        _ => Level::ERROR,
+    }
+}
+
+/// Logs a message of an FMU; `time` is that of the instance in s, if it is known.
+pub(crate) fn log_message(
+    level: Level,
+    instance: &str,
+    category: &str,
+    time: Option<f64>,
+    text: &str,
+) {
+    match level {
+        Level::ERROR => tracing::error!(target: "fmu", instance, category, time, "{text}"),
+        Level::WARN => tracing::warn!(target: "fmu", instance, category, time, "{text}"),
+        Level::INFO => tracing::info!(target: "fmu", instance, category, time, "{text}"),
+        Level::DEBUG => tracing::debug!(target: "fmu", instance, category, time, "{text}"),
+        Level::TRACE => tracing::trace!(target: "fmu", instance, category, time, "{text}"),
     }
 }
 
@@ -118,7 +134,9 @@ fn receive_unmatched(instance: Option<&str>, status: c_int, category: &str, text
         .or_else(|| find(|sink| Some(sink.place.instance()) == instance));
     match sink {
         Some(sink) => sink.receive(status, category, text),
-        None => log_message(instance.unwrap_or("an FMU"), None, status, category, text),
+        None => {
+            log_message(level_of(status), instance.unwrap_or("an FMU"), category, None, text);
+        }
     }
 }
 

@@ -11,15 +11,15 @@ use slave::{CallError, Failure, absent};
 /// Defines the methods for FMU states, for FMI 2.0 and 3.0.
 macro_rules! states {
     (
-        $visibility:vis fn save_state = $get:literal;
+        fn save_state = $get:literal;
         restore_state = $set:literal;
         serialize_state = $size:literal $serialize:literal;
         deserialize_state = $deserialize:literal;
         free_state = $free:literal;
     ) => {
         impl Component {
-            #[doc = concat!("Saves the current state in `slot` (`", $get, "`).", $crate::library::calls::errors!())]
-            $visibility fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+            #[doc = concat!("Saves the current state in `slot` (`", $get, "`).")]
+            pub(crate) fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
                 let function = function!(self.get_state, $get);
                 self.base.log_call($get, String::new);
                 let saved = &mut self.base.saved;
@@ -31,13 +31,8 @@ macro_rules! states {
                 self.base.check($get, status)
             }
 
-            #[doc = concat!("Restores the state in `slot` (`", $set, "`).")]
-            ///
-            /// # Errors
-            ///
-            /// [`CallError`] if the slot is empty, if the library lacks the function, or if its status is neither
-            /// OK nor a warning.
-            $visibility fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+            #[doc = concat!("Restores the state in `slot` (`", $set, "`); an error if the slot is empty.")]
+            pub(crate) fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
                 let state = self.base.saved.get(slot).copied().unwrap_or(null_mut());
                 if state.is_null() {
                     let what = format!("cannot restore the state of slot {slot}: the slot is empty");
@@ -72,11 +67,8 @@ macro_rules! states {
                 }
             }
 
-            #[doc = concat!(
-                "Serializes the current state (`", $get, "`, `", $serialize, "`).",
-                $crate::library::calls::errors!()
-            )]
-            $visibility fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+            #[doc = concat!("Serializes the current state (`", $get, "`, `", $serialize, "`).")]
+            pub(crate) fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
                 let function = function!(self.get_state, $get);
                 self.base.log_call($get, String::new);
                 let mut state = null_mut();
@@ -108,11 +100,8 @@ macro_rules! states {
                 Ok(bytes)
             }
 
-            #[doc = concat!(
-                "Restores a serialized state (`", $deserialize, "`, `", $set, "`).",
-                $crate::library::calls::errors!()
-            )]
-            $visibility fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+            #[doc = concat!("Restores a serialized state (`", $deserialize, "`, `", $set, "`).")]
+            pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
                 let mut state = null_mut();
                 let function = function!(self.deserialize_state, $deserialize);
                 self.base.log_call($deserialize, String::new);
@@ -132,7 +121,7 @@ macro_rules! states {
 pub(super) use states;
 
 states! {
-    pub fn save_state = "fmi2GetFMUstate";
+    fn save_state = "fmi2GetFMUstate";
     restore_state = "fmi2SetFMUstate";
     serialize_state = "fmi2SerializedFMUstateSize" "fmi2SerializeFMUstate";
     deserialize_state = "fmi2DeSerializeFMUstate";

@@ -1,12 +1,13 @@
 //! `fmi2DoStep` and the evaluation of its status.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::c_int;
+use std::ffi::{c_int, c_void};
 use std::time::{Duration, Instant};
 
 use fmu_description::abi::{Status, StatusKind};
 
 use super::Component;
+use super::base::Base;
 use super::calls::{function, same_length};
 use slave::{CallError, CommunicationStep, Failure, StepResult, absent};
 
@@ -18,14 +19,10 @@ const GET: &str = "fmi2GetReal";
 pub(super) const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
-    /// Calls `fmi2DoStep` from `time` with the step `size`, both in s.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks the function, if the step fails or exceeds the time limit, or if
-    /// the FMU reports an impossible time for a discarded step.
+    /// Calls `fmi2DoStep` from `time` with the step `size`, both in s. An error if the step fails or exceeds the time
+    /// limit, or if the FMU reports an impossible time for a discarded step.
     #[inline]
-    pub fn do_step(
+    pub(crate) fn do_step(
         &mut self,
         time: f64,
         size: f64,
@@ -46,13 +43,8 @@ impl Component {
     ///
     /// `fmi2OK` and `fmi2Warning` are handled inline; every other status goes through the methods of
     /// the single calls.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the library lacks a function, if a call or the step fails, if the step exceeds the time limit,
-    /// or if the FMU reports an impossible time for a discarded step.
     #[inline]
-    pub fn pass(
+    pub(crate) fn pass(
         &mut self,
         inputs: &[u32],
         values: &[f64],
@@ -117,34 +109,38 @@ impl Component {
         }
         Ok(done)
     }
+}
 
-    /// Calls `fmi2GetBooleanStatus` for `fmi2Terminated`.
-    fn terminated(&mut self) -> Result<bool, CallError> {
-        const NAME: &str = "fmi2GetBooleanStatus";
-        let mut value = 0;
-        let function = function!(self.get_boolean_status, NAME);
-        let kind = StatusKind::Terminated as c_int;
+/// A function that writes a property of the last step.
+type Query<T> = unsafe extern "C" fn(*mut c_void, c_int, *mut T) -> c_int;
+
+impl<F: Copy> Base<F> {
+    /// Asks for a property of the last step by `function`, called `name`. Returns `value` if the FMU writes none.
+    pub(super) fn ask<T>(
+        &self,
+        function: Option<Query<T>>,
+        name: &'static &'static str,
+        kind: StatusKind,
+        mut value: T,
+    ) -> Result<T, CallError> {
+        let function = function.ok_or_else(|| absent(name))?;
+        self.place.enter(name);
         // SAFETY: the instance is alive; one place to write to.
-        let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
-        self.base.check(NAME, status)?;
-        Ok(value != 0)
-    }
-
-    /// Returns whether the FMU requests the end of the simulation; false if it does not answer this question.
-    fn is_terminated(&mut self) -> bool {
-        self.terminated().unwrap_or(false)
+        let status = unsafe { function(self.pointer, kind as c_int, &raw mut value) };
+        self.check(name, status)?;
+        Ok(value)
     }
 }
 
-/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. The function `terminated` returns whether the
-/// instance requests the end of the simulation.
+/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. Only FMI 2.0 has a request of the FMU to end the
+/// simulation, `get_boolean_status`.
 macro_rules! finish_step {
     (
         do_step = $do_step:literal, discard = $discard:literal;
         cancel_step = $cancel:literal;
         get_status = $get_status:literal;
         get_real_status = $get_real_status:literal;
-        terminated = $terminated:path;
+        $($get_boolean_status:ident = $terminated:literal;)?
     ) => {
         impl Component {
             /// Evaluates a step whose status is not OK: waits while it is pending, up to the time limit, and asks for
@@ -165,7 +161,8 @@ macro_rules! finish_step {
                     }
                     std::thread::sleep(pause);
                     pause = (2 * pause).min(PAUSE);
-                    let answer = self.status();
+                    let function = self.base.functions.get_status;
+                    let answer = self.base.ask(function, &$get_status, StatusKind::DoStepStatus, 0);
                     let fatal = Failure::Status(Status::Fatal);
                     if answer.as_ref().is_err_and(|error| error.failure != fatal) {
                         self.cancel();
@@ -175,11 +172,19 @@ macro_rules! finish_step {
                 if status != Status::Discard as c_int {
                     return self.base.check($do_step, status).map(|()| StepResult::Whole);
                 }
-                let reached = self.last_successful_time().map_err(|CallError { messages, .. }| {
+                let (function, kind) =
+                    (self.base.functions.get_real_status, StatusKind::LastSuccessfulTime);
+                let answer = self.base.ask(function, &$get_real_status, kind, f64::NAN);
+                let reached = answer.map_err(|CallError { messages, .. }| {
                     let failure = Failure::Status(Status::Discard);
                     CallError { function: $do_step, failure, messages }
                 })?;
-                let terminated = $terminated(self);
+                // An FMU that does not answer has no such request.
+                let terminated = false $(|| {
+                    let function = self.base.functions.$get_boolean_status;
+                    let answer = self.base.ask(function, &$terminated, StatusKind::Terminated, 0);
+                    answer.is_ok_and(|value| value != 0)
+                })?;
                 let rounding = 1e-9 * (size.abs() + time.abs());
                 if !(reached >= time - rounding && reached <= time + size + rounding) {
                     let what = format!(
@@ -202,28 +207,6 @@ macro_rules! finish_step {
                 self.base.place.leave();
                 self.base.abandoned = status != Some(Status::OK as c_int);
             }
-
-            /// Asks for the status of a pending step.
-            fn status(&mut self) -> Result<c_int, CallError> {
-                let mut value = 0;
-                let function = function!(self.get_status, $get_status);
-                let kind = StatusKind::DoStepStatus as c_int;
-                // SAFETY: the instance is alive; one place to write to.
-                let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
-                self.base.check($get_status, status)?;
-                Ok(value)
-            }
-
-            /// Asks for the time in s that a discarded step has reached.
-            fn last_successful_time(&mut self) -> Result<f64, CallError> {
-                let mut value = f64::NAN;
-                let function = function!(self.get_real_status, $get_real_status);
-                let kind = StatusKind::LastSuccessfulTime as c_int;
-                // SAFETY: the instance is alive; one place to write to.
-                let status = unsafe { function(self.base.pointer, kind, &raw mut value) };
-                self.base.check($get_real_status, status)?;
-                Ok(value)
-            }
         }
     };
 }
@@ -234,5 +217,5 @@ finish_step! {
     cancel_step = "fmi2CancelStep";
     get_status = "fmi2GetStatus";
     get_real_status = "fmi2GetRealStatus";
-    terminated = Component::is_terminated;
+    get_boolean_status = "fmi2GetBooleanStatus";
 }

@@ -1,41 +1,52 @@
 //! The macro that declares the function table of a library, for each version of the standard.
 
-/// Declares the function table and its loader.
+/// Declares the function table. The first function returns the version of FMI, which is to be `$version`.
 macro_rules! functions {
-    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
+    (
+        $version:literal = $get_version:literal;
+        $($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*
+    ) => {
         /// The functions of a library. The standard requires every function in every library. Here a library may lack
-        /// those that [`Functions::require`] does not check: they fail when they are called.
+        /// those that [`Functions::open`] does not check: they fail when they are called.
         #[derive(Clone, Copy)]
         pub(crate) struct Functions {
             $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
         }
 
         impl Functions {
-            /// Looks up the functions. Their symbols are `prefix` and the name in the standard.
-            pub(super) fn load(handle: &libloading::Library, prefix: &str) -> Self {
-                Self { $($field: {
-                    // SAFETY: the standard gives this name this signature.
-                    let symbol = unsafe { handle.get(format!("{prefix}{}\0", $name).as_bytes()) };
-                    symbol.ok().map(|symbol| *symbol)
-                },)* }
-            }
+            /// The names of the functions in the standard.
+            #[cfg(target_os = "linux")]
+            pub(crate) const NAMES: &[&str] = &[$($name,)*];
 
-            /// Checks that the library at `path` exports the functions `required`. `prefix` is that of their symbols.
-            pub(super) fn require(
-                &self,
-                path: &std::path::Path,
+            /// Loads a library, and checks its version and that it exports the functions `required`. Its symbols are
+            /// `prefix` and the name in the standard.
+            pub(super) fn open(
+                loading: &$crate::library::Loading<'_>,
                 prefix: &str,
                 required: &[&[&str]],
-            ) -> Result<(), crate::LoadError> {
+            ) -> Result<std::sync::Arc<$crate::library::Loaded<Self>>, $crate::LoadError> {
+                let handle = loading.load()?;
+                let symbol = |name: &str| format!("{prefix}{name}\0");
+                // SAFETY: the standard gives each name its signature.
+                let (get_version, functions) = unsafe {
+                    let get_version = handle.get(symbol($get_version).as_bytes()).ok();
+                    let functions = Self { $($field: {
+                        handle.get(symbol($name).as_bytes()).ok().map(|function| *function)
+                    },)* };
+                    (get_version.map(|function| *function), functions)
+                };
+                let path = loading.path;
+                $crate::library::check_version(path, get_version, $get_version, $version)?;
                 let has = |function: &str| match function {
-                    $($name => self.$field.is_some(),)*
+                    $($name => functions.$field.is_some(),)*
                     _ => false,
                 };
                 let missing = required.iter().copied().flatten().find(|function| !has(function));
                 missing.map_or(Ok(()), |function| {
                     let (path, function) = (path.to_owned(), format!("{prefix}{function}"));
-                    Err(crate::LoadError::Missing { path, function })
-                })
+                    Err($crate::LoadError::Missing { path, function })
+                })?;
+                Ok($crate::library::Loaded::new(functions, path, handle).into())
             }
         }
     };

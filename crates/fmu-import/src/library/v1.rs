@@ -3,23 +3,24 @@
 //! The functions have the model identifier as prefix. [`Component`] has one method for each C function.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-mod equations;
-mod functions;
-mod step;
+pub(super) mod functions;
 
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use fmu_description::Version;
+use fmu_description::abi::{Status, StatusKind};
 
 use super::base::{Base, Loaded};
-use super::calls::{derivatives, function, modes, same_length, strings, values};
+use super::calls::{derivatives, equations, function, modes, same_length, strings, values};
 use super::log::{Names, Sink, logger};
-use super::{Interface, Loading, c_string, calloc, canary, check_version, copy_strings, free};
+use super::step::{PAUSE, finish_step};
+use super::{Interface, Loading, c_string, calloc, canary, copy_strings, free};
 use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{Callbacks, Functions, ModelCallbacks};
-use slave::{CallError, absent};
+use slave::{CallError, CompletedStep, EventInfo, Failure, StepResult, absent};
 
 /// The type of an FMU whose library runs in this process (FMI 1.0 for co-simulation, section 3.4.1).
 const MIME_TYPE: &CStr = c"application/x-fmu-sharedlibrary";
@@ -33,13 +34,9 @@ impl Library {
         loading: &Loading<'_>,
         model_identifier: &str,
         interface: Interface,
-    ) -> Result<Self, LoadError> {
-        let handle = loading.load()?;
+    ) -> Result<Arc<Self>, LoadError> {
         let prefix = format!("{model_identifier}_");
-        let functions = Functions::load(&handle, &prefix);
-        check_version(loading.path, functions.get_version, "fmiGetVersion", "1.0")?;
-        functions.require(loading.path, &prefix, &[functions::required(interface)])?;
-        Ok(Self::new(functions, loading.path, handle))
+        Functions::open(loading, &prefix, &[functions::required(interface)])
     }
 
     /// Calls `fmiInstantiateSlave` or `fmiInstantiateModel`. `location` is the URI of the unpacked FMU.
@@ -124,7 +121,6 @@ impl Drop for Component {
 }
 
 impl Component {
-    /// Calls `fmiSetDebugLogging`.
     pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmiSetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
@@ -132,8 +128,6 @@ impl Component {
         let status = unsafe { function(self.base.pointer, on.into()) };
         self.base.check(NAME, status)
     }
-
-    /// Calls `fmiInitializeSlave`.
     pub(crate) fn initialize(&mut self, start: f64, stop: Option<f64>) -> Result<(), CallError> {
         const NAME: &str = "fmiInitializeSlave";
         let function = function!(self.initialize, NAME);
@@ -152,6 +146,69 @@ impl Component {
             Interface::ModelExchange => self.terminate_model(),
         }
     }
+
+    /// Calls `fmiDoStep` from `time` with the step `size`, both in s. The last step is accepted
+    /// (`newStep`).
+    #[inline]
+    pub(crate) fn do_step(&mut self, time: f64, size: f64) -> Result<StepResult, CallError> {
+        const NAME: &str = "fmiDoStep";
+        let function = function!(self.do_step, NAME);
+        self.base.place.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.base.pointer, time, size, 1) };
+        self.base.place.leave();
+        if status == Status::OK as c_int {
+            return Ok(StepResult::Whole);
+        }
+        self.finish_step(status, time, size)
+    }
+    pub(crate) fn initialize_model(
+        &mut self,
+        tolerance: Option<f64>,
+    ) -> Result<EventInfo, CallError> {
+        const NAME: &str = "fmiInitialize";
+        let function = function!(self.initialize_model, NAME);
+        let mut info = functions::EventInfo::default();
+        let (controlled, tolerance) = (tolerance.is_some().into(), tolerance.unwrap_or(0.0));
+        // SAFETY: the instance is alive; one place for the result.
+        let status = unsafe { function(self.base.pointer, controlled, tolerance, &raw mut info) };
+        self.base.check(NAME, status)?;
+        Ok(info.into())
+    }
+    #[inline]
+    pub(crate) fn completed_integrator_step(&mut self) -> Result<CompletedStep, CallError> {
+        const NAME: &str = "fmiCompletedIntegratorStep";
+        let function = function!(self.completed_integrator_step, NAME);
+        let mut event = 0;
+        // SAFETY: the instance is alive; one place for the result.
+        let status = unsafe { function(self.base.pointer, &raw mut event) };
+        self.base.check(NAME, status)?;
+        Ok(CompletedStep { enter_event_mode: event != 0, terminate_simulation: false })
+    }
+
+    /// Calls `fmiEventUpdate`, which iterates until nothing changes any more.
+    pub(crate) fn event_update(&mut self) -> Result<EventInfo, CallError> {
+        const NAME: &str = "fmiEventUpdate";
+        let function = function!(self.event_update, NAME);
+        let mut info = functions::EventInfo::default();
+        // SAFETY: the instance is alive; one place for the result.
+        let status = unsafe { function(self.base.pointer, 0, &raw mut info) };
+        self.base.check(NAME, status)?;
+        Ok(info.into())
+    }
+}
+
+impl From<functions::EventInfo> for EventInfo {
+    fn from(info: functions::EventInfo) -> Self {
+        Self {
+            discrete_states_need_update: info.iteration_converged == 0,
+            terminate_simulation: info.terminate_simulation != 0,
+            // The states are other variables: so are their nominal values.
+            nominals_changed: info.state_value_references_changed != 0,
+            values_changed: info.state_values_changed != 0,
+            next_event_time: (info.upcoming_time_event != 0).then_some(info.next_event_time),
+        }
+    }
 }
 
 modes! {
@@ -160,16 +217,32 @@ modes! {
 }
 
 values! {
-    pub(crate) fn get_real, set_real: f64 = "fmiGetReal" "fmiSetReal", same_length;
-    pub(crate) fn get_integer, set_integer: c_int = "fmiGetInteger" "fmiSetInteger", same_length;
-    pub(crate) fn get_boolean, set_boolean: c_char = "fmiGetBoolean" "fmiSetBoolean", same_length;
+    fn get_real, set_real: f64 = "fmiGetReal" "fmiSetReal", same_length;
+    fn get_integer, set_integer: c_int = "fmiGetInteger" "fmiSetInteger", same_length;
+    fn get_boolean, set_boolean: c_char = "fmiGetBoolean" "fmiSetBoolean", same_length;
 }
 
 strings! {
-    pub(crate) fn get_string, set_string = "fmiGetString" "fmiSetString", same_length;
+    fn get_string, set_string = "fmiGetString" "fmiSetString", same_length;
 }
 
 derivatives! {
-    pub(crate) fn set_input_derivatives, get_output_derivatives =
+    fn set_input_derivatives, get_output_derivatives =
         "fmiSetRealInputDerivatives" "fmiGetRealOutputDerivatives";
+}
+
+equations! {
+    fn set_time = "fmiSetTime";
+    fn set_continuous_states = "fmiSetContinuousStates";
+    fn get_continuous_states = "fmiGetContinuousStates";
+    fn get_derivatives = "fmiGetDerivatives";
+    fn get_event_indicators = "fmiGetEventIndicators";
+    fn get_nominals_of_continuous_states = "fmiGetNominalContinuousStates";
+}
+
+finish_step! {
+    do_step = "fmiDoStep", discard = "fmiDiscard";
+    cancel_step = "fmiCancelStep";
+    get_status = "fmiGetStatus";
+    get_real_status = "fmiGetRealStatus";
 }

@@ -5,12 +5,9 @@
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod calls;
-mod equations;
-mod functions;
+pub(super) mod functions;
 mod intermediate;
-mod states;
 mod step;
-mod values;
 
 use std::ffi::c_void;
 use std::sync::Arc;
@@ -19,7 +16,7 @@ use fmu_description::Version;
 
 use super::base::{Base, Loaded};
 use super::log::{Sink, receive_message};
-use super::{Loading, c_string, check_version};
+use super::{Loading, c_string};
 use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption};
@@ -76,12 +73,11 @@ pub(crate) struct Instantiation<'a> {
 
 impl Library {
     /// Loads the library, and checks its version and that it has the required functions of `interface`.
-    pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
-        let handle = loading.load()?;
-        let functions = Functions::load(&handle, "");
-        check_version(loading.path, functions.get_version, "fmi3GetVersion", "3.0")?;
-        functions.require(loading.path, "", &functions::required(interface))?;
-        Ok(Self::new(functions, loading.path, handle))
+    pub(crate) fn open(
+        loading: &Loading<'_>,
+        interface: Interface,
+    ) -> Result<Arc<Self>, LoadError> {
+        Functions::open(loading, "", &functions::required(interface))
     }
 
     /// Calls the C function of `arguments.interface`; returns null if it fails or is missing.

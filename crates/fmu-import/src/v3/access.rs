@@ -7,9 +7,10 @@ use fmu_description::NativeType;
 use super::Instance;
 use super::buffer::Buffer;
 use super::clocked::TextOrBytes;
-use super::mode::Mode;
+use super::modes::Mode;
 use super::plan::Run;
-use super::refusal::{refused, unknown};
+use super::unknown;
+use crate::error::refused;
 use slave::CallError;
 
 impl Instance {
@@ -22,9 +23,9 @@ impl Instance {
     ) -> Result<(), CallError> {
         let plan = self.plans.find(&self.view, list);
         let plan = plan.map_err(|reference| unknown(function, reference))?;
-        let mut runs = self.plans.take(plan);
+        let mut runs = std::mem::take(self.plans.runs(plan));
         let done = runs.iter_mut().try_for_each(|run| action(self, run));
-        self.plans.put_back(plan, runs);
+        *self.plans.runs(plan) = runs;
         done
     }
 

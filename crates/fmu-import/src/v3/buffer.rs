@@ -213,6 +213,18 @@ macro_rules! buffer {
     };
 }
 
+impl Buffer {
+    /// Returns value number `position` as a Boolean, 0 or 1; `None` if it is no integer.
+    pub(super) fn boolean(&self, position: usize) -> Option<i32> {
+        Some(i32::from(self.integer(position)? != 0))
+    }
+
+    /// Stores a Boolean; `None` if the values are no numbers.
+    pub(super) fn put_boolean(&mut self, position: usize, value: i32) -> Option<()> {
+        self.put_integer(position, i64::from(value != 0))
+    }
+}
+
 buffer! {
     Float32: f32, get_float32, set_float32;
     Float64: f64, get_float64, set_float64;

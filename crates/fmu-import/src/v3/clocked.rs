@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Instance;
 use super::elements::ElementView;
-use super::mode::Mode;
+use super::modes::Mode;
 use super::plan::Run;
 use crate::library::v3::Component;
 use slave::CallError;

@@ -8,9 +8,9 @@ use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDesc
 use serde::{Deserialize, Serialize};
 
 use super::Instance;
-use super::mode::Mode;
+use super::modes::Mode;
 use super::plan::Run;
-use super::refusal::refused;
+use crate::error::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 
@@ -24,14 +24,17 @@ const TICKS: usize = 100;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
-/// An input clock that ticks at known times.
-#[derive(Clone, Debug, Default)]
+/// An input clock that ticks at known times. A serialised state has what changes with time.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct TimedClock {
+    #[serde(skip)]
     reference: u32,
+    #[serde(skip)]
     attributes: ClockType,
     /// Interval in s; that of an aperiodic clock is the last one.
     interval: f64,
     /// The interval as numerator and denominator, so that many ticks do not drift.
+    #[serde(skip)]
     fraction: Option<(u64, u64)>,
     /// Time of the first tick in s, if the clock is periodic.
     first: f64,
@@ -40,24 +43,16 @@ struct TimedClock {
     /// Time of the next tick in s, if it is known.
     next: Option<f64>,
     /// Whether an interval that is not allowed was a warning.
+    #[serde(skip)]
     warned: bool,
 }
 
 /// The state of all clocks in a serialised state.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ClocksState {
-    timed: Vec<TimedState>,
+    timed: Vec<TimedClock>,
     /// The clocks that ticked in the last step.
     ticked: Vec<u32>,
-}
-
-/// The state of a [`TimedClock`] in a serialised state.
-#[derive(Serialize, Deserialize)]
-struct TimedState {
-    interval: f64,
-    first: f64,
-    ticks: u64,
-    next: Option<f64>,
 }
 
 /// The clocks of an instance.
@@ -376,16 +371,10 @@ impl Clocks {
 
     /// Returns counters, times and the ticks of the last step for a serialised state.
     pub(super) fn state(&self) -> ClocksState {
-        let state = |clock: &TimedClock| TimedState {
-            interval: clock.interval,
-            first: clock.first,
-            ticks: clock.ticks,
-            next: clock.next,
-        };
         let ticked = self.ticked.iter().filter(|(_, ticked)| **ticked);
         let mut ticked: Vec<u32> = ticked.map(|(reference, _)| *reference).collect();
         ticked.sort_unstable();
-        ClocksState { timed: self.timed.iter().map(state).collect(), ticked }
+        ClocksState { timed: self.timed.clone(), ticked }
     }
 
     /// Returns whether a serialised state fits the number and the references of these clocks.

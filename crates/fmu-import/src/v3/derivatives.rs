@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Instance;
-use super::refusal::unknown;
+use super::unknown;
 use slave::CallError;
 
 /// The whole variables to which the elements of a list belong.
@@ -102,13 +102,11 @@ impl Instance {
         }
         // One call for each run of equal orders.
         let mut start = 0;
-        while start < list.len() {
-            let order = orders[start];
-            let same = orders[start..].iter().take_while(|other| **other == order).count();
-            let end = (start + same).min(list.len());
+        for equal in orders.chunk_by(i32::eq) {
+            let end = start + equal.len();
             let whole = self.whole(NAME, &list[start..end])?;
             let mut derivatives = vec![0.0; whole.count];
-            let orders = vec![order; whole.references.len()];
+            let orders = vec![equal[0]; whole.references.len()];
             self.component.get_output_derivatives(&whole.references, &orders, &mut derivatives)?;
             for (value, place) in values[start..end].iter_mut().zip(&whole.places) {
                 *value = derivatives[*place];

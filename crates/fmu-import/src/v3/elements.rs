@@ -103,11 +103,11 @@ impl ElementView {
             ));
         }
         builder.view.base = free_references(description, total);
-        for (position, variable) in description.variables.iter().enumerate() {
+        for (variable, extents) in description.variables.iter().zip(&extents) {
             let resized = variable.dimensions.iter().any(
                 |dimension| matches!(dimension, Dimension::Variable(by) if sizes.contains_key(by)),
             );
-            builder.add(description, position, variable, &extents[position], resized)?;
+            builder.add(description, variable, extents, resized)?;
         }
         builder.finish(description)
     }
@@ -225,16 +225,13 @@ impl Builder {
     fn add(
         &mut self,
         description: &ModelDescription,
-        position: usize,
         variable: &ScalarVariable,
         extents: &[u64],
         resized: bool,
     ) -> Result<(), String> {
         let size = count(extents);
         self.add_native(description, variable, size);
-        let start = self.view.description.variables.len();
-        self.ranges.push((start, size));
-        debug_assert_eq!(self.ranges.len(), position + 1);
+        self.ranges.push((self.view.description.variables.len(), size));
         if variable.dimensions.is_empty() {
             self.view.description.variables.push(variable.clone());
             return Ok(());

@@ -1,11 +1,11 @@
 //! The modes of an instance: events and steps (FMI 3.0.2, sections 2.3 and 4.2).
 
 use super::Instance;
-use super::mode::Mode;
-use super::refusal::refused;
-use crate::library::v3::Interface;
+use crate::error::refused;
+use crate::library::v3::{DoStepResult, Interface};
 use fmu_description::abi::Status;
 use fmu_description::number::seconds;
+use serde::{Deserialize, Serialize};
 use slave::{CallError, EventInfo, Events, Failure, StepResult};
 
 /// Largest number of updates of the discrete states in one event.
@@ -22,9 +22,28 @@ const DEVIATION: f64 = 1e-3;
 /// After `fmi3Discard` a part of a step is halved if it is larger than this fraction of the step.
 const SMALLEST: f64 = 1e-6;
 
+/// The mode of the FMU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Mode {
+    #[default]
+    Instantiated,
+    Initialization,
+    Event,
+    /// Step Mode, in model exchange Continuous-Time Mode.
+    Step,
+}
+
+impl Mode {
+    /// Whether the initialization has ended.
+    pub(super) fn is_initialized(self) -> bool {
+        matches!(self, Mode::Event | Mode::Step)
+    }
+}
+
 /// The state of the slave, besides the state of the FMU.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct State {
+    #[serde(skip)]
     pub(super) mode: Mode,
     /// `nextEventTime` in s.
     pub(super) next_event: Option<f64>,
@@ -38,6 +57,7 @@ pub(super) struct State {
     pub(super) held: Vec<Option<u64>>,
     /// Values of clocked elements at their last tick, and for their next one.
     pub(super) memory: super::clocked::Memory,
+    #[serde(skip)]
     pub(super) clocks: super::clocks::Clocks,
 }
 
@@ -191,6 +211,20 @@ impl Instance {
         }
     }
 
+    /// Starts a communication step of model exchange.
+    pub(crate) fn begin_communication_step(&mut self) {
+        self.state.clocks.begin_step();
+    }
+
+    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), CallError> {
+        self.state.time = time;
+        self.component.set_time(time)
+    }
+
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
+        self.leave_event_mode()
+    }
+
     /// Returns the largest step from `now` of at most `left` s that crosses no event.
     fn limited(&self, now: f64, left: f64, rounding: f64) -> f64 {
         if !self.event_mode {
@@ -207,6 +241,46 @@ impl Instance {
     fn is_event_due(&self, time: f64, size: f64) -> bool {
         self.state.next_event.is_some_and(|next| next <= time + rounding(time, size))
             || self.state.clocks.is_due(time)
+    }
+}
+
+/// Scheduled execution (FMI 3.0.2, section 5): a tick of an input clock activates its model partition. The master takes
+/// such an FMU for one of co-simulation whose steps do nothing and whose events run the partitions.
+impl Instance {
+    pub(super) fn is_scheduled(&self) -> bool {
+        self.interface == Interface::ScheduledExecution
+    }
+
+    /// Steps from `time` over `size` s. In scheduled execution the step is complete at once.
+    pub(super) fn advance(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<DoStepResult, CallError> {
+        if self.is_scheduled() {
+            let reached = time + size;
+            return Ok(DoStepResult { event: false, terminate: false, early: false, reached });
+        }
+        self.component.do_step(time, size, never_back)
+    }
+
+    /// Runs the model partitions of the input clocks that tick, in the order of their priorities. The clocks that tick
+    /// as a result do so until the next call.
+    pub(super) fn run_partitions(&mut self) -> Result<EventInfo, CallError> {
+        let time = self.state.time;
+        for clock in self.state.clocks.take_partitions() {
+            self.component.activate_model_partition(clock, time)?;
+        }
+        self.state.clocks.end_ticks();
+        self.state.clocks.read_outputs(&mut self.component)?;
+        self.state.clocks.ask_intervals(&mut self.component, time)?;
+        self.tick()?;
+        Ok(EventInfo {
+            discrete_states_need_update: self.state.clocks.any_active(),
+            next_event_time: self.next_event_time(),
+            ..EventInfo::default()
+        })
     }
 }
 

@@ -12,10 +12,10 @@ const KEPT: usize = 32;
 
 /// The calls for one list of value references.
 #[derive(Debug)]
-pub(super) struct Plan {
+struct Plan {
     /// The list.
     references: Vec<u32>,
-    pub(super) runs: Vec<Run>,
+    runs: Vec<Run>,
 }
 
 /// One call: variables of one type with the same clocks. Either all of them may change in Event Mode only, or none.
@@ -140,17 +140,8 @@ impl Plans {
         Ok(place)
     }
 
-    /// Removes and returns the runs of a plan. [`Plans::put_back`] stores them again.
-    pub(super) fn take(&mut self, plan: usize) -> Vec<Run> {
-        std::mem::take(&mut self.plans[plan].runs)
-    }
-
-    pub(super) fn put_back(&mut self, plan: usize, runs: Vec<Run>) {
-        self.plans[plan].runs = runs;
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.plans.clear();
-        self.next = 0;
+    /// Returns the runs of a plan.
+    pub(super) fn runs(&mut self, plan: usize) -> &mut Vec<Run> {
+        &mut self.plans[plan].runs
     }
 }

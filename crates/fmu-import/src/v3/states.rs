@@ -1,32 +1,19 @@
 //! FMU states together with the state of the slave: mode, next event, clocks, values set last.
 
-use serde::{Deserialize, Serialize};
 use slave::CallError;
 
 use super::Instance;
-use super::clocked::Memory;
 use super::clocks::ClocksState;
-use super::mode::Mode;
-use super::modes::State;
-use super::refusal::refused;
+use super::modes::{Mode, State};
+use crate::error::refused;
 
 /// The first bytes of a serialised state: name and version of its format.
 const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
-/// The state of the slave in a serialised state; the state of the FMU follows.
-#[derive(Serialize, Deserialize)]
-struct SlaveState {
-    initialized: bool,
-    next_event: Option<f64>,
-    event: bool,
-    terminate: bool,
-    time: f64,
-    held: Vec<Option<u64>>,
-    memory: Memory,
-    clocks: ClocksState,
-}
+/// A serialised state: whether the initialization has ended, the state of the slave, and that of the FMU.
+type Saved<'a> = (bool, State, ClocksState, &'a [u8]);
 
 impl Instance {
     pub(crate) fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
@@ -53,37 +40,25 @@ impl Instance {
             self.handle_event()?;
         }
         let fmu_state = self.component.serialize_state()?;
-        let State { mode, next_event, event, terminate, time, held, memory, clocks } = &self.state;
-        let slave_state = SlaveState {
-            initialized: mode.is_initialized(),
-            next_event: *next_event,
-            event: *event,
-            terminate: *terminate,
-            time: *time,
-            held: held.clone(),
-            memory: memory.clone(),
-            clocks: clocks.state(),
-        };
-        postcard::to_extend(&(slave_state, fmu_state), MAGIC.to_vec())
+        let (initialized, clocks) = (self.state.mode.is_initialized(), self.state.clocks.state());
+        postcard::to_extend(&(initialized, &self.state, clocks, fmu_state), MAGIC.to_vec())
             .map_err(|error| refused(SERIALIZE, format!("cannot store the state: {error}")))
     }
 
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
-        let read = read.filter(|(saved, _): &(SlaveState, &[u8])| {
-            saved.held.len() == self.state.held.len() && self.state.clocks.fits(&saved.clocks)
+        let read = read.filter(|(_, saved, clocks, _): &Saved<'_>| {
+            saved.held.len() == self.state.held.len() && self.state.clocks.fits(clocks)
         });
-        let Some((saved, fmu_state)) = read else {
+        let Some((initialized, saved, saved_clocks, fmu_state)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
             return Err(refused(DESERIALIZE, what));
         };
         self.component.deserialize_state(fmu_state)?;
-        let state = &mut self.state;
-        state.mode = if saved.initialized { Mode::Step } else { Mode::Instantiated };
-        (state.next_event, state.event) = (saved.next_event, saved.event);
-        (state.terminate, state.time) = (saved.terminate, saved.time);
-        (state.held, state.memory) = (saved.held, saved.memory);
-        state.clocks.restore(&saved.clocks);
+        let mode = if initialized { Mode::Step } else { Mode::Instantiated };
+        let mut clocks = std::mem::take(&mut self.state.clocks);
+        clocks.restore(&saved_clocks);
+        self.state = State { mode, clocks, ..saved };
         Ok(())
     }
 }

@@ -48,7 +48,7 @@ pub(super) struct EventInfo {
 }
 
 functions! {
-    get_version = "fmiGetVersion": fn() -> Text;
+    "1.0" = "fmiGetVersion";
     instantiate = "fmiInstantiateSlave": fn(Text, Text, Text, Text, f64, Boolean, Boolean,
         Callbacks, Boolean) -> Instance;
     free_instance = "fmiFreeSlaveInstance": fn(Instance);
@@ -80,7 +80,7 @@ functions! {
     get_continuous_states = "fmiGetContinuousStates": fn(Instance, *mut f64, usize) -> Status;
     get_derivatives = "fmiGetDerivatives": fn(Instance, *mut f64, usize) -> Status;
     get_event_indicators = "fmiGetEventIndicators": fn(Instance, *mut f64, usize) -> Status;
-    get_nominals = "fmiGetNominalContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    get_nominals_of_continuous_states = "fmiGetNominalContinuousStates": fn(Instance, *mut f64, usize) -> Status;
     completed_integrator_step = "fmiCompletedIntegratorStep":
         fn(Instance, *mut Boolean) -> Status;
     event_update = "fmiEventUpdate": fn(Instance, Boolean, *mut EventInfo) -> Status;

@@ -27,7 +27,7 @@ pub(super) type ClockUpdate = unsafe extern "C" fn(*mut c_void);
 pub(super) type Preemption = unsafe extern "C" fn();
 
 functions! {
-    get_version = "fmi3GetVersion": fn() -> Text;
+    "3.0" = "fmi3GetVersion";
     set_debug_logging = "fmi3SetDebugLogging":
         fn(Instance, bool, usize, *const Text) -> Status;
     instantiate = "fmi3InstantiateCoSimulation": fn(Text, Text, Text, bool, bool, bool, bool,
@@ -44,7 +44,6 @@ functions! {
     enter_event_mode = "fmi3EnterEventMode": fn(Instance) -> Status;
     enter_step_mode = "fmi3EnterStepMode": fn(Instance) -> Status;
     terminate = "fmi3Terminate": fn(Instance) -> Status;
-    reset = "fmi3Reset": fn(Instance) -> Status;
     enter_configuration_mode = "fmi3EnterConfigurationMode": fn(Instance) -> Status;
     exit_configuration_mode = "fmi3ExitConfigurationMode": fn(Instance) -> Status;
     get_float32 = "fmi3GetFloat32": fn(Instance, References, usize, *mut f32, usize) -> Status;
@@ -85,7 +84,7 @@ functions! {
     serialize_state = "fmi3SerializeFMUState": fn(Instance, State, *mut u8, usize) -> Status;
     deserialize_state = "fmi3DeserializeFMUState":
         fn(Instance, *const u8, usize, *mut State) -> Status;
-    get_directional_derivative = "fmi3GetDirectionalDerivative": fn(Instance, References, usize,
+    directional_derivative = "fmi3GetDirectionalDerivative": fn(Instance, References, usize,
         References, usize, *const f64, usize, *mut f64, usize) -> Status;
     get_output_derivatives = "fmi3GetOutputDerivatives":
         fn(Instance, References, usize, *const i32, *mut f64, usize) -> Status;
@@ -107,7 +106,7 @@ functions! {
     get_derivatives = "fmi3GetContinuousStateDerivatives":
         fn(Instance, *mut f64, usize) -> Status;
     get_event_indicators = "fmi3GetEventIndicators": fn(Instance, *mut f64, usize) -> Status;
-    get_nominals = "fmi3GetNominalsOfContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    get_nominals_of_continuous_states = "fmi3GetNominalsOfContinuousStates": fn(Instance, *mut f64, usize) -> Status;
     get_number_of_states = "fmi3GetNumberOfContinuousStates": fn(Instance, *mut usize) -> Status;
     get_number_of_indicators = "fmi3GetNumberOfEventIndicators":
         fn(Instance, *mut usize) -> Status;
