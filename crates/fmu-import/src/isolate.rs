@@ -1,9 +1,8 @@
 //! Isolation: each FMU instance runs in a separate process, so that a crash does not end the master.
 //!
-//! [`open`] starts a worker process. The worker is the same program with [`WORKER`] as its only
-//! argument, which calls [`worker()`]. It loads the FMU and executes the commands of the master's
-//! side, [`Isolated`]. Arguments, results and messages pass through shared memory; master and worker
-//! take turns.
+//! [`open`] starts a worker process: the same program with [`WORKER`] as its only argument, which calls [`worker()`]. It
+//! loads the FMU and executes the commands of the master's side, [`Isolated`]. Arguments, results and messages pass
+//! through shared memory; master and worker take turns.
 //!
 //! Isolation works on Linux; on other systems [`open`] returns [`IsolateError::Platform`].
 
@@ -32,6 +31,8 @@ mod process;
 #[cfg(target_os = "linux")]
 mod region;
 #[cfg(target_os = "linux")]
+mod request;
+#[cfg(target_os = "linux")]
 mod transfer;
 #[cfg(not(target_os = "linux"))]
 mod unsupported;
@@ -49,6 +50,7 @@ use std::time::Duration;
 use fmu_description::ModelDescription;
 use fmu_description::package::{PackageError, Unpacked};
 
+use crate::fmu::{unpack, warnings};
 use slave::{CallError, Failure, ModelExchange, Slave};
 
 #[cfg(target_os = "linux")]
@@ -61,8 +63,7 @@ pub use worker::{worker, worker_with};
 /// The first and only argument of a program that is to become a worker.
 pub const WORKER: &str = "--fmu-worker";
 
-/// The environment variable that marks a process as a worker: the identifier of the process that
-/// started it.
+/// The environment variable that marks a process as a worker: the identifier of the process that started it.
 #[cfg(target_os = "linux")]
 const STARTED_BY: &str = "FMU_WORKER_STARTED_BY";
 
@@ -71,8 +72,7 @@ const STARTED_BY: &str = "FMU_WORKER_STARTED_BY";
 pub struct Options {
     /// Time limit of each call; a worker that exceeds it is killed. `None`: no limit.
     pub time_limit: Option<Duration>,
-    /// Limit of the address space of each worker in bytes, program included (`RLIMIT_AS`). `None`: no
-    /// additional limit.
+    /// Limit of the address space of each worker in bytes, program included (`RLIMIT_AS`). `None`: no additional limit.
     pub memory_limit: Option<u64>,
     /// Libraries that the worker loads before the FMU, as [`crate::preload`] does.
     pub preload: Vec<OsString>,
@@ -84,8 +84,7 @@ pub struct Options {
     pub logging: bool,
     /// The program that becomes the worker; `None`: this program.
     pub executable: Option<PathBuf>,
-    /// How the worker integrates the instance, which is then one for model exchange; `None`: the instance
-    /// is one for co-simulation or scheduled execution.
+    /// How the worker integrates an instance for model exchange; `None`: co-simulation or scheduled execution.
     pub integration: Option<Integration>,
 }
 
@@ -220,16 +219,13 @@ pub struct Package {
 }
 
 impl Package {
-    /// Unpacks the FMU at `path`, an archive or a folder with an unpacked FMU. Its library is not
-    /// loaded into this process.
+    /// Unpacks the FMU at `path`, an archive or a folder with an unpacked FMU. This process does not load its library.
     ///
     /// # Errors
     ///
     /// [`IsolateError::Package`] if the FMU cannot be read.
     pub fn open(path: &Path) -> Result<Self, IsolateError> {
-        let unpacked =
-            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        Ok(Self { path: path.to_owned(), unpacked: Arc::new(unpacked) })
+        Ok(Self { path: path.to_owned(), unpacked: Arc::new(unpack(path)?) })
     }
 
     /// Returns the model description.
@@ -240,16 +236,15 @@ impl Package {
 
     /// Returns the warnings about the archive, then those about the description.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        let description = self.unpacked.warnings.iter().map(ToString::to_string);
-        self.unpacked.archive_warnings.iter().cloned().chain(description)
+        warnings(&self.unpacked)
     }
 
     /// Starts a worker process and creates the instance `name` in it.
     ///
     /// # Errors
     ///
-    /// [`IsolateError`] if the FMU lacks the interface, if no worker can be started, or if the FMU does
-    /// not load, does not instantiate or ends its process.
+    /// [`IsolateError`] if the FMU lacks the interface, if no worker can be started, or if the FMU does not load, does
+    /// not instantiate or ends its process.
     pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
         let (description, path) = (self.description(), self.path.clone());
         match options.integration {
@@ -269,8 +264,7 @@ impl Package {
 ///
 /// # Errors
 ///
-/// [`IsolateError`] if the FMU cannot be read or lacks the interface, if no worker can be started, or if the FMU does
-/// not load, does not instantiate or ends its process.
+/// Same as [`Package::open`] and [`Package::instantiate`].
 pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
     Package::open(path)?.instantiate(name, options)
 }

@@ -6,25 +6,19 @@ use serde::de::DeserializeOwned;
 
 use super::function::Function;
 use super::isolated::{Isolated, description_of_instance};
-use super::message::Request;
 use super::perform::{EVENT, PART, TERMINATED, WHOLE};
+use super::request::Request;
 use super::words::{Reader, Word, Writer};
 use slave::{
     Background, CallError, CommunicationStep, EventInfo, Events, Slave, StepRequest, StepResult,
 };
 
-/// Writes references and one value for each.
+/// Writes references and one value for each. Panics if there is another number of values.
 #[inline]
 fn write_pairs<T: Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
-    assert_equally_many(references, values);
+    assert_eq!(references.len(), values.len(), "references and values are equally many");
     writer.put_list(references);
     writer.put_all(values);
-}
-
-/// Panics if the caller passes another number of values than references.
-#[inline]
-fn assert_equally_many<T>(references: &[u32], values: &[T]) {
-    assert_eq!(references.len(), values.len(), "references and values are equally many");
 }
 
 fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
@@ -41,9 +35,22 @@ fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
 
 /// Defines the methods that send one request and return its answer.
 macro_rules! requests {
-    ($(fn $method:ident($($argument:ident: $type:ty)?) -> $result:ty = $request:expr;)*) => {
-        $(fn $method(&mut self $(, $argument: $type)?) -> Result<$result, CallError> {
+    ($(fn $method:ident($($argument:ident: $type:ty),*) -> $result:ty = $request:expr;)*) => {
+        $(fn $method(&mut self $(, $argument: $type)*) -> Result<$result, CallError> {
             self.request(&$request)
+        })*
+    };
+}
+
+/// Defines the methods that send one request and fill a list of `$value` with the answer.
+macro_rules! lists {
+    ($(fn $method:ident($($argument:ident: $type:ty),*; $value:ty) = $request:expr;)*) => {
+        $(fn $method(
+            &mut self,
+            $($argument: $type,)*
+            values: &mut [$value],
+        ) -> Result<(), CallError> {
+            self.request_all(&$request, values)
         })*
     };
 }
@@ -74,9 +81,7 @@ impl Isolated {
         if answers.len() != values.len() {
             return Err(self.invalid_answer(request.function()));
         }
-        for (value, answer) in values.iter_mut().zip(answers) {
-            *value = answer;
-        }
+        values.iter_mut().zip(answers).for_each(|(value, answer)| *value = answer);
         Ok(())
     }
 }
@@ -116,14 +121,20 @@ impl Slave for Isolated {
     requests! {
         fn process_changes() -> Vec<String> = Request::ProcessChanges;
         fn set_debug_logging(on: bool) -> () = Request::SetDebugLogging(on);
-        fn enter_initialization_mode() -> () = Request::EnterInitializationMode;
-        fn exit_initialization_mode() -> () = Request::ExitInitializationMode;
-        fn terminate() -> () = Request::Terminate;
+        fn enter_initialization_mode() -> () = Request::EnterInitializationMode();
+        fn exit_initialization_mode() -> () = Request::ExitInitializationMode();
+        fn terminate() -> () = Request::Terminate();
         fn save_state(slot: usize) -> () = Request::SaveState(slot);
         fn restore_state(slot: usize) -> () = Request::RestoreState(slot);
-        fn serialize_state() -> Vec<u8> = Request::SerializeState;
+        fn serialize_state() -> Vec<u8> = Request::SerializeState();
         fn deserialize_state(bytes: &[u8]) -> () = Request::DeserializeState(bytes);
         fn hand_over_events(stop: bool) -> bool = Request::HandOverEvents(stop);
+        fn set_string(references: &[u32], values: &[String]) -> () =
+            Request::SetString(references.into(), values.into());
+        fn set_binary(references: &[u32], values: &[Vec<u8>]) -> () =
+            Request::SetBinary(references.into(), values.into());
+        fn set_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) -> () =
+            Request::SetInputDerivatives(references.into(), orders.into(), values.into());
     }
 
     numbers! {
@@ -136,13 +147,20 @@ impl Slave for Isolated {
         self.description.as_ref().unwrap_or(&self.package.description)
     }
 
+    lists! {
+        fn get_string(references: &[u32]; String) = Request::GetString(references.into());
+        fn get_binary(references: &[u32]; Vec<u8>) = Request::GetBinary(references.into());
+        fn get_output_derivatives(references: &[u32], orders: &[i32]; f64) =
+            Request::GetOutputDerivatives(references.into(), orders.into());
+        fn directional_derivative(unknowns: &[u32], knowns: &[u32], seed: &[f64]; f64) =
+            Request::DirectionalDerivative(unknowns.into(), knowns.into(), seed.into());
+    }
+
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
-        assert_equally_many(references, values);
-        let pairs = references.iter().copied().zip(values.iter().copied());
-        self.request::<()>(&Request::Configure(pairs.clone().collect()))?;
-        for (reference, value) in pairs {
-            if let Ok(value) = u64::try_from(value) {
-                self.sizes.insert(reference, value);
+        self.request::<()>(&Request::Configure(references.into(), values.into()))?;
+        for (reference, value) in references.iter().zip(values) {
+            if let Ok(value) = u64::try_from(*value) {
+                self.sizes.insert(*reference, value);
             }
         }
         match description_of_instance(&self.package.description, &self.sizes, self.describe) {
@@ -161,67 +179,9 @@ impl Slave for Isolated {
         self.free_instance()
     }
 
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        self.request_all(&Request::GetString(references.into()), values)
-    }
-
-    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        assert_equally_many(references, values);
-        let values = references.iter().copied().zip(values.iter().map(String::as_str));
-        self.request(&Request::SetString(values.collect()))
-    }
-
-    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
-        self.request_all(&Request::GetBinary(references.into()), values)
-    }
-
-    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
-        assert_equally_many(references, values);
-        let values = references.iter().copied().zip(values.iter().map(Vec::as_slice));
-        self.request(&Request::SetBinary(values.collect()))
-    }
-
-    fn set_input_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &[f64],
-    ) -> Result<(), CallError> {
-        assert_equally_many(references, orders);
-        assert_equally_many(references, values);
-        let derivatives = references.iter().zip(orders).zip(values);
-        let derivatives =
-            derivatives.map(|((reference, order), value)| (*reference, *order, *value));
-        self.request(&Request::SetInputDerivatives(derivatives.collect()))
-    }
-
-    fn get_output_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), CallError> {
-        assert_equally_many(references, orders);
-        let outputs = references.iter().copied().zip(orders.iter().copied()).collect();
-        self.request_all(&Request::GetOutputDerivatives(outputs), values)
-    }
-
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         let step = CommunicationStep { time, size, never_back };
         self.advance(&mut StepRequest::held(&[], &[], step, &[], &mut []))
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        changes: &mut [f64],
-    ) -> Result<(), CallError> {
-        assert_equally_many(knowns, seed);
-        let knowns = knowns.iter().copied().zip(seed.iter().copied()).collect();
-        let unknowns = unknowns.into();
-        self.request_all(&Request::DirectionalDerivative { unknowns, knowns }, changes)
     }
 
     fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
@@ -240,9 +200,9 @@ impl Slave for Isolated {
 
 impl Events for Isolated {
     requests! {
-        fn next_event() -> Option<f64> = Request::NextEvent;
-        fn enter_event_mode() -> () = Request::EnterEventMode;
-        fn update_discrete_states() -> EventInfo = Request::UpdateDiscreteStates;
-        fn leave_event_mode() -> () = Request::LeaveEventMode;
+        fn next_event() -> Option<f64> = Request::NextEvent();
+        fn enter_event_mode() -> () = Request::EnterEventMode();
+        fn update_discrete_states() -> EventInfo = Request::UpdateDiscreteStates();
+        fn leave_event_mode() -> () = Request::LeaveEventMode();
     }
 }

@@ -1,90 +1,28 @@
 //! The functions that a worker executes. The number of a function is the command of the master; its name is that of a
 //! crash between the calls of the FMU.
 
+use crate::library::function_names;
 use fmu_description::Version;
-use serde::{Deserialize, Serialize};
 
-/// C functions, and the end of a library, that errors can name besides those of the table of [`Function`]: a worker
-/// calls them on its own for a [`Function`].
-const OTHERS: &[&str] = &[
+/// Names in errors of a worker that are neither C functions nor in the table of [`Function`].
+const OTHERS: [&str; 4] = [
     crate::crash::UNLOADING,
-    "fmi2CancelStep",
-    "fmi2FreeFMUstate",
-    "fmi3FreeFMUState",
-    "fmi3ExitConfigurationMode",
-    "fmi3GetFloat32",
-    "fmi3SetFloat32",
-    "fmi3GetInt8",
-    "fmi3SetInt8",
-    "fmi3GetUInt8",
-    "fmi3SetUInt8",
-    "fmi3GetInt16",
-    "fmi3SetInt16",
-    "fmi3GetUInt16",
-    "fmi3SetUInt16",
-    "fmi3GetInt32",
-    "fmi3SetInt32",
-    "fmi3GetUInt32",
-    "fmi3SetUInt32",
-    "fmi3GetUInt64",
-    "fmi3SetUInt64",
-    "fmi3GetClock",
-    "fmi3SetClock",
-    "fmi3GetIntervalDecimal",
-    "fmi3GetShiftDecimal",
-    "fmi3InstantiateScheduledExecution",
-    "fmi3ActivateModelPartition",
-    "fmiCancelStep",
-    // Model exchange.
     "the integration of the model-exchange FMU",
     "numberOfContinuousStates",
     "numberOfEventIndicators",
-    "fmi3InstantiateModelExchange",
-    "fmi3EnterContinuousTimeMode",
-    "fmi3CompletedIntegratorStep",
-    "fmi3SetTime",
-    "fmi3SetContinuousStates",
-    "fmi3GetContinuousStates",
-    "fmi3GetContinuousStateDerivatives",
-    "fmi3GetEventIndicators",
-    "fmi3GetNominalsOfContinuousStates",
-    "fmi3GetNumberOfContinuousStates",
-    "fmi3GetNumberOfEventIndicators",
-    "fmi2CompletedIntegratorStep",
-    "fmi2SetTime",
-    "fmi2SetContinuousStates",
-    "fmi2GetContinuousStates",
-    "fmi2GetDerivatives",
-    "fmi2GetEventIndicators",
-    "fmi2GetNominalsOfContinuousStates",
-    "fmiInstantiateModel",
-    "fmiInitialize",
-    "fmiTerminate",
-    "fmiFreeModelInstance",
-    "fmiEventUpdate",
-    "fmiCompletedIntegratorStep",
-    "fmiSetTime",
-    "fmiSetContinuousStates",
-    "fmiGetContinuousStates",
-    "fmiGetDerivatives",
-    "fmiGetEventIndicators",
-    "fmiGetNominalContinuousStates",
 ];
 
 /// Returns the static name of a function of any version; `None` if no error of a worker names it.
 pub(super) fn known_name(name: &str) -> Option<&'static str> {
-    let versions = [Version::V2, Version::V3, Version::V1];
-    let names = versions.into_iter().flat_map(|version| {
-        Function::ALL.iter().map(move |function| *function.static_name(version))
-    });
-    names.chain(OTHERS.iter().copied()).find(|known| *known == name)
+    let table = Function::ALL.iter().map(|function| function.name(Version::V2));
+    table.chain(OTHERS).chain(function_names()).find(|known| *known == name)
 }
 
 /// Defines the functions, each with the names that its errors have: in FMI 2.0, 3.0 and 1.0.
 macro_rules! functions {
     ($($function:ident = $name:literal $name_3:literal $name_1:literal,)*) => {
         /// A function of a worker.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Function {
             $($function,)*
         }
@@ -130,10 +68,6 @@ functions! {
     SerializeState = "fmi2SerializeFMUstate" "fmi3SerializeFMUState" "fmi2SerializeFMUstate",
     DeserializeState = "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState" "fmi2DeSerializeFMUstate",
     Free = "fmi2FreeInstance" "fmi3FreeInstance" "fmiFreeSlaveInstance",
-    GetStatus = "fmi2GetStatus" "fmi2GetStatus" "fmiGetStatus",
-    GetRealStatus = "fmi2GetRealStatus" "fmi2GetRealStatus" "fmiGetRealStatus",
-    GetBooleanStatus = "fmi2GetBooleanStatus" "fmi2GetBooleanStatus" "fmi2GetBooleanStatus",
-    SerializedSize = "fmi2SerializedFMUstateSize" "fmi3SerializedFMUStateSize" "fmi2SerializedFMUstateSize",
     GetBinary = "fmi3GetBinary" "fmi3GetBinary" "fmi3GetBinary",
     SetBinary = "fmi3SetBinary" "fmi3SetBinary" "fmi3SetBinary",
     Configure = "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode",

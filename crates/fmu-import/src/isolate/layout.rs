@@ -23,7 +23,7 @@ const MIN_AREA: usize = 1 << 13;
 /// 1 + 2 n for an output. A variable is either an input or an output, so that 16 words are enough for 4 orders.
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
-const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0003;
+const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0004;
 
 /// Defines a method for each field, a word at a position.
 macro_rules! fields {

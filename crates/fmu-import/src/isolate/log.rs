@@ -16,6 +16,7 @@ use tracing::{Event, Level, Metadata, Subscriber};
 use super::layout::Shared;
 use super::message::decode;
 use super::words::words_of;
+use crate::library::log_message;
 use slave::CallError;
 
 /// The `target` of `tracing` events that carry messages of an FMU.
@@ -252,7 +253,8 @@ impl Inbox {
                 break;
             };
             if self.quota.admits(&self.instance, message.text.len()) {
-                log_message(&self.instance, level, &message);
+                let Message { category, time, text } = &message;
+                log_message(level, &self.instance, category, Some(*time), text);
             }
             if self.recent.len() == KEPT {
                 self.recent.pop_front();
@@ -304,18 +306,6 @@ impl Inbox {
         if !self.recent.is_empty() {
             self.recent.clear();
         }
-    }
-}
-
-/// Logs a message in the same form as an FMU in this process.
-fn log_message(instance: &str, level: Level, Message { category, time, text }: &Message) {
-    let category = category.as_str();
-    match level {
-        Level::ERROR => tracing::error!(target: "fmu", instance, category, time, "{text}"),
-        Level::WARN => tracing::warn!(target: "fmu", instance, category, time, "{text}"),
-        Level::INFO => tracing::info!(target: "fmu", instance, category, time, "{text}"),
-        Level::DEBUG => tracing::debug!(target: "fmu", instance, category, time, "{text}"),
-        Level::TRACE => tracing::trace!(target: "fmu", instance, category, time, "{text}"),
     }
 }
 

@@ -1,10 +1,8 @@
-//! The requests to a worker and their answers, encoded by `postcard`. The other process may have
+//! The answers of a worker and its errors, and how messages are encoded: by `postcard`. The other process may have
 //! written anything: messages are decoded from a copy, and [`decode`] returns `None` for other bytes.
 
-use std::borrow::Cow;
-
+use fmu_description::Version;
 use fmu_description::abi::Status;
-use fmu_description::{Experiment, Version};
 use serde::{Deserialize, Serialize};
 
 use super::function::{Function, known_name};
@@ -12,93 +10,6 @@ use slave::{CallError, Failure};
 
 /// Maximum number of bytes of one text in an error.
 const TEXT: usize = 8192;
-
-/// A request to a worker. The commands that run in every step are not encoded as requests: see `words`.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum Request<'a> {
-    /// Loads the FMU and creates an instance. The answer is an [`Opening`].
-    #[serde(borrow)]
-    Open(Open<'a>),
-    /// Frees the instance and creates another one. The answer is an [`Opening`].
-    Renew {
-        name: &'a str,
-        logging: bool,
-    },
-    SetDebugLogging(bool),
-    SetupExperiment(Experiment),
-    EnterInitializationMode,
-    ExitInitializationMode,
-    Terminate,
-    /// Structural parameters: references and values.
-    Configure(Vec<(u32, i64)>),
-    GetBinary(Cow<'a, [u32]>),
-    SetBinary(#[serde(borrow)] Vec<(u32, &'a [u8])>),
-    GetString(Cow<'a, [u32]>),
-    SetString(#[serde(borrow)] Vec<(u32, &'a str)>),
-    /// References, orders and values.
-    SetInputDerivatives(Vec<(u32, i32, f64)>),
-    /// References and orders.
-    GetOutputDerivatives(Vec<(u32, i32)>),
-    /// The known variables have a seed.
-    DirectionalDerivative {
-        unknowns: Cow<'a, [u32]>,
-        knowns: Vec<(u32, f64)>,
-    },
-    SaveState(usize),
-    RestoreState(usize),
-    SerializeState,
-    DeserializeState(&'a [u8]),
-    /// Hands the events over to the master; true if a step ends at the first event.
-    HandOverEvents(bool),
-    NextEvent,
-    EnterEventMode,
-    UpdateDiscreteStates,
-    LeaveEventMode,
-    /// Asks what the FMU has changed in the process.
-    ProcessChanges,
-    Free,
-}
-
-/// The arguments of [`Request::Open`].
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Open<'a> {
-    /// The folder of the unpacked FMU.
-    pub(super) folder: &'a [u8],
-    pub(super) name: &'a str,
-    pub(super) logging: bool,
-    pub(super) strict_binding: bool,
-    pub(super) guard_arrays: bool,
-    /// Bytes; 0: no limit.
-    pub(super) memory_limit: u64,
-    #[serde(borrow)]
-    pub(super) preload: Vec<&'a [u8]>,
-    /// The options of the integrator, for an instance for model exchange.
-    pub(super) integration: Option<&'a str>,
-}
-
-/// Defines [`Request::function`]: for most requests it has their name.
-macro_rules! functions {
-    ($($request:ident)*) => {
-        impl Request<'_> {
-            /// Returns the function that the errors of the request name.
-            pub(super) fn function(&self) -> Function {
-                match self {
-                    Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges => {
-                        Function::Instantiate
-                    }
-                    $(Request::$request { .. } => Function::$request,)*
-                }
-            }
-        }
-    };
-}
-
-functions! {
-    SetDebugLogging SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Configure
-    GetBinary SetBinary GetString SetString SetInputDerivatives GetOutputDerivatives DirectionalDerivative
-    SaveState RestoreState SerializeState DeserializeState
-    HandOverEvents NextEvent EnterEventMode UpdateDiscreteStates LeaveEventMode Free
-}
 
 /// The result of an instantiation.
 #[derive(Debug, Serialize, Deserialize)]
@@ -185,6 +96,7 @@ pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::request::Request;
     use super::*;
 
     fn through(error: &CallError) -> CallError {
@@ -220,44 +132,6 @@ mod tests {
         assert_eq!(actual.function, "fmi2DoStep");
         assert_eq!(actual.failure, Failure::Panicked("é".repeat(TEXT / 2)));
         assert_eq!(actual.messages, ["x".repeat(TEXT)]);
-    }
-
-    fn requests<'a>() -> [Request<'a>; 5] {
-        let (logging, memory_limit) = (true, u64::MAX);
-        let preload = vec![&b"a"[..], &[0xff, 0]];
-        [
-            Request::Open(Open {
-                folder: b"/tmp/\xff",
-                name: "grün",
-                logging,
-                strict_binding: true,
-                guard_arrays: true,
-                memory_limit,
-                preload,
-                integration: Some("stiff"),
-            }),
-            Request::SetString(vec![(1, ""), (u32::MAX, "a b"), (3, "Größe\n")]),
-            Request::DirectionalDerivative {
-                unknowns: Cow::Borrowed(&[1, 2]),
-                knowns: vec![(7, -0.5)],
-            },
-            Request::SetInputDerivatives(vec![(1, -2, f64::INFINITY)]),
-            Request::DeserializeState(&[1, 2, 0]),
-        ]
-    }
-
-    #[test]
-    fn requests_pass_and_parts_of_them_are_refused() {
-        for request in requests() {
-            let mut bytes = vec![9; 3];
-            encode(&request, &mut bytes);
-            assert_eq!(decode::<Request<'_>>(&bytes), Some(request));
-            for length in 0..bytes.len() {
-                assert_eq!(decode::<Request<'_>>(&bytes[..length]), None, "{length}");
-            }
-            bytes.push(0);
-            assert_eq!(decode::<Request<'_>>(&bytes), None, "one byte more");
-        }
     }
 
     #[test]

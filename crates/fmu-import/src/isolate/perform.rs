@@ -6,10 +6,11 @@ use serde::Serialize;
 
 use super::Integrator;
 use super::function::Function;
-use super::message::{RemoteError, Request, encode};
+use super::message::{RemoteError, encode};
 use super::words::{Reader, Word, Writer};
+use crate::error::refused;
 use crate::{Fmu, FmuError};
-use slave::{CallError, Events, Failure, Slave, StepResult, absent};
+use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult};
 
 /// First word of an answer that consists of words.
 pub(super) const VALUES: u64 = 0;
@@ -27,7 +28,7 @@ pub(super) type CommandResult = Option<Result<(), CallError>>;
 
 /// An instance and the buffers of its calls, kept so that a step does not allocate.
 pub(super) struct Executor {
-    instance: Box<dyn Slave>,
+    pub(super) instance: Box<dyn Slave>,
     /// Creates another instance of the same kind.
     pub(super) maker: Maker,
     references: Vec<u32>,
@@ -68,12 +69,9 @@ impl Maker {
     }
 }
 
-/// The arguments and results of a step, as in [`Slave::advance`].
+/// The lists of a [`StepRequest`].
 #[derive(Default)]
 struct Step {
-    time: f64,
-    size: f64,
-    never_back: bool,
     inputs: Vec<u32>,
     input_values: Vec<f64>,
     derived_inputs: Vec<u32>,
@@ -97,8 +95,7 @@ impl Executor {
         Self { instance, maker, references, reals, integers, booleans, step: Step::default() }
     }
 
-    /// Steps, or gets or sets numbers: reads the arguments from `reader`, writes the results to
-    /// `writer`. Other functions are executed by [`Executor::execute`].
+    /// Steps, or gets or sets numbers: reads the arguments from `reader`, writes the results to `writer`.
     #[inline]
     pub(super) fn exchange(
         &mut self,
@@ -123,88 +120,6 @@ impl Executor {
             _ => None,
         }
     }
-
-    /// Executes a request for the instance and encodes the answer.
-    pub(super) fn execute(&mut self, request: Request<'_>, answer: &mut Vec<u8>) {
-        let instance = &mut self.instance;
-        let done = match request {
-            Request::SetDebugLogging(on) => instance.set_debug_logging(on),
-            Request::SetupExperiment(experiment) => instance.setup_experiment(&experiment),
-            Request::EnterInitializationMode => instance.enter_initialization_mode(),
-            Request::ExitInitializationMode => instance.exit_initialization_mode(),
-            Request::Terminate => instance.terminate(),
-            Request::SetString(values) => {
-                let (references, values): (Vec<u32>, Vec<String>) = values
-                    .into_iter()
-                    .map(|(reference, value)| (reference, value.to_owned()))
-                    .unzip();
-                instance.set_string(&references, &values)
-            }
-            Request::SetInputDerivatives(values) => {
-                let (references, orders, values): (Vec<_>, Vec<_>, Vec<_>) =
-                    values.into_iter().collect();
-                instance.set_input_derivatives(&references, &orders, &values)
-            }
-            Request::SaveState(slot) => instance.save_state(slot),
-            Request::RestoreState(slot) => instance.restore_state(slot),
-            Request::DeserializeState(bytes) => instance.deserialize_state(bytes),
-            Request::Configure(values) => {
-                let (references, values): (Vec<_>, Vec<_>) = values.into_iter().unzip();
-                instance.configure(&references, &values)
-            }
-            Request::SetBinary(values) => {
-                let values =
-                    values.into_iter().map(|(reference, bytes)| (reference, bytes.to_vec()));
-                let (references, values): (Vec<u32>, Vec<Vec<u8>>) = values.unzip();
-                instance.set_binary(&references, &values)
-            }
-            Request::GetBinary(references) => {
-                let mut values = vec![Vec::new(); references.len()];
-                let done = instance.get_binary(&references, &mut values);
-                return reply(done.map(|()| values), answer);
-            }
-            Request::GetString(references) => {
-                let mut values = vec![String::new(); references.len()];
-                let done = instance.get_string(&references, &mut values);
-                return reply(done.map(|()| values), answer);
-            }
-            Request::GetOutputDerivatives(derivatives) => {
-                let (references, orders): (Vec<_>, Vec<_>) = derivatives.into_iter().unzip();
-                let mut values = vec![0.0; references.len()];
-                let done = instance.get_output_derivatives(&references, &orders, &mut values);
-                return reply(done.map(|()| values), answer);
-            }
-            Request::DirectionalDerivative { unknowns, knowns } => {
-                let (knowns, seed): (Vec<_>, Vec<_>) = knowns.into_iter().unzip();
-                let mut changes = vec![0.0; unknowns.len()];
-                let done = instance.directional_derivative(&unknowns, &knowns, &seed, &mut changes);
-                return reply(done.map(|()| changes), answer);
-            }
-            Request::SerializeState => return reply(instance.serialize_state(), answer),
-            Request::HandOverEvents(stop) => {
-                return reply(instance.hand_over_events(stop), answer);
-            }
-            Request::NextEvent => {
-                let next = events(instance.as_mut()).and_then(Events::next_event);
-                return reply(next, answer);
-            }
-            Request::UpdateDiscreteStates => {
-                let events = events(instance.as_mut());
-                return reply(events.and_then(Events::update_discrete_states), answer);
-            }
-            Request::EnterEventMode => events(instance.as_mut()).and_then(Events::enter_event_mode),
-            Request::LeaveEventMode => events(instance.as_mut()).and_then(Events::leave_event_mode),
-            Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges | Request::Free => {
-                Err(invalid_command(request.function()))
-            }
-        };
-        reply(done, answer);
-    }
-}
-
-/// Returns the interface for the events of an instance; an error if it has none.
-fn events(instance: &mut dyn Slave) -> Result<&mut dyn Events, CallError> {
-    instance.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
 
 /// Encodes a result or an error as the answer to a request.
@@ -220,8 +135,20 @@ impl Step {
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
-        self.read(reader)?;
-        Some(self.run(instance).map(|done| {
+        let mut request = StepRequest {
+            step: self.read(reader)?,
+            inputs: &self.inputs,
+            input_values: &self.input_values,
+            derived_inputs: &self.derived_inputs,
+            input_orders: &self.input_orders,
+            input_derivatives: &self.input_derivatives,
+            outputs: &self.outputs,
+            output_values: &mut self.output_values,
+            derived_outputs: &self.derived_outputs,
+            output_orders: &self.output_orders,
+            output_derivatives: &mut self.output_derivatives,
+        };
+        Some(instance.advance(&mut request).map(|done| {
             let (end, reached) = match done {
                 StepResult::Whole => (WHOLE, 0.0),
                 StepResult::Event { reached } => (EVENT, reached),
@@ -236,10 +163,10 @@ impl Step {
         }))
     }
 
-    fn read(&mut self, reader: &mut Reader<'_>) -> Option<()> {
-        self.time = reader.take()?;
-        self.size = reader.take()?;
-        self.never_back = reader.take::<u64>()? != 0;
+    /// Reads the arguments.
+    fn read(&mut self, reader: &mut Reader<'_>) -> Option<CommunicationStep> {
+        let (time, size) = (reader.take()?, reader.take()?);
+        let never_back = reader.take::<u64>()? != 0;
         reader.take_list(&mut self.inputs)?;
         reader.take_counted(self.inputs.len(), &mut self.input_values)?;
         reader.take_list(&mut self.derived_inputs)?;
@@ -250,27 +177,7 @@ impl Step {
         reader.take_counted(self.derived_outputs.len(), &mut self.output_orders)?;
         self.output_values.resize(self.outputs.len(), 0.0);
         self.output_derivatives.resize(self.derived_outputs.len(), 0.0);
-        Some(())
-    }
-
-    /// Makes the calls of [`Slave::advance`].
-    fn run(&mut self, instance: &mut dyn Slave) -> Result<StepResult, CallError> {
-        if !self.inputs.is_empty() {
-            instance.set_real(&self.inputs, &self.input_values)?;
-        }
-        if !self.derived_inputs.is_empty() {
-            let (references, orders) = (&self.derived_inputs, &self.input_orders);
-            instance.set_input_derivatives(references, orders, &self.input_derivatives)?;
-        }
-        let done = instance.do_step(self.time, self.size, self.never_back)?;
-        if !self.outputs.is_empty() {
-            instance.get_real(&self.outputs, &mut self.output_values)?;
-        }
-        if !self.derived_outputs.is_empty() {
-            let (references, orders) = (&self.derived_outputs, &self.output_orders);
-            instance.get_output_derivatives(references, orders, &mut self.output_derivatives)?;
-        }
-        Ok(done)
+        Some(CommunicationStep { time, size, never_back })
     }
 }
 
@@ -309,6 +216,5 @@ pub(super) fn invalid_command(function: Function) -> CallError {
 }
 
 pub(super) fn invalid(function: Function, what: &str) -> CallError {
-    let failure = Failure::InvalidAnswer(what.to_owned());
-    CallError { function: function.name(Version::V2), failure, messages: Vec::new() }
+    refused(function.name(Version::V2), what.to_owned())
 }

@@ -7,8 +7,9 @@ use serde::de::DeserializeOwned;
 
 use super::function::Function;
 use super::isolated::Isolated;
-use super::message::{RemoteError, Request, decode, encode};
+use super::message::{RemoteError, decode, encode};
 use super::perform::MESSAGE;
+use super::request::Request;
 use super::words::Reader;
 use slave::{CallError, Failure};
 
@@ -18,11 +19,13 @@ const MAX_ANSWER: u64 = u32::MAX as u64;
 const BUFFER: usize = 1 << 16;
 
 impl Isolated {
-    /// Sends `request`, in parts if it is longer than the shared memory; returns the answer.
+    /// Sends `request`, in parts if it is longer than the shared memory; returns the answer. Panics if the caller passes
+    /// another number of values than references.
     pub(super) fn request<T: DeserializeOwned>(
         &mut self,
         request: &Request<'_>,
     ) -> Result<T, CallError> {
+        assert!(request.has_matching_lists(), "references and values are equally many");
         let function = request.function();
         let mut message = take(&mut self.message);
         encode(request, &mut message);

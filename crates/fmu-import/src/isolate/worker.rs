@@ -20,10 +20,11 @@ use super::channel::{Channel, Side, WaitResult};
 use super::function::Function;
 use super::layout::Shared;
 use super::log::Forward;
-use super::message::{Open, Opening, Request, decode};
+use super::message::{Opening, decode};
 use super::perform::{
     CommandResult, Executor, MESSAGE, Maker, VALUES, invalid, invalid_command, reply,
 };
+use super::request::{Open, Request};
 use super::words::{Reader, Writer};
 use super::{Integrator, IsolateError, STARTED_BY, WorkerError, memory};
 use crate::Fmu;
@@ -192,7 +193,8 @@ impl Worker {
         let whole = Reader::new(self.shared.area()).take_bytes(&mut bytes);
         self.answer.clear();
         self.answer.shrink_to(BUFFER);
-        match (whole.and_then(|()| decode(&bytes)), &mut self.executor) {
+        let request = whole.and_then(|()| decode(&bytes)).filter(Request::has_matching_lists);
+        match (request, &mut self.executor) {
             (Some(Request::Open(arguments)), None) => {
                 let opened = self.open(&arguments);
                 reply(opened, &mut self.answer);
@@ -213,7 +215,9 @@ impl Worker {
                 self.freed = true;
                 reply(Ok(()), &mut self.answer);
             }
-            (Some(request), Some(executor)) => executor.execute(request, &mut self.answer),
+            (Some(request), Some(executor)) => {
+                request.execute(executor.instance.as_mut(), &mut self.answer);
+            }
             _ => reply(Err::<(), _>(invalid_command(function)), &mut self.answer),
         }
         bytes.clear();
@@ -293,12 +297,6 @@ fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> 
 
 /// Returns the text of an error and of its causes.
 fn with_causes(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        text.push_str(": ");
-        text.push_str(&error.to_string());
-        cause = error.source();
-    }
-    text
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
