@@ -1,7 +1,7 @@
-//! The trait [`Slave`]: the interface through which a co-simulation master calls an FMU.
+//! The trait [`Slave`]: the interface through which a co-simulation master calls an FMU, or anything that it steps
+//! together with FMUs: a model in Rust, a proxy for a process, a test double.
 //!
-//! Implement it for anything that a master steps together with FMUs: a model in Rust, a proxy for a
-//! process, a test double. `fmu-import` implements it for FMUs; `master` couples slaves.
+//! `fmu-import` implements it for FMUs; `master` couples slaves.
 #![forbid(unsafe_code)]
 
 mod events;
@@ -10,9 +10,8 @@ mod transformation;
 mod value;
 
 pub use events::Events;
-use fmu_description::Experiment;
-use fmu_description::ModelDescription;
 pub use fmu_description::abi::Status;
+use fmu_description::{Experiment, ModelDescription};
 pub use model_exchange::{CompletedStep, EventInfo, ModelExchange};
 pub use transformation::Transformation;
 pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
@@ -33,10 +32,9 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 /// * Clocked variables may be read and set at any time: outside of the ticks of their clock, reading
 ///   returns the value at the last tick, and a value set reaches the FMU at the next one.
 ///
-/// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
-/// returns a [`CallError`]; `fmi2Discard` of a step is [`StepResult::Part`]. The default implementations
-/// of the functions that access values, derivatives and states return [`Failure::Missing`]; those that
-/// set up, change modes, terminate and free succeed without a call.
+/// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or returns a
+/// [`CallError`]; `fmi2Discard` of a step is [`StepResult::Part`]. By default the functions that access values,
+/// derivatives and states return [`Failure::Missing`]; those that set up, change modes, terminate and free succeed.
 #[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
 #[expect(unused_variables, reason = "arguments of functions that an implementation may leave out")]
 pub trait Slave: Send {
@@ -45,8 +43,7 @@ pub trait Slave: Send {
     /// Only [`Slave::configure`] changes it.
     fn description(&self) -> &ModelDescription;
 
-    /// Whether the outputs depend on the present inputs only, with no state in between. The Jacobi
-    /// method steps such a slave after all others, when its inputs are known.
+    /// Whether the outputs depend on the present inputs only. The Jacobi method steps such a slave after all others.
     fn is_function(&self) -> bool {
         false
     }
@@ -56,11 +53,9 @@ pub trait Slave: Send {
         Err(absent("fmi2SetDebugLogging"))
     }
 
-    /// Sets structural parameters (FMI 3.0) in configuration mode, before
-    /// [`Slave::enter_initialization_mode`]: value references and values; a Boolean is 0 or 1.
-    ///
-    /// Arrays change their sizes, so [`Slave::description`] has other variables afterwards, and states that were saved
-    /// before are discarded.
+    /// Sets structural parameters (FMI 3.0) in configuration mode, before [`Slave::enter_initialization_mode`]: value
+    /// references and values; a Boolean is 0 or 1. Arrays change their sizes, so [`Slave::description`] has other
+    /// variables afterwards, and states that were saved before are discarded.
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         Err(absent("fmi3EnterConfigurationMode"))
     }
@@ -85,8 +80,8 @@ pub trait Slave: Send {
         Ok(())
     }
 
-    /// Calls `fmi2FreeInstance` now and reports its outcome, if the instance runs in its own process.
-    /// No other call may follow. Any other instance is freed when it is dropped.
+    /// Calls `fmi2FreeInstance` now and reports its outcome, if the instance runs in its own process. No other call may
+    /// follow. Any other instance is freed when it is dropped.
     fn free(&mut self) -> Result<(), CallError> {
         Ok(())
     }
@@ -159,9 +154,8 @@ pub trait Slave: Send {
         Err(absent("fmi2GetRealOutputDerivatives"))
     }
 
-    /// `fmi2DoStep` from `time` to `time + size`, both in s. `never_back` is
-    /// `noSetFMUStatePriorToCurrentPoint`. After `fmi2Pending` the call waits for the end of the step;
-    /// `fmi2Discard` returns [`StepResult::Part`].
+    /// `fmi2DoStep` from `time` to `time + size`, both in s. `never_back` is `noSetFMUStatePriorToCurrentPoint`. After
+    /// `fmi2Pending` the call waits for the end of the step; `fmi2Discard` returns [`StepResult::Part`].
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError>;
 
     /// `fmi2GetDirectionalDerivative` (section 2.1.9): `changes = (dh/dv) seed` for the `unknowns` h and
@@ -196,10 +190,8 @@ pub trait Slave: Send {
         Err(absent("fmi2DeSerializeFMUstate"))
     }
 
-    /// Sets Real inputs and their derivatives, steps, and reads Real outputs and their derivatives.
-    ///
-    /// One call does all of it, so that a slave in another process receives one request. The outputs
-    /// are also read after a partial step.
+    /// Sets Real inputs and their derivatives, steps, and reads Real outputs and their derivatives, also after a partial
+    /// step. It is one call, so that a slave in another process receives one request.
     fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         if !request.inputs.is_empty() {
             self.set_real(request.inputs, request.input_values)?;
@@ -254,36 +246,29 @@ pub trait Slave: Send {
         None
     }
 
-    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
-    /// status, results and the end of the line after it. Returns false if the slave cannot do so; the
-    /// caller then logs the functions of this trait.
+    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made; status, results and the
+    /// end of the line after it. Returns false if the slave cannot do so; the caller then logs the functions of this trait.
     fn log_calls(&mut self, sink: CallSink) -> bool {
         false
     }
 
-    /// Lets the FMU get copies of arrays in its calls from now on, with canaries around them: a write past
-    /// an array or into a constant one is an error of the call. Does nothing if the slave calls no C
-    /// functions in this process.
+    /// Lets the FMU get copies of arrays in its calls from now on, with canaries around them: a write past an array or
+    /// into a constant one is an error of the call. Does nothing if the slave calls no C functions in this process.
     fn guard_arrays(&mut self) {}
 
-    /// Returns what the FMU has changed for its whole process, a phrase each: environment, working
-    /// directory, rounding mode, locale, process group. Empty unless the FMU is alone in a process.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] if the process of the FMU has ended.
+    /// Returns what the FMU has changed for its whole process, a phrase each: environment, working directory, rounding
+    /// mode, locale, process group. Empty unless the FMU is alone in a process.
     fn process_changes(&mut self) -> Result<Vec<String>, CallError> {
         Ok(Vec::new())
     }
 
-    /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this
-    /// is unknown, as for an instance in another process.
+    /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this is unknown, as for
+    /// an instance in another process.
     fn take_warning(&mut self) -> bool {
         false
     }
 
-    /// Returns the interface for steps that run in the background; `None` if stepping blocks the
-    /// calling thread.
+    /// Returns the interface for steps that run in the background; `None` if stepping blocks the calling thread.
     fn in_background(&mut self) -> Option<&mut dyn Background> {
         None
     }
@@ -294,10 +279,8 @@ pub type CallSink = Box<dyn FnMut(&str) + Send>;
 
 /// A slave that steps in the background, so that its caller can start the steps of other slaves.
 pub trait Background {
-    /// The first half of [`Slave::advance`]: sets the inputs and starts the step.
-    ///
-    /// Call [`Background::finish_advance`] next. Any other call waits for the end of the step and
-    /// discards its result.
+    /// The first half of [`Slave::advance`]: sets the inputs and starts the step. Call [`Background::finish_advance`]
+    /// next: any other call waits for the end of the step and discards its result.
     ///
     /// # Errors
     ///
@@ -317,7 +300,7 @@ pub trait Background {
 ///
 /// # Errors
 ///
-/// Returns the [`CallError`] of the function called.
+/// The [`CallError`] of that function.
 pub fn finish(
     slave: &mut dyn Slave,
     request: &mut StepRequest<'_>,
@@ -367,8 +350,7 @@ pub struct StepRequest<'a> {
 }
 
 impl<'a> StepRequest<'a> {
-    /// A step with constant inputs: references and values of the inputs and of the outputs, no
-    /// derivatives.
+    /// A step with constant inputs: references and values of the inputs and of the outputs, no derivatives.
     #[must_use]
     pub fn held(
         inputs: &'a [u32],

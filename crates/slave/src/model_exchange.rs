@@ -4,12 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CallError, Slave, absent};
 
-/// An instance of a model-exchange FMU (FMI 2.0.5, section 3.2; FMI 3.0, section 3), whose states the
-/// importer integrates.
+/// An instance of a model-exchange FMU (FMI 2.0.5, section 3.2; FMI 3.0, section 3), whose states the importer
+/// integrates. Where the versions differ, the functions are named after FMI 3.0.
 ///
-/// [`Slave`] has the functions that both interfaces share; its `do_step` and its input and output
-/// derivatives return [`Failure::Missing`](crate::Failure::Missing). Where the versions differ, the
-/// functions are named after FMI 3.0.
+/// [`Slave`] has the functions that both interfaces share; its `do_step` and its input and output derivatives return
+/// [`Failure::Missing`](crate::Failure::Missing).
 #[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
 pub trait ModelExchange: Slave {
     /// Returns the number of continuous states: the number of entries of `ModelStructure/Derivatives`, or
