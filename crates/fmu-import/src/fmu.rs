@@ -189,16 +189,10 @@ impl Fmu {
     /// another number of elements.
     pub fn elements(&self) -> Result<ModelDescription, FmuError> {
         let description = self.description();
-        let view = match description.version() {
-            Version::V1 => return Ok(crate::v1::scalar_description(description)),
-            Version::V2 => return Ok(description.clone()),
-            Version::V3 => crate::v3::ElementView::new(description, &HashMap::new()),
-        };
-        let unsupported = |reason| {
-            let model = description.model_name.clone();
-            LoadError::Unsupported { model, reason }
-        };
-        Ok(view.map_err(unsupported)?.description)
+        let scalar = scalar_description(description, &HashMap::new()).map_err(|reason| {
+            LoadError::Unsupported { model: description.model_name.clone(), reason }
+        })?;
+        Ok(scalar.unwrap_or_else(|| description.clone()))
     }
 
     /// Returns the library for `interface`. That for model exchange is loaded now. The error of an FMU without the
@@ -250,6 +244,19 @@ impl Fmu {
             by_reference.get(&(kind, reference)).map(|position| variables[*position].name.clone())
         })
     }
+}
+
+/// Returns the description of an instance without integration if it differs from that of its FMU: with a scalar variable
+/// for each element of an array, whose structural parameters have the values `sizes`. On failure returns the reason.
+pub(crate) fn scalar_description(
+    description: &ModelDescription,
+    sizes: &HashMap<u32, u64>,
+) -> Result<Option<ModelDescription>, String> {
+    Ok(match description.version() {
+        Version::V1 => Some(crate::v1::scalar_description(description)),
+        Version::V2 => None,
+        Version::V3 => Some(crate::v3::ElementView::new(description, sizes)?.description),
+    })
 }
 
 /// Returns the letter of a type in the messages of an FMU (FMI 2.0.5, section 2.1.5).

@@ -57,23 +57,23 @@ pub(crate) struct Instance {
     sizes: HashMap<u32, u64>,
 }
 
-/// Defines methods that get and set values: by which methods, with the names of the functions in errors.
+/// Defines methods that get and set values: the names of the functions in errors, and how a buffer gives and takes a
+/// value.
 macro_rules! values {
     ($(
         $get:ident $set:ident: $type:ty =
-            $read:ident($get_name:literal $(, $convert:expr)?)
-            $write:ident($set_name:literal $(, $put:expr)?);
+            ($get_name:literal, $convert:expr) ($set_name:literal, $put:expr);
     )*) => {
         $(pub(crate) fn $get(
             &mut self,
             list: &[u32],
             values: &mut [$type],
         ) -> Result<(), CallError> {
-            self.$read($get_name, list, values $(, $convert)?)
+            self.read($get_name, list, values, $convert)
         }
 
         pub(crate) fn $set(&mut self, list: &[u32], values: &[$type]) -> Result<(), CallError> {
-            self.$write($set_name, list, values $(, $put)?)
+            self.write($set_name, list, values, $put)
         })*
     };
 }
@@ -230,11 +230,11 @@ impl Instance {
 
     values! {
         get_integer set_integer: i64 =
-            read("fmi3GetInt64", Buffer::integer) write("fmi3SetInt64", Buffer::put_integer);
+            ("fmi3GetInt64", Buffer::integer) ("fmi3SetInt64", Buffer::put_integer);
         get_boolean set_boolean: i32 =
-            read("fmi3GetBoolean", Buffer::boolean) write("fmi3SetBoolean", Buffer::put_boolean);
-        get_string set_string: String = read_list("fmi3GetString") write_list("fmi3SetString");
-        get_binary set_binary: Vec<u8> = read_list("fmi3GetBinary") write_list("fmi3SetBinary");
+            ("fmi3GetBoolean", Buffer::boolean) ("fmi3SetBoolean", Buffer::put_boolean);
+        get_string set_string: String = ("fmi3GetString", Buffer::text) ("fmi3SetString", Buffer::put_text);
+        get_binary set_binary: Vec<u8> = ("fmi3GetBinary", Buffer::bytes) ("fmi3SetBinary", Buffer::put_bytes);
     }
 }
 

@@ -22,6 +22,7 @@ use super::words::{Reader, Writer};
 use super::worker::refuse_in_worker;
 use super::{IsolateError, Options};
 use crate::crash::Place;
+use crate::fmu::scalar_description;
 use slave::{CallError, Failure};
 
 /// Longest wait between two checks of messages and time limits.
@@ -399,11 +400,7 @@ pub(super) fn description_of_instance(
     sizes: &HashMap<u32, u64>,
     describe: Option<Describe>,
 ) -> Result<Option<ModelDescription>, String> {
-    let scalar = match description.version() {
-        Version::V1 => Some(crate::v1::scalar_description(description)),
-        Version::V2 => None,
-        Version::V3 => Some(crate::v3::ElementView::new(description, sizes)?.description),
-    };
+    let scalar = scalar_description(description, sizes)?;
     let described = describe.map(|describe| describe(scalar.as_ref().unwrap_or(description)));
     Ok(described.or(scalar))
 }

@@ -14,11 +14,10 @@ use crate::crash::{LOADING, Limit, Place, UNLOADING};
 use crate::error::LoadError;
 
 /// What happens to a library with functions that no library defines.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Binding {
     /// It is loaded with a warning if the system can bind functions at their first call. A call of such
     /// a function ends the process.
-    #[default]
     Lenient,
     /// It is refused.
     #[cfg(target_os = "linux")]

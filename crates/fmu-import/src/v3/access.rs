@@ -1,12 +1,9 @@
 //! Get and set: values of a list of variables through the calls of its plan.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
-
 use fmu_description::NativeType;
 
 use super::Instance;
 use super::buffer::Buffer;
-use super::clocked::TextOrBytes;
 use super::modes::Mode;
 use super::plan::Run;
 use super::unknown;
@@ -29,7 +26,7 @@ impl Instance {
         done
     }
 
-    /// Reads numbers. `convert` returns one number of a buffer; `None` is an error.
+    /// Reads values. `convert` returns one value of a buffer; `None` is an error.
     pub(super) fn read<T>(
         &mut self,
         function: &'static str,
@@ -60,8 +57,8 @@ impl Instance {
         })
     }
 
-    /// Passes numbers. `put` stores one number in a buffer; `None` is an error.
-    pub(super) fn write<T: Copy + std::fmt::Debug>(
+    /// Passes values. `put` stores one value in a buffer; `None` is an error.
+    pub(super) fn write<T: Clone + std::fmt::Debug>(
         &mut self,
         function: &'static str,
         list: &[u32],
@@ -76,9 +73,9 @@ impl Instance {
                 run.buffer.get(&mut instance.component, &run.references)?;
             }
             for &(position, place) in &run.places {
-                if put(&mut run.buffer, place, values[position]).is_none() {
+                let value = &values[position];
+                if put(&mut run.buffer, place, value.clone()).is_none() {
                     let (name, kind) = (instance.view.name(list[position]), run.kind.name());
-                    let value = values[position];
                     let what = format!(
                         "cannot take the value {value:?} for {name}, expected a value of type {kind}"
                     );
@@ -97,65 +94,6 @@ impl Instance {
             }
             if instance.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {
                 run.buffer.set(&mut instance.component, &run.references)?;
-            }
-            Ok(())
-        })
-    }
-
-    /// Reads Strings or binaries.
-    pub(super) fn read_list<T: TextOrBytes>(
-        &mut self,
-        function: &'static str,
-        list: &[u32],
-        values: &mut [T],
-    ) -> Result<(), CallError> {
-        self.for_runs(function, list, |instance, run| {
-            if instance.is_silent(run) {
-                let all = instance.recall_list(run);
-                for &(position, place) in &run.places {
-                    values[position] = all[place].clone().unwrap_or_default();
-                }
-                return Ok(());
-            }
-            if run.direct {
-                return T::get(&mut instance.component, &run.references, values);
-            }
-            let mut all = vec![T::default(); run.shadows.len()];
-            T::get(&mut instance.component, &run.references, &mut all)?;
-            for &(position, place) in &run.places {
-                values[position].clone_from(&all[place]);
-            }
-            Ok(())
-        })
-    }
-
-    /// Passes Strings or binaries.
-    pub(super) fn write_list<T: TextOrBytes + Hash>(
-        &mut self,
-        function: &'static str,
-        list: &[u32],
-        values: &[T],
-    ) -> Result<(), CallError> {
-        self.for_runs(function, list, |instance, run| {
-            let silent = instance.is_silent(run);
-            let mut all = vec![T::default(); run.shadows.len()];
-            if run.partial && silent {
-                let known = instance.recall_list(run).into_iter();
-                all = known.map(Option::unwrap_or_default).collect();
-            } else if run.partial {
-                T::get(&mut instance.component, &run.references, &mut all)?;
-            }
-            for &(position, place) in &run.places {
-                all[place].clone_from(&values[position]);
-            }
-            if !run.clocks.is_empty() {
-                instance.remember_list(run, &all);
-            }
-            if silent {
-                return Ok(());
-            }
-            if instance.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
-                T::set(&mut instance.component, &run.references, &all)?;
             }
             Ok(())
         })
@@ -187,10 +125,4 @@ impl Instance {
         }
         Ok(changed)
     }
-}
-
-fn hash(value: &impl Hash) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    hasher.finish()
 }

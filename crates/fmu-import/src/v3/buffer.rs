@@ -1,39 +1,64 @@
 //! The values of one C call, in the type of the FMU.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+
 use fmu_description::NativeType;
+use serde::{Deserialize, Serialize};
 
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// A number of the C interface.
-trait Number: Copy + Default + PartialEq {
-    /// NaN for an integer beyond 64 bits with a sign.
-    fn to_real(self) -> f64;
+/// A value that outlives its call.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum ElementValue {
+    /// The bits of a number.
+    Number(u64),
+    Text(String),
+    Bytes(Vec<u8>),
+}
+
+/// A value of the C interface. It is no Real or Integer, and made from none, unless its type says how.
+trait Element: Clone + Default {
+    /// NaN for an integer beyond 64 bits with a sign; `None` if the value is no number.
+    fn real(&self) -> Option<f64> {
+        None
+    }
+
     /// `None` if the type is no floating-point type or the number is beyond its range.
-    fn from_real(value: f64) -> Option<Self>;
-    /// `None` for a floating-point type and beyond 64 bits with a sign.
-    fn to_integer(self) -> Option<i64>;
-    /// `None` beyond the range of the type.
-    fn from_integer(value: i64) -> Option<Self>;
-    /// Returns bits that are equal for equal values only.
-    fn bits(self) -> u64;
-    /// Returns the number with these [`Number::bits`].
-    fn from_bits(bits: u64) -> Self;
+    fn from_real(_: f64) -> Option<Self> {
+        None
+    }
+
+    /// `None` if the type is no integer type, and beyond 64 bits with a sign.
+    fn integer(&self) -> Option<i64> {
+        None
+    }
+
+    /// `None` if the type is no type of numbers, and beyond its range.
+    fn from_integer(_: i64) -> Option<Self> {
+        None
+    }
+
+    /// Returns bits that are equal for equal values only; of a String or a binary, a hash.
+    fn bits(&self) -> u64;
+
+    fn to_value(&self) -> ElementValue {
+        ElementValue::Number(self.bits())
+    }
+
+    /// `None` if the value has another type.
+    fn from_value(value: &ElementValue) -> Option<Self>;
 }
 
 macro_rules! integers {
     ($($type:ty)*) => {
-        $(impl Number for $type {
-            fn to_real(self) -> f64 {
-                self.to_integer().map_or(f64::NAN, slave::to_real)
+        $(impl Element for $type {
+            fn real(&self) -> Option<f64> {
+                Some(self.integer().map_or(f64::NAN, slave::to_real))
             }
 
-            fn from_real(_: f64) -> Option<Self> {
-                None
-            }
-
-            fn to_integer(self) -> Option<i64> {
-                self.try_into().ok()
+            fn integer(&self) -> Option<i64> {
+                (*self).try_into().ok()
             }
 
             fn from_integer(value: i64) -> Option<Self> {
@@ -42,14 +67,14 @@ macro_rules! integers {
 
             #[expect(clippy::allow_attributes, reason = "depends on the type")]
             #[allow(clippy::cast_lossless, clippy::cast_sign_loss, reason = "only compared")]
-            fn bits(self) -> u64 {
-                self as u64
+            fn bits(&self) -> u64 {
+                *self as u64
             }
 
             #[expect(clippy::allow_attributes, reason = "depends on the type")]
             #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "of bits")]
-            fn from_bits(bits: u64) -> Self {
-                bits as Self
+            fn from_value(value: &ElementValue) -> Option<Self> {
+                if let ElementValue::Number(bits) = value { Some(*bits as Self) } else { None }
             }
         })*
     };
@@ -57,35 +82,31 @@ macro_rules! integers {
 
 integers! { i8 u8 i16 u16 i32 u32 i64 u64 }
 
-impl Number for f64 {
-    fn to_real(self) -> f64 {
-        self
+impl Element for f64 {
+    fn real(&self) -> Option<f64> {
+        Some(*self)
     }
 
     fn from_real(value: f64) -> Option<Self> {
         Some(value)
     }
 
-    fn to_integer(self) -> Option<i64> {
-        None
-    }
-
     fn from_integer(value: i64) -> Option<Self> {
         Some(slave::to_real(value))
     }
 
-    fn bits(self) -> u64 {
+    fn bits(&self) -> u64 {
         self.to_bits()
     }
 
-    fn from_bits(bits: u64) -> Self {
-        f64::from_bits(bits)
+    fn from_value(value: &ElementValue) -> Option<Self> {
+        if let ElementValue::Number(bits) = value { Some(f64::from_bits(*bits)) } else { None }
     }
 }
 
-impl Number for f32 {
-    fn to_real(self) -> f64 {
-        self.into()
+impl Element for f32 {
+    fn real(&self) -> Option<f64> {
+        Some((*self).into())
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "the nearest f32; checked for overflow")]
@@ -94,22 +115,62 @@ impl Number for f32 {
         (rounded.is_finite() || !value.is_finite()).then_some(rounded)
     }
 
-    fn to_integer(self) -> Option<i64> {
-        None
-    }
-
     fn from_integer(value: i64) -> Option<Self> {
         Self::from_real(slave::to_real(value))
     }
 
-    fn bits(self) -> u64 {
+    fn bits(&self) -> u64 {
         self.to_bits().into()
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "the bits of an f32")]
-    fn from_bits(bits: u64) -> Self {
-        f32::from_bits(bits as u32)
+    fn from_value(value: &ElementValue) -> Option<Self> {
+        if let ElementValue::Number(bits) = value {
+            Some(f32::from_bits(*bits as u32))
+        } else {
+            None
+        }
     }
+}
+
+/// Defines the types that are no numbers, and how a buffer gives and takes their values.
+macro_rules! others {
+    ($($type:ty: $variant:ident, $value:ident, $get:ident, $put:ident;)*) => {
+        $(impl Element for $type {
+            fn bits(&self) -> u64 {
+                let mut hasher = DefaultHasher::new();
+                self.hash(&mut hasher);
+                hasher.finish()
+            }
+
+            fn to_value(&self) -> ElementValue {
+                ElementValue::$value(self.clone())
+            }
+
+            fn from_value(value: &ElementValue) -> Option<Self> {
+                if let ElementValue::$value(value) = value { Some(value.clone()) } else { None }
+            }
+        })*
+
+        impl Buffer {
+            $(/// Returns value number `position`; `None` if the values have another type.
+            pub(super) fn $get(&self, position: usize) -> Option<$type> {
+                if let Buffer::$variant(values) = self { Some(values[position].clone()) } else { None }
+            }
+
+            /// Stores a value; `None` if the values have another type.
+            pub(super) fn $put(&mut self, position: usize, value: $type) -> Option<()> {
+                let Buffer::$variant(values) = self else { return None };
+                values[position] = value;
+                Some(())
+            })*
+        }
+    };
+}
+
+others! {
+    String: String, Text, text, put_text;
+    Vec<u8>: Binary, Bytes, bytes, put_bytes;
 }
 
 /// Defines the buffer: for each variant its type and its functions.
@@ -119,8 +180,6 @@ macro_rules! buffer {
         #[derive(Debug)]
         pub(super) enum Buffer {
             $($variant(Vec<$type>),)*
-            /// `String` and `Binary`, which are no numbers.
-            Other,
         }
 
         impl Buffer {
@@ -129,11 +188,10 @@ macro_rules! buffer {
                 match kind {
                     $(NativeType::$variant => Buffer::$variant(vec![<$type>::default(); count]),)*
                     NativeType::Clock => Buffer::Boolean(vec![0; count]),
-                    NativeType::String | NativeType::Binary => Buffer::Other,
                 }
             }
 
-            /// Reads all values from the FMU; none if they are no numbers.
+            /// Reads all values from the FMU.
             pub(super) fn get(
                 &mut self,
                 component: &mut Component,
@@ -141,11 +199,10 @@ macro_rules! buffer {
             ) -> Result<(), CallError> {
                 match self {
                     $(Buffer::$variant(values) => component.$get(references, values),)*
-                    Buffer::Other => Ok(()),
                 }
             }
 
-            /// Passes all values to the FMU; none if they are no numbers.
+            /// Passes all values to the FMU.
             pub(super) fn set(
                 &self,
                 component: &mut Component,
@@ -153,15 +210,13 @@ macro_rules! buffer {
             ) -> Result<(), CallError> {
                 match self {
                     $(Buffer::$variant(values) => component.$set(references, values),)*
-                    Buffer::Other => Ok(()),
                 }
             }
 
             /// Returns value number `position` as a Real; `None` if the values are no numbers.
             pub(super) fn real(&self, position: usize) -> Option<f64> {
                 match self {
-                    $(Buffer::$variant(values) => Some(values[position].to_real()),)*
-                    Buffer::Other => None,
+                    $(Buffer::$variant(values) => values[position].real(),)*
                 }
             }
 
@@ -169,7 +224,6 @@ macro_rules! buffer {
             pub(super) fn put_real(&mut self, position: usize, value: f64) -> Option<()> {
                 match self {
                     $(Buffer::$variant(values) => values[position] = <$type>::from_real(value)?,)*
-                    Buffer::Other => return None,
                 }
                 Some(())
             }
@@ -178,8 +232,7 @@ macro_rules! buffer {
             /// sign.
             pub(super) fn integer(&self, position: usize) -> Option<i64> {
                 match self {
-                    $(Buffer::$variant(values) => values[position].to_integer(),)*
-                    Buffer::Other => None,
+                    $(Buffer::$variant(values) => values[position].integer(),)*
                 }
             }
 
@@ -187,26 +240,34 @@ macro_rules! buffer {
             pub(super) fn put_integer(&mut self, position: usize, value: i64) -> Option<()> {
                 match self {
                     $(Buffer::$variant(values) => values[position] = <$type>::from_integer(value)?,)*
-                    Buffer::Other => return None,
                 }
                 Some(())
             }
 
-            /// Returns bits of value number `position` that are equal for equal values only; 0 if it is no number.
+            /// Returns bits of value number `position` that are equal for equal values only; of a String or a binary,
+            /// a hash.
             pub(super) fn bits(&self, position: usize) -> u64 {
                 match self {
                     $(Buffer::$variant(values) => values[position].bits(),)*
-                    Buffer::Other => 0,
                 }
             }
 
-            /// Stores the value with these [`Buffer::bits`].
-            pub(super) fn put_bits(&mut self, position: usize, bits: u64) {
+            /// Returns value number `position`, to be stored by [`Buffer::put_value`] later.
+            pub(super) fn value(&self, position: usize) -> ElementValue {
+                match self {
+                    $(Buffer::$variant(values) => values[position].to_value(),)*
+                }
+            }
+
+            /// Stores a value, or 0 or nothing if there is none of the type; returns whether there is one.
+            pub(super) fn put_value(&mut self, position: usize, value: Option<&ElementValue>) -> bool {
                 match self {
                     $(Buffer::$variant(values) => {
-                        values[position] = <$type as Number>::from_bits(bits);
+                        let value = value.and_then(<$type as Element>::from_value);
+                        let is_known = value.is_some();
+                        values[position] = value.unwrap_or_default();
+                        is_known
                     })*
-                    Buffer::Other => {}
                 }
             }
         }
@@ -237,4 +298,6 @@ buffer! {
     Int64: i64, get_int64, set_int64;
     UInt64: u64, get_uint64, set_uint64;
     Boolean: u8, get_boolean, set_boolean;
+    String: String, get_string, set_string;
+    Binary: Vec<u8>, get_binary, set_binary;
 }

@@ -4,70 +4,17 @@
 
 use std::collections::BTreeMap;
 
-use fmu_description::{Causality, NativeType};
-use serde::{Deserialize, Serialize};
-
 use super::Instance;
+use super::buffer::ElementValue;
 use super::elements::ElementView;
 use super::modes::Mode;
 use super::plan::Run;
-use crate::library::v3::Component;
+use fmu_description::{Causality, NativeType};
 use slave::CallError;
-
-/// The value of an element.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum ElementValue {
-    /// The bits of a number.
-    Number(u64),
-    Text(String),
-    Bytes(Vec<u8>),
-}
 
 /// Values of clocked elements at their last tick, or to be set at their next one. The key is the position of the
 /// element among all elements that may change in Event Mode only.
 pub(super) type Memory = BTreeMap<usize, ElementValue>;
-
-/// A value of type String or Binary.
-pub(super) trait TextOrBytes: Clone + Default {
-    fn to_value(&self) -> ElementValue;
-    /// `None` if the value has another type.
-    fn from_value(value: &ElementValue) -> Option<&Self>;
-    /// Reads the values of whole variables.
-    fn get(component: &mut Component, list: &[u32], values: &mut [Self]) -> Result<(), CallError>;
-    /// Passes the values of whole variables.
-    fn set(component: &mut Component, list: &[u32], values: &[Self]) -> Result<(), CallError>;
-}
-
-macro_rules! text_or_bytes {
-    ($($type:ty: $variant:ident, $get:ident, $set:ident;)*) => {
-        $(impl TextOrBytes for $type {
-            fn to_value(&self) -> ElementValue {
-                ElementValue::$variant(self.clone())
-            }
-
-            fn from_value(value: &ElementValue) -> Option<&Self> {
-                if let ElementValue::$variant(value) = value { Some(value) } else { None }
-            }
-
-            fn get(
-                component: &mut Component,
-                list: &[u32],
-                values: &mut [Self],
-            ) -> Result<(), CallError> {
-                component.$get(list, values)
-            }
-
-            fn set(component: &mut Component, list: &[u32], values: &[Self]) -> Result<(), CallError> {
-                component.$set(list, values)
-            }
-        })*
-    };
-}
-
-text_or_bytes! {
-    String: Text, get_string, set_string;
-    Vec<u8>: Bytes, get_binary, set_binary;
-}
 
 /// The calls for all clocked variables of an FMU.
 #[derive(Debug, Default)]
@@ -98,39 +45,21 @@ impl Instance {
         is_clocked && self.state.mode.is_initialized() && !ticks()
     }
 
-    /// Remembers the numbers in the buffer of a run.
+    /// Remembers the values in the buffer of a run.
     pub(super) fn remember(&mut self, run: &Run) {
         for (place, shadow) in run.shadows.iter().enumerate() {
-            self.state.memory.insert(*shadow, ElementValue::Number(run.buffer.bits(place)));
+            self.state.memory.insert(*shadow, run.buffer.value(place));
         }
     }
 
-    /// Puts the remembered numbers into the buffer of a run; elements without one are 0. Returns whether all have one.
+    /// Puts the remembered values into the buffer of a run; elements without one are 0 or empty. Returns whether all have
+    /// one.
     pub(super) fn recall(&self, run: &mut Run) -> bool {
         let mut all = true;
         for (place, shadow) in run.shadows.iter().enumerate() {
-            let known = self.state.memory.get(shadow);
-            let bits = match known {
-                Some(ElementValue::Number(bits)) => Some(*bits),
-                _ => None,
-            };
-            all &= bits.is_some();
-            run.buffer.put_bits(place, bits.unwrap_or(0));
+            all &= run.buffer.put_value(place, self.state.memory.get(shadow));
         }
         all
-    }
-
-    /// Remembers the Strings or binaries of a run.
-    pub(super) fn remember_list<T: TextOrBytes>(&mut self, run: &Run, values: &[T]) {
-        for (shadow, value) in run.shadows.iter().zip(values) {
-            self.state.memory.insert(*shadow, value.to_value());
-        }
-    }
-
-    /// Returns the remembered Strings or binaries of a run; `None` for an element without one.
-    pub(super) fn recall_list<T: TextOrBytes>(&self, run: &Run) -> Vec<Option<T>> {
-        let value = |shadow| self.state.memory.get(shadow).and_then(T::from_value).cloned();
-        run.shadows.iter().map(value).collect()
     }
 
     /// Reads and remembers the clocked outputs and locals whose clocks tick.
@@ -140,17 +69,9 @@ impl Instance {
         }
         let mut runs = std::mem::take(&mut self.clocked.others);
         let done = runs.iter_mut().try_for_each(|run| {
-            if !self.state.clocks.is_active(&run.clocks) {
-                return Ok(());
-            }
-            match run.kind {
-                NativeType::Clock => {}
-                NativeType::String => self.read_and_remember::<String>(run)?,
-                NativeType::Binary => self.read_and_remember::<Vec<u8>>(run)?,
-                _ => {
-                    run.buffer.get(&mut self.component, &run.references)?;
-                    self.remember(run);
-                }
+            if run.kind != NativeType::Clock && self.state.clocks.is_active(&run.clocks) {
+                run.buffer.get(&mut self.component, &run.references)?;
+                self.remember(run);
             }
             Ok(())
         });
@@ -158,39 +79,21 @@ impl Instance {
         done
     }
 
-    fn read_and_remember<T: TextOrBytes>(&mut self, run: &Run) -> Result<(), CallError> {
-        let mut values = vec![T::default(); run.shadows.len()];
-        T::get(&mut self.component, &run.references, &mut values)?;
-        self.remember_list(run, &values);
-        Ok(())
-    }
-
     /// Passes the values that were set last to the clocked inputs of `clocks`, which have started to tick. Inputs that
     /// were never set are left as they are.
     pub(super) fn set_clocked(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         let mut runs = std::mem::take(&mut self.clocked.inputs);
-        let done = runs.iter_mut().try_for_each(|run| {
-            if !run.clocks.iter().any(|clock| clocks.contains(clock)) {
-                return Ok(());
-            }
-            match run.kind {
-                NativeType::String => self.set_remembered::<String>(run),
-                NativeType::Binary => self.set_remembered::<Vec<u8>>(run),
-                NativeType::Clock => Ok(()),
-                _ => {
-                    if !self.recall(run) {
-                        return Ok(());
-                    }
-                    run.buffer.set(&mut self.component, &run.references)
-                }
+        let is_set = |run: &&mut Run| {
+            run.kind != NativeType::Clock && run.clocks.iter().any(|clock| clocks.contains(clock))
+        };
+        let done = runs.iter_mut().filter(is_set).try_for_each(|run| {
+            if self.recall(run) {
+                run.buffer.set(&mut self.component, &run.references)
+            } else {
+                Ok(())
             }
         });
         self.clocked.inputs = runs;
         done
-    }
-
-    fn set_remembered<T: TextOrBytes>(&mut self, run: &Run) -> Result<(), CallError> {
-        let values: Option<Vec<T>> = self.recall_list(run).into_iter().collect();
-        values.map_or(Ok(()), |all| T::set(&mut self.component, &run.references, &all))
     }
 }

@@ -34,8 +34,6 @@ pub(super) struct Run {
     pub(super) shadows: Vec<usize>,
     /// Whether the list lacks elements of an array, which keep their values.
     pub(super) partial: bool,
-    /// Whether the values of the call are the values of the list, in the same order.
-    pub(super) direct: bool,
     pub(super) buffer: Buffer,
 }
 
@@ -60,13 +58,6 @@ impl Plan {
             run.places.iter().for_each(|(_, place)| stated[*place] = true);
             run.partial = stated.contains(&false);
         }
-        let single = runs.len() == 1;
-        for run in &mut runs {
-            run.direct = single
-                && !run.partial
-                && run.places.len() == run.shadows.len()
-                && run.places.iter().all(|(position, place)| position == place);
-        }
         Ok(Self { references: list.to_vec(), runs })
     }
 }
@@ -84,8 +75,7 @@ fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
             places: Vec::new(),
             shadows: Vec::new(),
             partial: false,
-            direct: false,
-            buffer: Buffer::Other,
+            buffer: Buffer::new(kind, 0),
         });
         runs.len() - 1
     })
