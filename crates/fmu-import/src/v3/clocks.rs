@@ -47,34 +47,34 @@ struct TimedClock {
     warned: bool,
 }
 
-/// The state of all clocks in a serialised state.
-#[derive(Serialize, Deserialize)]
-pub(super) struct ClocksState {
-    timed: Vec<TimedClock>,
-    /// The clocks that ticked in the last step.
-    ticked: Vec<u32>,
-}
-
-/// The clocks of an instance.
-#[derive(Clone, Debug, Default)]
+/// The clocks of an instance. A serialised state has those that tick at known times, and the ticks of the last step.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Clocks {
     timed: Vec<TimedClock>,
     /// Triggered input clocks.
+    #[serde(skip)]
     triggered: Vec<u32>,
+    #[serde(skip)]
     outputs: Vec<u32>,
     /// The clocks that tick now: from their activation to the next update of the discrete states.
+    #[serde(skip)]
     active: Vec<u32>,
     /// The input clocks whose model partitions have to run.
+    #[serde(skip)]
     partitions: Vec<u32>,
-    /// The priorities of the clocks; the smallest number is the highest priority.
+    /// The priorities of all clocks; the smallest number is the highest priority.
+    #[serde(skip)]
     priorities: HashMap<u32, i64>,
     /// The input clocks that ticked in the present event.
+    #[serde(skip)]
     event_ticks: Vec<u32>,
-    /// Whether each clock ticked in the last step.
-    ticked: HashMap<u32, bool>,
+    /// The clocks that ticked in the last step, sorted.
+    ticked: Vec<u32>,
     /// Triggered input clocks that tick at the start of the next step.
+    #[serde(skip)]
     requested: Vec<u32>,
     /// Buffer for the values of the output clocks.
+    #[serde(skip)]
     flags: Vec<u8>,
 }
 
@@ -160,7 +160,6 @@ impl Clocks {
                 continue;
             };
             let reference = variable.value_reference;
-            clocks.ticked.insert(reference, false);
             clocks.priorities.insert(reference, attributes.priority.map_or(i64::MAX, i64::from));
             match (variable.causality, attributes.interval_variability) {
                 (Causality::Input, IntervalVariability::Triggered) => {
@@ -224,9 +223,7 @@ impl Clocks {
 
     /// Forgets the ticks of the last step.
     pub(super) fn begin_step(&mut self) {
-        for ticked in self.ticked.values_mut() {
-            *ticked = false;
-        }
+        self.ticked.clear();
     }
 
     /// Returns the time of the next tick in s, if one is known.
@@ -254,7 +251,9 @@ impl Clocks {
     }
 
     fn begin_tick(&mut self, reference: u32) {
-        self.ticked.insert(reference, true);
+        if let Err(place) = self.ticked.binary_search(&reference) {
+            self.ticked.insert(place, reference);
+        }
         if !self.active.contains(&reference) {
             self.active.push(reference);
         }
@@ -346,9 +345,8 @@ impl Clocks {
     /// Stores in the buffer of a run which clocks tick at present (`now`), or have ticked in the last step.
     fn read(&self, run: &mut Run, now: bool) {
         for (place, reference) in run.references.iter().enumerate() {
-            let ticked = || self.ticked.get(reference).copied().unwrap_or(false);
-            let ticks = if now { self.active.contains(reference) } else { ticked() };
-            run.buffer.put_integer(place, ticks.into());
+            let ticks = if now { &self.active } else { &self.ticked };
+            run.buffer.put_integer(place, ticks.contains(reference).into());
         }
     }
 
@@ -369,23 +367,15 @@ impl Clocks {
         }
     }
 
-    /// Returns counters, times and the ticks of the last step for a serialised state.
-    pub(super) fn state(&self) -> ClocksState {
-        let ticked = self.ticked.iter().filter(|(_, ticked)| **ticked);
-        let mut ticked: Vec<u32> = ticked.map(|(reference, _)| *reference).collect();
-        ticked.sort_unstable();
-        ClocksState { timed: self.timed.clone(), ticked }
-    }
-
     /// Returns whether a serialised state fits the number and the references of these clocks.
-    pub(super) fn fits(&self, state: &ClocksState) -> bool {
-        state.timed.len() == self.timed.len()
-            && state.ticked.iter().all(|reference| self.ticked.contains_key(reference))
+    pub(super) fn fits(&self, saved: &Self) -> bool {
+        saved.timed.len() == self.timed.len()
+            && saved.ticked.iter().all(|reference| self.priorities.contains_key(reference))
     }
 
     /// Restores a serialised state; nothing ticks now.
-    pub(super) fn restore(&mut self, state: &ClocksState) {
-        for (clock, saved) in self.timed.iter_mut().zip(&state.timed) {
+    pub(super) fn restore(&mut self, saved: &Self) {
+        for (clock, saved) in self.timed.iter_mut().zip(&saved.timed) {
             clock.set_interval(saved.interval);
             (clock.first, clock.ticks, clock.next) = (saved.first, saved.ticks, saved.next);
         }
@@ -393,9 +383,7 @@ impl Clocks {
         self.partitions.clear();
         self.event_ticks.clear();
         self.requested.clear();
-        for (reference, ticked) in &mut self.ticked {
-            *ticked = state.ticked.contains(reference);
-        }
+        self.ticked.clone_from(&saved.ticked);
     }
 }
 

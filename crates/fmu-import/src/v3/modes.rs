@@ -57,7 +57,6 @@ pub(super) struct State {
     pub(super) held: Vec<Option<u64>>,
     /// Values of clocked elements at their last tick, and for their next one.
     pub(super) memory: super::clocked::Memory,
-    #[serde(skip)]
     pub(super) clocks: super::clocks::Clocks,
 }
 

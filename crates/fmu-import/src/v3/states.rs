@@ -3,7 +3,6 @@
 use slave::CallError;
 
 use super::Instance;
-use super::clocks::ClocksState;
 use super::modes::{Mode, State};
 use crate::error::refused;
 
@@ -13,7 +12,7 @@ const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
 /// A serialised state: whether the initialization has ended, the state of the slave, and that of the FMU.
-type Saved<'a> = (bool, State, ClocksState, &'a [u8]);
+type Saved<'a> = (bool, State, &'a [u8]);
 
 impl Instance {
     pub(crate) fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
@@ -40,24 +39,24 @@ impl Instance {
             self.handle_event()?;
         }
         let fmu_state = self.component.serialize_state()?;
-        let (initialized, clocks) = (self.state.mode.is_initialized(), self.state.clocks.state());
-        postcard::to_extend(&(initialized, &self.state, clocks, fmu_state), MAGIC.to_vec())
+        let initialized = self.state.mode.is_initialized();
+        postcard::to_extend(&(initialized, &self.state, fmu_state), MAGIC.to_vec())
             .map_err(|error| refused(SERIALIZE, format!("cannot store the state: {error}")))
     }
 
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
-        let read = read.filter(|(_, saved, clocks, _): &Saved<'_>| {
-            saved.held.len() == self.state.held.len() && self.state.clocks.fits(clocks)
+        let read = read.filter(|(_, saved, _): &Saved<'_>| {
+            saved.held.len() == self.state.held.len() && self.state.clocks.fits(&saved.clocks)
         });
-        let Some((initialized, saved, saved_clocks, fmu_state)) = read else {
+        let Some((initialized, saved, fmu_state)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
             return Err(refused(DESERIALIZE, what));
         };
         self.component.deserialize_state(fmu_state)?;
         let mode = if initialized { Mode::Step } else { Mode::Instantiated };
         let mut clocks = std::mem::take(&mut self.state.clocks);
-        clocks.restore(&saved_clocks);
+        clocks.restore(&saved.clocks);
         self.state = State { mode, clocks, ..saved };
         Ok(())
     }
