@@ -301,7 +301,7 @@ impl Instance {
 fn integer_for_fmu(value: i64, negated: bool) -> Result<c_int, CallError> {
     // The smallest i64 has no opposite and is beyond 32 bits in any case.
     let value = if negated { value.wrapping_neg() } else { value };
-    narrow("fmiSetInteger", "an Integer of 32 bits", value)
+    narrow("fmiSetInteger", value)
 }
 
 #[cfg(test)]

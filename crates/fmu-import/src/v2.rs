@@ -11,14 +11,11 @@ pub(crate) struct Instance {
     integers: Vec<i32>,
 }
 
-/// Converts an integer to the type of the FMU. The error of `function` describes this type by `expected`.
-pub(crate) fn narrow<T: TryFrom<i64>>(
-    function: &'static str,
-    expected: &str,
-    value: i64,
-) -> Result<T, CallError> {
-    T::try_from(value).map_err(|_| {
-        refused(function, format!("cannot take the value {value}, expected {expected}"))
+/// Converts an integer to the type of the FMU; an error of `function` beyond 32 bits.
+pub(crate) fn narrow(function: &'static str, value: i64) -> Result<i32, CallError> {
+    i32::try_from(value).map_err(|_| {
+        let what = format!("cannot take the value {value}, expected an Integer of 32 bits");
+        refused(function, what)
     })
 }
 
@@ -48,7 +45,7 @@ impl Instance {
     ) -> Result<(), CallError> {
         self.integers.clear();
         for value in values {
-            self.integers.push(narrow("fmi2SetInteger", "an Integer of 32 bits", *value)?);
+            self.integers.push(narrow("fmi2SetInteger", *value)?);
         }
         self.component.set_integer(references, &self.integers)
     }
