@@ -7,6 +7,7 @@ from ._slave import Slave
 __all__ = [
     "Cancel",
     "Designed",
+    "FileLock",
     "LiveView",
     "Numbers",
     "Stepper",
@@ -19,6 +20,7 @@ __all__ = [
     "design_file",
     "design_plant",
     "identify",
+    "lock_file",
     "open_fmus",
     "parse_toml",
     "read_configuration",
@@ -38,6 +40,7 @@ def design_plant(plant: str | Mapping[str, Any], path: str) -> Designed: ...
 def identify(
     paths: list[str], inputs: list[str], outputs: list[str], order: int | None
 ) -> tuple[str, str | None, list[str]]: ...
+def lock_file(path: str) -> FileLock | None: ...
 def open_fmus() -> int: ...
 def parse_toml(text: str) -> dict[str, Any]: ...
 def read_configuration(path: str) -> dict[str, Any]: ...
@@ -67,6 +70,10 @@ class Designed:
     def fmu(self, base: str, path: str) -> None: ...
     def kalman_fmu(self, base: str, path: str) -> None: ...
     def feedback_fmu(self, base: str, path: str) -> None: ...
+
+@final
+class FileLock:
+    def release(self) -> None: ...
 
 @final
 class LiveView:

@@ -9,6 +9,7 @@ mod designed;
 mod error;
 mod guard;
 mod live;
+mod lock;
 mod logging;
 mod node;
 mod python_slave;
@@ -33,6 +34,8 @@ mod _core {
     use super::designed::{Designed, design_file, design_plant, identify};
     #[pymodule_export]
     use super::live::LiveView;
+    #[pymodule_export]
+    use super::lock::{FileLock, lock_file};
     #[pymodule_export]
     use super::run::{Study, clear, open_fmus, set_worker};
     #[pymodule_export]

@@ -291,6 +291,53 @@ def test_a_campaign_that_was_killed_while_its_folder_was_made_goes_on(campaign, 
     assert parquet.read_table(folder / "plan.parquet").num_rows == 4
 
 
+WAITING = """
+import pathlib, time
+
+def measure(results, values):
+    while not pathlib.Path({path!r}).exists():
+        time.sleep(0.01)
+    return 2.0 * values["plant.F_c"]
+"""
+
+
+def test_of_two_commands_on_one_folder_the_second_is_refused_until_the_first_one_ends(campaign, tmp_path):
+    (tmp_path / "waiting.py").write_text(WAITING.format(path=str(tmp_path / "go")), encoding="utf-8")
+    text = (
+        'system = "paper"\nruns-per-task = 2\n[experiment]\nstop-time = 0.01\n[parameters]\n'
+        '"plant.F_c" = [20.0, 21.0, 22.0, 23.0]\n[measures]\ntwice = {{ python = "waiting.py:measure" }}\n'
+    )
+    file, folder = campaign(text=text), tmp_path / "out"
+    words = (file, "--out", folder, "--workers", 1)
+
+    def state():
+        return {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+
+    first = command(*words, start_new_session=True)
+    try:
+        wait_for(lambda: (folder / "manifest.json").exists() or first.poll() is not None)
+        before = state()
+        status, out, messages = done(*words)
+        assert (status, out, messages.count("\n")) == (2, "", 1)
+        assert f"another process does a campaign in the folder {folder} now: wait for its end" in messages
+        with pytest.raises(af.ConfigurationError, match="another process does a campaign"):
+            af.campaign.Campaign.from_toml(file).run(folder, workers=1, progress=False)
+        assert first.poll() is None and state() == before
+        # Its workers remain; a lock that they had inherited would, too.
+        first.kill()
+        first.wait()
+        (tmp_path / "go").touch()
+        status, out, messages = done(*words)
+        assert (status, messages) == (0, "")
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(first.pid, signal.SIGKILL)
+        first.communicate()
+    table = rows(folder)
+    assert table["run"] == list(range(4))
+    assert table["twice"] == np.array([40.0, 42.0, 44.0, 46.0]).tobytes()
+
+
 def test_a_campaign_that_is_done_is_not_done_again(campaign, tmp_path):
     file, folder = campaign(runs=8), tmp_path / "out"
     assert done(file, "--out", folder, "--workers", 1)[0] == 0

@@ -2,6 +2,8 @@
 
 import logging
 import math
+import subprocess
+import sys
 
 import aso_ftc as af
 import numpy as np
@@ -42,6 +44,23 @@ def test_the_worst_case_is_the_largest_value_of_the_function(tmp_path):
     # All runs are in the folder: the same call does none of them again, also without workers.
     again = study.worst_case(tmp_path / "search", "y", scheduler="tcp://127.0.0.1:9")
     assert again == worst_case
+
+
+def test_a_folder_in_which_another_process_searches_is_refused(tmp_path):
+    parameters = {"a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]}}
+    study = campaign({"method": "random", "runs": 40}, 'parameter("a")', parameters=parameters)
+    text = (
+        "import sys, aso_ftc.campaign._folder as f, pathlib\n"
+        "with f.locked(pathlib.Path(sys.argv[1])):\n    print(flush=True)\n    input()\n"
+    )
+    words = [sys.executable, "-I", "-c", text, str(tmp_path / "search")]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        other.stdout.readline()
+        with pytest.raises(af.ConfigurationError, match="another process does a campaign in the folder"):
+            study.worst_case(tmp_path / "search", "y", workers=1)
+        other.communicate("\n")
+    assert not list((tmp_path / "search").glob("batch-*"))
+    assert study.worst_case(tmp_path / "search", "y", workers=1).runs <= 40
 
 
 def test_a_search_leaves_no_job_on_the_workers_of_a_cluster(tmp_path):

@@ -445,8 +445,8 @@ class Campaign:
             live: serve a page on this machine that shows the runs while they are done; gets its address.
 
         Raises:
-            ConfigurationError: something is wrong that is known before the first run, or the folder has
-                another campaign.
+            ConfigurationError: something is wrong that is known before the first run, the folder has
+                another campaign, or another process does a campaign in it.
             Error: the scheduler was lost, or the disk is full. The same call goes on.
         """
         from ._engine import execute

@@ -70,12 +70,13 @@ def execute(
 def _outcome(campaign: Campaign, path: Path, progress: bool, perform: Callable[[_Work], None]) -> Outcome:
     """Let ``perform`` do the runs of a campaign that its folder lacks."""
     folder = Folder(path, campaign)
-    folder.begin(campaign)
-    if not folder.manifest["complete"]:
-        work = _Work(campaign, folder, progress)
-        if work.open_parts:
-            perform(work)
-        work.close()
+    with folder.locked():
+        folder.begin(campaign)
+        if not folder.manifest["complete"]:
+            work = _Work(campaign, folder, progress)
+            if work.open_parts:
+                perform(work)
+            work.close()
     return load(folder.path)
 
 

@@ -1,7 +1,7 @@
 """The folder of a campaign: manifest, plan, parts of the results, kept signals.
 
 Every file is written under a temporary name and renamed, so that an interrupted campaign leaves whole
-files only.
+files only. One process at a time writes a folder.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +26,11 @@ from ._parameters import Place, text
 if TYPE_CHECKING:
     from ._campaign import Campaign
 
-__all__ = ["Folder", "column", "parquet_bytes", "read_manifest", "system_of"]
+__all__ = ["Folder", "column", "locked", "parquet_bytes", "read_manifest", "system_of"]
 
 MANIFEST = "manifest.json"
+# An empty file, which the process that writes the folder has locked.
+_LOCK = "campaign.lock"
 _FORMAT = 1
 # The temporary name of a file; see `write`.
 _TEMPORARY = re.compile(r"\.(.+)\.\d+\.tmp")
@@ -54,6 +57,30 @@ def write(path: Path, content: bytes) -> None:
         raise ResultsError(f"cannot write {path}: {reason}", "Results", {"path": str(path)}) from None
 
 
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other processes from a campaign in this folder, which is created if it is missing.
+
+    Raises:
+        ConfigurationError: another process does a campaign in the folder.
+        ResultsError: the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = _core.lock_file(str(folder / _LOCK))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ResultsError(f"cannot write {folder}: {reason}", "Results", {"path": str(folder)}) from None
+    if lock is None:
+        raise ConfigurationError(
+            f"another process does a campaign in the folder {folder} now: wait for its end, or choose another folder"
+        )
+    try:
+        yield
+    finally:
+        lock.release()
+
+
 class Folder:
     """The files of one campaign.
 
@@ -75,10 +102,18 @@ class Folder:
         }
         self._adopt()
 
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes from the folder; see :func:`locked`."""
+        with locked(self.path):
+            # Another process may have had the folder until now.
+            self._adopt()
+            yield
+
     def _adopt(self) -> None:
         known = read_manifest(self.path)
         if known is None:
-            names = {_TEMPORARY.sub(r"\1", path.name) for path in self.path.glob("*")}
+            names = {_TEMPORARY.sub(r"\1", path.name) for path in self.path.glob("*")} - {_LOCK}
             # A start that was killed before it had written the manifest goes on.
             if names and not {"plan.parquet"} <= names <= {"plan.parquet", "system.toml", MANIFEST}:
                 raise ConfigurationError(

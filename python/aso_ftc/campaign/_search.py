@@ -17,6 +17,7 @@ from .._arrays import plain
 from ._changes import arguments
 from ._engine import Session
 from ._entries import fail, whole
+from ._folder import locked
 from ._packages import package
 from ._parameters import Sampled
 
@@ -130,7 +131,8 @@ def _batches(
     variant = copy.copy(campaign)
     variant.stop, variant.keep = {}, {}
     count = None if workers is None else whole("workers", plain(workers), 1)
-    with Session(count, scheduler) as session:
+    # Between two batches the search has none of their folders locked.
+    with locked(path.absolute()), Session(count, scheduler) as session:
         yield _Batches(variant, path, session, measure)
 
 
