@@ -2,6 +2,7 @@
 
 mod description;
 
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::io;
@@ -135,9 +136,11 @@ fn identifiers(description: &ModelDescription) -> Vec<String> {
 }
 
 /// Returns the name of the built FMU.
-fn file_name(path: &Path) -> String {
+fn file_name(path: &Path) -> OsString {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    format!("{}.fmu", path.file_stem().unwrap_or_default().to_string_lossy())
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(".fmu");
+    name
 }
 
 /// Returns the folder for built FMUs: in the user's cache folder, or without one in the temporary folder.
@@ -157,7 +160,7 @@ fn cache() -> PathBuf {
 /// Returns the content of the built FMU: the model description and [`PARTS`].
 fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
     let file = unpacked.folder().join(package::DESCRIPTION);
-    let xml = fs::read_to_string(&file).map_err(file_error("read", &file))?;
+    let xml = fs::read(&file).map_err(file_error("read", &file))?;
     let mut content = Package::new(xml).for_version(unpacked.description.version());
     for part in PARTS {
         let folder = unpacked.folder().join(part);
@@ -171,7 +174,7 @@ fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
 /// A compiler.
 struct Compiler {
     /// The program and its arguments.
-    words: Vec<String>,
+    words: Vec<OsString>,
     /// The output of `--version`.
     version: String,
 }
@@ -184,21 +187,28 @@ impl Compiler {
         } else {
             ("CC", ["cc", "gcc", "clang"], "C")
         };
-        let stated = std::env::var(variable).ok().filter(|command| !command.trim().is_empty());
-        let tried =
-            stated.map_or_else(|| known.map(str::to_owned).to_vec(), |command| vec![command]);
-        let mut compilers = tried.iter().filter_map(|command| {
-            let words: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
+        let stated = std::env::var_os(variable).map(|command| words(&command));
+        let commands = stated.filter(|words| !words.is_empty()).map_or_else(
+            || known.map(|program| vec![OsString::from(program)]).to_vec(),
+            |words| vec![words],
+        );
+        let mut compilers = commands.iter().filter_map(|words| {
             let output =
                 Command::new(&words[0]).args(&words[1..]).arg("--version").output().ok()?;
             let version = String::from_utf8_lossy(&output.stdout).into_owned();
-            output.status.success().then_some(Self { words, version })
+            output.status.success().then(|| Self { words: words.clone(), version })
         });
-        compilers.next().ok_or_else(|| CompileError::NoCompiler {
-            path: path.to_owned(),
-            language,
-            tried: tried.join(", "),
-            variable,
+        compilers.next().ok_or_else(|| {
+            let tried: Vec<String> = commands
+                .iter()
+                .map(|words| words.join(OsStr::new(" ")).to_string_lossy().into_owned())
+                .collect();
+            CompileError::NoCompiler {
+                path: path.to_owned(),
+                language,
+                tried: tried.join(", "),
+                variable,
+            }
         })
     }
 
@@ -207,6 +217,20 @@ impl Compiler {
         command.args(&self.words[1..]);
         command
     }
+}
+
+/// Splits a command at its white space. Its words may be any bytes.
+#[cfg(unix)]
+fn words(command: &OsStr) -> Vec<OsString> {
+    use std::os::unix::ffi::OsStrExt as _;
+    let words = command.as_bytes().split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    words.map(|word| OsStr::from_bytes(word).to_owned()).collect()
+}
+
+/// Splits a command at its white space.
+#[cfg(not(unix))]
+fn words(command: &OsStr) -> Vec<OsString> {
+    command.to_string_lossy().split_whitespace().map(OsString::from).collect()
 }
 
 /// What is needed to build the libraries of an FMU.

@@ -2,13 +2,16 @@
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use fmu_description::package::{Package, Unpacked};
 use tests::c_fmu::CFmu;
 
 /// Runs the command in `folder`, with a cache in it.
-fn run(folder: &Path, compiler: &str, arguments: &[&str]) -> Output {
+fn run(folder: &Path, compiler: impl AsRef<OsStr>, arguments: &[&str]) -> Output {
     let mut command = Command::new(tests::command());
     command.current_dir(folder).env("XDG_CACHE_HOME", folder.join("cache")).env("CC", compiler);
     command.args(arguments).output().unwrap()
@@ -47,6 +50,40 @@ fn a_built_fmu_gives_the_results_of_its_library_and_is_built_once() {
         built.push(kept.map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>());
     }
     assert!(built[0].len() == 1 && built[0] == built[1], "{built:?}");
+}
+
+/// The model description and a source file are in Latin-1, the name of the compiler is no text at all.
+#[test]
+fn a_built_fmu_gives_the_results_of_its_library_also_if_it_is_not_in_utf_8() {
+    let latin_1 = |text: &str| -> Vec<u8> {
+        text.chars().map(|character| u8::try_from(character).unwrap()).collect()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| std::fs::read(folder.path().join(name).join("results.csv")).unwrap();
+    let _ = CFmu::well_behaved().write(folder.path(), "slave");
+    assert!(run(folder.path(), "cc", &[&RUN[..], &["--out", "a"]].concat()).status.success());
+    let path = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let unpacked = Unpacked::open_whole(&path).unwrap();
+    let xml = std::fs::read_to_string(unpacked.folder().join("modelDescription.xml")).unwrap();
+    let xml = xml.replace("UTF-8", "ISO-8859-1");
+    let xml = xml.replace("modelName=", "description=\"Größe\" modelName=");
+    let source = unpacked.folder().join("sources/deeds.c");
+    let code = std::fs::read_to_string(&source).unwrap();
+    std::fs::write(&source, latin_1(&format!("/* Größe */\n{code}"))).unwrap();
+    let mut package = Package::new(latin_1(&xml));
+    package.add_folder("sources", &unpacked.folder().join("sources")).unwrap();
+    package.write(&path).unwrap();
+    let known = Command::new("sh").args(["-c", "command -v cc"]).output().unwrap().stdout;
+    let compiler = folder.path().join(OsStr::from_bytes(b"c\xe9"));
+    std::os::unix::fs::symlink(OsStr::from_bytes(known.trim_ascii()), &compiler).unwrap();
+    let output = run(folder.path(), &compiler, &[&RUN[..], &["--compile", "--out", "b"]].concat());
+    assert!(output.status.success(), "{}", said(&output));
+    assert_eq!(read("a"), read("b"));
+    // The error of a compiler that is named by such bytes shows them as far as they are text.
+    std::fs::remove_file(&compiler).unwrap();
+    let output = run(folder.path(), &compiler, &[&RUN[..], &["--compile"]].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("c\u{fffd}; the variable CC names one"), "{}", said(&output));
 }
 
 #[test]

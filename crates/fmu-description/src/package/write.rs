@@ -33,15 +33,16 @@ const ENTRIES: u64 = 65_000;
 #[derive(Clone, Debug)]
 pub struct Package {
     version: Version,
-    description: String,
+    description: Vec<u8>,
     entries: Vec<(String, Vec<u8>)>,
 }
 
 impl Package {
-    /// Creates an FMU of FMI 2.0 that contains only `description_xml` as its `modelDescription.xml`.
+    /// Creates an FMU of FMI 2.0 that contains only `description_xml` as its `modelDescription.xml`: a text, or bytes
+    /// in the encoding that they declare.
     #[must_use]
-    pub fn new(description_xml: String) -> Self {
-        Package { version: Version::V2, description: description_xml, entries: Vec::new() }
+    pub fn new(description_xml: impl Into<Vec<u8>>) -> Self {
+        Package { version: Version::V2, description: description_xml.into(), entries: Vec::new() }
     }
 
     /// Sets the version of FMI whose rules on files [`Package::write`] checks.
@@ -94,7 +95,7 @@ impl Package {
         let mut entries: Vec<(&str, &[u8])> =
             self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
         entries.sort_unstable();
-        entries.insert(0, (DESCRIPTION, self.description.as_bytes()));
+        entries.insert(0, (DESCRIPTION, self.description.as_slice()));
         write_archive(target, &pack(target, entries, |_| false)?)
     }
 
@@ -121,7 +122,7 @@ impl Package {
         }
         let bytes = |text: &[u8]| u64::try_from(text.len()).unwrap_or(u64::MAX);
         let sizes = self.entries.iter().map(|(_, content)| bytes(content));
-        let total = sizes.fold(bytes(self.description.as_bytes()), u64::saturating_add);
+        let total = sizes.fold(bytes(&self.description), u64::saturating_add);
         let count = u64::try_from(self.entries.len()).unwrap_or(u64::MAX);
         for (number, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
             if number > limit {
