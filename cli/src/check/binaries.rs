@@ -177,18 +177,25 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     }
 }
 
-/// Returns the names of the libraries, each with the interface types that it serves.
+/// Returns the names of the libraries, each with the interface types that it serves. Scheduled execution is none of
+/// these types: a library of FMI 3.0 exports all functions.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
     let simulation = description.co_simulation.as_ref().map(|flags| flags.model_identifier.clone());
-    match (simulation, exchange) {
+    let mut libraries: Vec<_> = match (simulation, exchange) {
         (Some(one), Some(other)) if one == other => vec![(vec![CoSimulation, ModelExchange], one)],
         (one, other) => [(CoSimulation, one), (ModelExchange, other)]
             .into_iter()
             .filter_map(|(interface, name)| Some((vec![interface], name?)))
             .collect(),
+    };
+    if let Some(flags) = &description.scheduled_execution
+        && libraries.iter().all(|(_, name)| *name != flags.model_identifier)
+    {
+        libraries.push((Vec::new(), flags.model_identifier.clone()));
     }
+    libraries
 }
 
 fn library(
@@ -350,20 +357,27 @@ mod tests {
     /// FMI 3.0.2, section 2.5.1.4.1: four architectures and three systems.
     #[test]
     fn libraries_of_each_platform_tuple_are_checked() {
-        let description = ModelDescription::parse(
-            r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
-<CoSimulation modelIdentifier="M"/><ModelVariables>
+        let of_interface = |interface: &str| {
+            let text = format!(
+                r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+<{interface} modelIdentifier="M"/><ModelVariables>
 <Float64 name="time" valueReference="0" causality="independent"/>
-</ModelVariables><ModelStructure/></fmiModelDescription>"#,
-        );
-        let description = description.unwrap();
+</ModelVariables><ModelStructure/></fmiModelDescription>"#
+            );
+            ModelDescription::parse(text).unwrap()
+        };
+        let descriptions =
+            ["CoSimulation", "ModelExchange", "ScheduledExecution"].map(of_interface);
         for architecture in ["aarch32", "aarch64", "x86", "x86_64"] {
             for (system, suffix) in [("darwin", ".dylib"), ("linux", ".so"), ("windows", ".dll")] {
                 let name = format!("binaries/{architecture}-{system}/M{suffix}");
-                let findings = check(&|_: &str| Ok(b"no library".to_vec()), &[name], &description);
-                let what = findings.iter().map(|finding| finding.what.as_str());
-                let what = what.collect::<Vec<_>>().join("; ");
-                assert!(what.starts_with("expected a shared library, found"), "{what}");
+                for description in &descriptions {
+                    let names = std::slice::from_ref(&name);
+                    let findings = check(&|_: &str| Ok(b"no library".to_vec()), names, description);
+                    let what = findings.iter().map(|finding| finding.what.as_str());
+                    let what = what.collect::<Vec<_>>().join("; ");
+                    assert!(what.starts_with("expected a shared library, found"), "{what}");
+                }
             }
         }
     }

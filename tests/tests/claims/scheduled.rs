@@ -1,6 +1,11 @@
 //! Scheduled execution of FMI 3.0 (section 5). The FMU is `tests/c/scheduled3.c`, which is strict about its calls.
 
-use tests::{Table, scheduled};
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use fmu_description::package::Unpacked;
+use serde_json::Value;
+use tests::{Table, root, scheduled};
 
 /// The digits of the partitions, by hand. At 0.5 s the scenario asks a for partition 2, which comes before 1 because
 /// its priority is higher. At 1.2 s the countdowns of both end; that of a makes b's partition 2 run at the same instant.
@@ -42,6 +47,33 @@ fn model_partitions_run_at_the_ticks_of_their_clocks_by_priority() {
         assert_eq!(changes("a.sum"), [(0.0, 0.0), (0.5, 7.0)]);
         assert_eq!(changes("b.sum"), [(0.0, 0.0), (1.2, 7.0)]);
     }
+}
+
+/// The functions are those of the header of the standard, without what nm lists.
+#[test]
+fn check_names_the_functions_that_the_library_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = scheduled::write(folder.path());
+    let output = tests::run(&["check", "--json", "--no-run", fmu.to_str().unwrap()]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let findings = report["findings"].as_array().unwrap().iter();
+    let mut findings = findings.filter(|finding| finding["part"] == "binaries");
+    let lacking = findings.find_map(|finding| finding["what"].as_str()?.strip_prefix("lacks "));
+    let lacking: BTreeSet<&str> = lacking.unwrap().split(", ").collect();
+    let header = root().join("crates/fmu-import/headers/fmi3Functions.h");
+    let header = std::fs::read_to_string(header).unwrap();
+    let declared = header.lines().filter_map(|line| {
+        line.strip_prefix("FMI3_Export ")?.split_whitespace().nth(1)?.strip_suffix(';')
+    });
+    let unpacked = Unpacked::open(&fmu).unwrap();
+    let library = unpacked.library("scheduled3").unwrap();
+    let listed = Command::new("nm").args(["-D", "--defined-only"]).arg(library).output().unwrap();
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let exported: BTreeSet<&str> = listed.split_whitespace().collect();
+    assert!(exported.contains("fmi3ActivateModelPartition"), "{listed}");
+    let expected: BTreeSet<&str> = declared.filter(|name| !exported.contains(name)).collect();
+    assert!(expected.contains("fmi3DoStep") && lacking == expected, "{lacking:?}");
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]
