@@ -10,7 +10,8 @@
  * The instantiation token selects a misbehaviour: "lie" returns early with a time before the step,
  * "stay" returns early for ever, "late" returns early from each step, a unit in the last place after its
  * end, "discard" discards steps above 0.03 s, "huge" gives `big` a value
- * beyond 63 bits, "no event mode" does not instantiate with eventModeUsed, "terminate" ends at 0.5 s. With
+ * beyond 63 bits, "null" gives binaries a null pointer with their size, "no event mode" does not
+ * instantiate with eventModeUsed, "terminate" ends at 0.5 s. With
  * "intermediate" it asks for u in the middle and at the end of a step, and y follows by Simpson's rule.
  *
  * It is strict: a call that section 4.2 forbids in its mode ends the process by SIGABRT. */
@@ -537,6 +538,9 @@ EXPORT fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference *vr, si
         bool in = vr[k] == BYTES_IN;
         sizes[k] = in ? slave->now.size_in : slave->now.size_out;
         values[k] = in ? slave->now.bytes_in : slave->now.bytes_out;
+        if (strcmp(slave->token, "null") == 0) {
+            values[k] = NULL;
+        }
     }
     return fmi3OK;
 }

@@ -142,6 +142,23 @@ fn binaries_and_arrays_of_strings_pass_unchanged() {
     assert_eq!(texts[0], "Grüße");
 }
 
+/// A binary without bytes needs no pointer.
+#[test]
+fn a_null_pointer_to_bytes_is_an_error() {
+    let mut loaded = ready("null");
+    let (from, to) = (loaded.reference("bytes_in"), loaded.reference("bytes_out"));
+    let mut bytes = [Vec::new()];
+    let error = loaded.slave.get_binary(&[to], &mut bytes).unwrap_err();
+    assert!(matches!(error.failure, Failure::InvalidAnswer(_)), "{error}");
+    let what =
+        format!("fmi3GetBinary returned a null pointer for 3 bytes of the value references [{to}]");
+    assert!(error.to_string().contains(&what), "{error}");
+    loaded.slave.set_binary(&[from], &[Vec::new()]).unwrap();
+    assert_eq!(loaded.step(0.0, 0.01), Ok(StepResult::Whole));
+    loaded.slave.get_binary(&[to], &mut bytes).unwrap();
+    assert!(bytes[0].is_empty(), "{bytes:?}");
+}
+
 #[test]
 fn a_float32_has_its_own_precision() {
     let mut loaded = ready("plain");

@@ -288,11 +288,18 @@ impl Component {
         self.base.place.enter(&NAME);
         for (value, (pointer, size)) in values.iter_mut().zip(pointers.into_iter().zip(sizes)) {
             value.clear();
-            if let Err(failure) = canary::check_size(size, "binary value") {
+            let mut checked = canary::check_size(size, "binary value");
+            if size > 0 && pointer.is_null() {
+                checked = Err(Failure::InvalidAnswer(format!(
+                    "returned a null pointer for {size} bytes of the value references {references:?}, expected \
+                     their address"
+                )));
+            }
+            if let Err(failure) = checked {
                 self.base.place.leave();
                 return Err(self.base.failed(NAME, failure));
             }
-            if size > 0 && !pointer.is_null() {
+            if size > 0 {
                 // SAFETY: the FMU returns `size` bytes at `pointer`, which live until the next call.
                 value.extend_from_slice(unsafe { std::slice::from_raw_parts(pointer, size) });
             }
