@@ -27,7 +27,8 @@ const FLOOR: f64 = 1e-12;
 /// A bandwidth without a response, at the frequency of an undamped mode, is raised by this factor.
 const DETUNING: f64 = 1.01;
 
-/// Units: each output is measured by the strongest effect of an input on it, then each input by that on an output.
+/// Units of inputs and outputs: each output is measured by the strongest effect of an input on it, then each input by
+/// its strongest effect on an output.
 ///
 /// ```text
 /// h[j, i] = integral of e^(-2 s t) g[j, i](t)^2 over t,    s = rate + max(0, largest real part)       continuous

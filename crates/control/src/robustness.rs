@@ -174,7 +174,8 @@ impl Loop {
         ]
     }
 
-    /// The loop as a system: from signals added to commands and measurements to both before the addition.
+    /// The loop as a system: from signals that are added to commands and measurements to the commands and
+    /// measurements before the addition.
     #[must_use]
     pub fn system(&self) -> StateSpace {
         let (plant, controller) = (&self.plant, &self.controller);

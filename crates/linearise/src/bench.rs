@@ -244,8 +244,8 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Returns the regressors [X, t X, ..., t^degree X]: the fitted coefficients are polynomials of time. t is the elapsed fraction of
-    /// the record; the rows of each pulse begin `first` steps after its start.
+    /// Returns the regressors [X, t X, ..., t^degree X]: the fitted coefficients are polynomials of time. t is the
+    /// elapsed fraction of the record; the rows of each pulse begin `first` steps after its start.
     pub(super) fn regressors(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
         let columns = x.ncols();
         DMatrix::from_fn(x.nrows(), (degree + 1) * columns, |i, j| {

@@ -246,7 +246,8 @@ impl EnergyControl {
         }
     }
 
-    /// Returns the measure e of a step with these bonds at its end, 0 without any; updates the largest powers.
+    /// Returns the measure e of a step from the bonds at its end, as many as nominals; 0 without bonds. Updates the
+    /// largest powers.
     pub fn measure(&mut self, bonds: &[Bond]) -> f64 {
         if bonds.is_empty() {
             return 0.0;

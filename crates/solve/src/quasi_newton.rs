@@ -33,7 +33,8 @@ pub struct QuasiNewton {
 }
 
 impl QuasiNewton {
-    /// Creates a solver with at most `limit` evaluations of G that reuses differences of `reuse` solutions.
+    /// Creates a solver with at most `limit` evaluations of G that reuses the differences of the last
+    /// `reuse` solutions.
     #[must_use]
     pub fn new(scale: Scale, limit: u32, reuse: u32) -> Self {
         let n = scale.len();

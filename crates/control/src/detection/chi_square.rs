@@ -15,7 +15,8 @@ const FAR: f64 = 40.0;
 /// Q(x) = erfc((x/2)^(1/2)) + e^(-x/2) sum (x/2)^(j-1/2) / Gamma(j+1/2), 1 <= j <= (k-1)/2     k odd
 /// ```
 ///
-/// All terms are positive: full relative precision, also for large x. 1 for x <= 0; 0 for x > 0 without degrees.
+/// All terms are positive: full relative precision, also for large x. 1 for x <= 0;
+/// 0 for x > 0 without degrees of freedom.
 ///
 /// Source: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions (1964), 26.4.4, 26.4.5.
 ///
@@ -71,7 +72,8 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// The x that a chi-square variable exceeds with the probability `probability`.
+/// The x that a chi-square variable with `degrees` degrees of freedom exceeds with the probability
+/// `probability`.
 ///
 /// `probability`: in 0 to 1, both excluded. Method: bisection of [`survival`] to the resolution of double
 /// precision. NaN for a probability outside of its range, and for no degrees of freedom.

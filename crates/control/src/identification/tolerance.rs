@@ -21,7 +21,8 @@ pub struct ResponseUnits {
     pub outputs: Vec<f64>,
 }
 
-/// The relative tolerance of `plant` that moves its frequency response as two standard deviations of its estimate do.
+/// The relative tolerance of the entries of `plant` that moves its frequency response as far as two standard deviations
+/// of its estimate do.
 ///
 /// `estimate`: the same plant, or the sampled one of which `plant` is the continuous one; `parts`: the estimates from the same
 /// samples without one of g blocks each, the jackknife. With the distance

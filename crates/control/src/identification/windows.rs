@@ -170,7 +170,8 @@ impl Windows {
         1..1 + self.past * self.signals()
     }
 
-    /// The factor in units of the deviations of the signals, 1 for a constant one and without windows; these units.
+    /// The factor of signals divided by their units, and these units: their deviations; 1 for a constant signal, and
+    /// without windows.
     ///
     /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean
     /// for each row; deviations of a column that are smaller are zero in the factor.

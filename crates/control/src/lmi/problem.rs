@@ -132,6 +132,10 @@ impl Problem {
 
     /// Like [`Problem::require`], for a constraint that is part of the formulation, such as P > 0,
     /// and never reported in a conflict.
+    ///
+    /// # Panics
+    ///
+    /// When the matrix is not square.
     pub fn constrain(&mut self, matrix: &Affine, margin: f64) {
         self.push(None, matrix, margin);
     }

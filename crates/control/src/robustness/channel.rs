@@ -10,7 +10,8 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
 
-/// Gains are searched up to this one and down to its reciprocal; stability is tested at so many on each side.
+/// The largest gain up to which a limit is searched, as down to its reciprocal, and the number of gains at which
+/// stability is tested on each side.
 const LARGEST_GAIN: f64 = 1e6;
 const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.

@@ -33,7 +33,8 @@ const CLEAR: f64 = 1e-6;
 /// In sampled time the loop bears every delay of whole samples up to the result, and may bear longer ones, since a
 /// modulus of 1 may ask for a part of a sample: [`sampled_delay_margin`] decides by eigenvalues. If an eigenvalue of L
 /// at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each sample of delay turns L by half
-/// a turn around -1: one more unstable eigenvalue. The result is then zero, unless the moduli give one below a sample.
+/// a turn around -1, which adds an unstable eigenvalue of the loop. The result is then zero, unless the moduli give a
+/// limit below one sample.
 ///
 /// # Errors
 ///

@@ -79,7 +79,8 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         }
     }
 
-    /// The multiple of the deviations below which the loop is stable, None if at all [`PlantFamily::multiples`].
+    /// The multiple of the deviations below which the loop is stable; None if it is stable at all
+    /// [`PlantFamily::multiples`].
     pub(super) fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
         stability_limit(0.0, self.family.multiples(), |multiple| {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
