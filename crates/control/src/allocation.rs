@@ -37,7 +37,8 @@ impl Actuators<'_> {
 pub struct Allocation {
     /// M of u = M `u_d`, m x m; the rows of inputs that are gone are zero.
     pub matrix: DMatrix<f64>,
-    /// Norm of B M - B relative to that of B: the part of the effect that the remaining inputs cannot produce.
+    /// Norm of B M - B relative to the norm of B: the part of the effect that the remaining inputs cannot
+    /// produce.
     pub residual: f64,
 }
 

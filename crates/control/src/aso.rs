@@ -225,7 +225,8 @@ impl ExtendedPlant {
     }
 }
 
-/// Norm of B `K_f` + `F_a` in the rows of the plant, relative to that of `F_a` unless no fault acts there.
+/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; the norm itself if no fault acts
+/// there.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
     let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();

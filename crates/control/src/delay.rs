@@ -104,7 +104,8 @@ impl Delays {
         order * delayed.count()
     }
 
-    /// The first state of the delay of each command and measurement, from that of all delays; None without a delay.
+    /// For each command, and for each measurement, the first state of its delay, counted from the first state of all
+    /// delays; None without a delay.
     fn first_states(&self, order: usize) -> [Vec<Option<usize>>; 2] {
         let mut next = 0;
         let mut first = |delay: &f64| {

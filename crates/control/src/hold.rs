@@ -31,7 +31,7 @@ impl FirstOrderHold {
     /// balanced, inputs scaled, then one exponential of the block matrix [A h, B h, 0; 0, 0, I; 0,
     /// 0, 0] of order n + 2 m, whose first row of blocks is [Phi, `Gamma_0`, `Gamma_1` / h]; about
     /// (7 + s) (n + 2 m)^3 multiplications, s = log2(norm of the block matrix / 5.4), at least 0. The
-    /// error is that of the exponential, relative to the norm of each column in balanced coordinates.
+    /// error is the error of the exponential, relative to the norm of each column in balanced coordinates.
     ///
     /// Source: C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
     /// Autom. Control 23 (1978), theorem 1.

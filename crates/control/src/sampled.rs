@@ -53,7 +53,7 @@ pub struct SampledDesign {
 /// reduces an error to 1.8 % in one sample; faster poles crowd at zero, where the eigenvectors of
 /// an observer with fewer measurements than states become parallel: for the pendulum of the paper
 /// at 10 ms the condition number would be 1e14, and the residual motion only 8 % smaller. The rule
-/// preserves the order of the poles, and those with q <= 1; it maps the fastest to q = 4.
+/// preserves the order of the poles, does not change poles with q <= 1, and maps the fastest to q = 4.
 ///
 /// # Example
 ///

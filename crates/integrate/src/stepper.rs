@@ -322,7 +322,8 @@ impl Stepper {
         Ok(size.min(100.0 * guess))
     }
 
-    /// The first state of the last step without a finite error, else that of the largest; whether it is finite.
+    /// The first state of the last step without a finite error, otherwise the one with the largest error;
+    /// and whether its error is finite.
     fn worst(&self) -> (usize, bool) {
         let error = self.last_stiff().map_or(self.explicit.error.as_slice(), Rosenbrock::error);
         let end = self.end();

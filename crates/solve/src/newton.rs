@@ -9,7 +9,8 @@ use super::{Convergence, Progress, Scale, Solver};
 const SLOW_DECREASE: f64 = 0.3;
 /// The smallest damping factor, after which the solver requests a new matrix.
 const SHORTEST: f64 = 1.0 / 64.0;
-/// Required decrease of the residual relative to that of a linear model (Armijo condition).
+/// Required decrease of the residual relative to the decrease that a linear model predicts (Armijo
+/// condition).
 const DESCENT: f64 = 1e-4;
 /// Condition number above which a difference quotient has no significant digits left.
 const SINGULAR: f64 = 1e10;

@@ -139,7 +139,8 @@ fn rosenbrock_matrix(
 /// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to
 /// length one, so that units do not decide the rank.
 ///
-/// For z in the null space of the scaled matrix, D^-1 z, D the lengths of the columns, is in that of M.
+/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in the null
+/// space of M.
 fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();

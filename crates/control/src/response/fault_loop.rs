@@ -150,7 +150,8 @@ pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
 }
 
 /// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`]; with a direct
-/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action, then those of `x_i`.
+/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action the rows and columns of `x_i`
+/// follow.
 pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let (first, t) = (2 * n + q, gains.integrals());

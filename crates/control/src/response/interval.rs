@@ -85,7 +85,8 @@ impl Length {
     }
 }
 
-/// A system in balanced coordinates, its shortest interval and those of twice, four times, ... its length.
+/// A system in balanced coordinates, with its shortest interval and the intervals of twice, four times, ... its
+/// length.
 pub(super) struct Intervals {
     /// Columns of B in balanced coordinates: the states after an impulse.
     pub(super) starts: DMatrix<f64>,

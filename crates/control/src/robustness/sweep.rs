@@ -27,7 +27,8 @@ impl<'a> Sweep<'a> {
     }
 
     /// The sweep of T = `complementary` for L = T (I - T)^-1: also at the frequencies of the poles of L, the
-    /// eigenvalues of A + B C, where L may have narrow peaks, and in continuous time until those of L are below 1.
+    /// eigenvalues of A + B C, where L may have narrow peaks, and in continuous time up to a T for which the
+    /// eigenvalues of L are below 1.
     pub(super) fn of_loop(complementary: &'a KnownResponse) -> Result<Self, Error> {
         let StateSpace { a, b, c, domain, .. } = &complementary.system;
         let mut frequencies = complementary.frequencies();

@@ -180,7 +180,8 @@ impl<'a> HeldFamily<'a> {
         ])
     }
 
-    /// The blocks, and the channels in their order: those of each deviation together, then those of the error.
+    /// The channels in the order of the blocks, and the blocks: all channels of a deviation together, then the channels
+    /// of the error.
     fn places(&self, stages: usize) -> (Vec<usize>, Vec<Block>) {
         let (of_states, of_outputs) = (&self.on_states.ranks, &self.on_outputs.ranks);
         let (all, outputs) = (self.on_states.left.ncols(), self.on_outputs.left.ncols());
