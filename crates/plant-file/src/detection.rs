@@ -199,8 +199,8 @@ fn process_noise(entry: &Entry<'_>) -> Result<ProcessNoise> {
 fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>> {
     let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
     let stated = positives(&entry.table()?, "sizes", &names)?;
-    let size = |(fault, stated): (&Fault, Option<f64>)| {
-        stated.or(fault.step).or(fault.bound).ok_or_else(|| {
+    let size = |(fault, stated): (&Fault, Result<Option<f64>>)| {
+        stated?.or(fault.step).or(fault.bound).ok_or_else(|| {
             entry.error(format!(
                 "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
                  `step` or `bound` of the fault",
@@ -218,7 +218,7 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
     };
     let margin = within(&entry, 1.0.., "expected a factor from 1")?;
     let names: Vec<_> = actuators.iter().map(|actuator| actuator.name.as_str()).collect();
-    let commands = positives(table, "commands", &names)?;
+    let commands = positives(table, "commands", &names)?.into_iter().collect::<Result<_>>()?;
     Ok(Some(ModelError { margin, commands, place: entry.place }))
 }
 

@@ -21,12 +21,17 @@ pub(crate) fn optional<'a, T>(
     table.get(key).as_ref().map(read).transpose()
 }
 
-/// Reads a table with a number above 0 for some of `names`; returns that of each name, if it is stated.
-pub(crate) fn positives(table: &Table<'_>, key: &str, names: &[&str]) -> Result<Vec<Option<f64>>> {
-    let Some(entry) = table.get(key) else { return Ok(vec![None; names.len()]) };
+/// Reads a table with a number above 0 for some of `names`; returns that of each name, if it is stated, or its error,
+/// so that callers report mistakes in the order of the names.
+pub(crate) fn positives(
+    table: &Table<'_>,
+    key: &str,
+    names: &[&str],
+) -> Result<Vec<Result<Option<f64>>>> {
+    let Some(entry) = table.get(key) else { return Ok(names.iter().map(|_| Ok(None)).collect()) };
     let stated = entry.table()?;
     stated.allow(names)?;
-    names.iter().map(|name| positive(&stated, name)).collect()
+    Ok(names.iter().map(|name| positive(&stated, name)).collect())
 }
 
 /// Reads a number in `range`; `rule` is the text for other numbers, such as "expected at most 1".
