@@ -34,7 +34,7 @@ use crate::matrix::matrix;
 use crate::model::{read_fmu_plant, read_matrices};
 use crate::names::check_names;
 use crate::pid::Pid;
-use crate::read::{Result, each, is_first, positive, positives, refuse};
+use crate::read::{Result, each, is_first, optional, positive, refuse};
 use crate::reconfiguration::ReconfigurationRequest;
 use crate::references::References;
 use crate::requirements::{Request, request};
@@ -198,7 +198,11 @@ impl<'a> PlantFile<'a> {
             Some(shape) => shape.starts(domain)[0].clone(),
             None => [read("feedback", ["Q", "R"])?, read("observer", ["W", "V"])?],
         };
-        let times = positives(file, "experiment", &["stop_time", "step_size"])?;
+        let experiment = optional(file, "experiment", Entry::table)?;
+        if let Some(table) = &experiment {
+            table.allow(&["stop_time", "step_size"])?;
+        }
+        let time = |key| experiment.as_ref().map_or(Ok(None), |table| positive(table, key));
         let plant_file = Self {
             source,
             places: KEYS.iter().filter_map(place).collect(),
@@ -212,8 +216,8 @@ impl<'a> PlantFile<'a> {
             observer,
             loop_shape,
             estimation: EstimationRequest::read(file, faults.len())?,
-            stop_time: times[0],
-            step_size: times[1],
+            stop_time: time("stop_time")?,
+            step_size: time("step_size")?,
             robustness: RobustnessLimits::read(file, &model, measurements.len())?,
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
