@@ -74,7 +74,7 @@ impl Controller {
         };
         let losses = file.losses();
         let reconfiguration = Reconfiguration::of(&file, &losses, sample_time);
-        // Each entry of a design file has code, or the reason why it needs none.
+        // Each entry of a design file is read here or above, or has the reason why it needs no code.
         let Design {
             description,
             t_on,
