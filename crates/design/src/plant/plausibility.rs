@@ -45,7 +45,7 @@ pub(crate) fn check_limits(
         let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
         let point = format!("the operating point of the {what} `{}`, {value}{unit}", signal.name);
         let is_actuator = what == "actuator";
-        if value < low || value > high {
+        if !(low..=high).contains(&value) {
             let (limits, expected) = if is_actuator {
                 (format!("limits {low} and {high}"), "limits around it")
             } else {
