@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use fmu_description::package::Unpacked;
+
 use crate::function::Function;
 use crate::structure::Implementation;
 use slave::Transformation;
@@ -32,6 +34,8 @@ pub struct Element {
     pub fmu: PathBuf,
     /// Name of the FMU for messages if `fmu` is an unpacked copy: `system.ssp/resources/m.fmu`.
     pub shown: Option<PathBuf>,
+    /// The archive from which `fmu` was unpacked; ignored if `fmu` is another path than its folder.
+    pub origin: Option<Origin>,
     /// Values set before the initialization, in this order; later values override earlier ones.
     pub settings: Vec<Setting>,
     /// The interface of the FMU to use, as stated in a system structure.
@@ -43,6 +47,30 @@ impl Element {
     #[must_use]
     pub fn shown(&self) -> &Path {
         self.shown.as_deref().unwrap_or(&self.fmu)
+    }
+
+    /// Returns the path of the FMU with all its files: the archive from which `fmu` was unpacked, otherwise `fmu`.
+    #[must_use]
+    pub fn complete(&self) -> &Path {
+        let origin = self.origin.as_ref().filter(|origin| origin.folder == self.fmu);
+        origin.map_or(&self.fmu, |origin| &origin.archive)
+    }
+}
+
+/// An archive, and the folder into which those of its files were unpacked that a simulation on this platform needs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// Path of the archive.
+    pub archive: PathBuf,
+    /// Path of the folder.
+    pub folder: PathBuf,
+}
+
+impl Origin {
+    /// Returns archive and folder of an FMU; `None` for an FMU that was not unpacked.
+    pub(crate) fn of(fmu: &Unpacked) -> Option<Self> {
+        let folder = fmu.folder().to_owned();
+        fmu.archive().map(|archive| Origin { archive: archive.to_owned(), folder })
     }
 }
 

@@ -28,7 +28,7 @@ use std::path::Path;
 use fmu_description::Kind;
 use fmu_description::package::{TemporaryFolder, Unpacked};
 
-pub use assembly::{Assembly, Element, Link, Setting, Terminal};
+pub use assembly::{Assembly, Element, Link, Origin, Setting, Terminal};
 pub use error::SspError;
 pub use function::{Function, FunctionSlave};
 pub use read::{read_ssb, read_ssd, read_ssm, read_ssv};
@@ -44,7 +44,7 @@ use tree::{Content, Tree, Vertex};
 #[derive(Debug)]
 pub struct Opened {
     /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked
-    /// FMUs, which exist as long as [`Opened::folders`].
+    /// FMUs; they, and the archives in an SSP from which they were unpacked, exist as long as [`Opened::folders`].
     pub assembly: Assembly,
     /// Start time, stop time and base step that the file states. The base step of an OSP file without one is 0.1 s.
     pub experiment: DefaultExperiment,
@@ -119,6 +119,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
             name: node.path.clone(),
             fmu: tree.fmus[fmu].folder().to_owned(),
             shown: Some(tree.shown[fmu].clone()),
+            origin: Origin::of(&tree.fmus[fmu]),
             settings: settings.remove(&index).unwrap_or_default(),
             implementation: node.implementation,
         });

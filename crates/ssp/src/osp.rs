@@ -14,7 +14,7 @@ use super::load::files::Files;
 use super::source::{Base, Target};
 use super::structure::{DefaultExperiment, Implementation};
 use super::{Folders, Opened};
-use crate::assembly::{Assembly, Element, Link, Setting, Terminal};
+use crate::assembly::{Assembly, Element, Link, Origin, Setting, Terminal};
 use document::{Connection, Document, End, Kind, Simulator};
 use groups::Group;
 use slave::Transformation;
@@ -121,6 +121,7 @@ impl Loader {
             name: name.clone(),
             fmu: fmu.folder().to_owned(),
             shown: Some(shown),
+            origin: Origin::of(fmu),
             settings: simulator.settings.clone(),
             implementation: Implementation::Any,
         });

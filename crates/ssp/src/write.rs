@@ -29,7 +29,8 @@ pub(super) const TOOL: &str = "aso-ftc";
 
 /// Writes `assembly` as the SSP archive `target`; creates the folder of `target`.
 ///
-/// The FMUs go into `resources`. The settings of each element go into a parameter set `settings` in
+/// The FMUs go into `resources`, each with all its files: an archive as it is, also that of an FMU that
+/// [`crate::open`] has unpacked, and a folder packed. The settings of each element go into a parameter set `settings` in
 /// a separate file, bound to the component. Connectors are the connected variables and the
 /// outputs of type Real, Integer and Boolean, with the types and units of the FMUs. `step_size` in
 /// s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
@@ -88,13 +89,13 @@ impl Exporter {
         element: &crate::assembly::Element,
         linked: &Linked<'_>,
     ) -> Result<(), SspError> {
-        let path = &element.fmu;
+        let path = element.complete();
         let fmu = if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
         let source = if let Some(known) = self.fmus.get(path) {
             known.clone()
         } else {
             let added = self.archive.add_fmu(path, &fmu)?;
-            self.fmus.insert(path.clone(), added.clone());
+            self.fmus.insert(path.to_owned(), added.clone());
             added
         };
         let description = fmu.description.clone();

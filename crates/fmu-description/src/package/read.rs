@@ -20,6 +20,8 @@ pub struct Unpacked {
     folder: PathBuf,
     /// The temporary folder, removed on drop; `None` for an FMU in a folder.
     temporary: Option<TemporaryFolder>,
+    /// The absolute path of the archive; `None` for an FMU in a folder.
+    archive: Option<PathBuf>,
     /// The names of the archive's entries; empty for an FMU in a folder.
     names: Vec<String>,
     /// The content of `modelDescription.xml`.
@@ -65,6 +67,7 @@ impl Unpacked {
 
     fn unpack(path: &Path, is_needed: impl Fn(&str) -> bool) -> Result<Self, PackageError> {
         let mut archive = Archive::open(path)?;
+        let place = std::path::absolute(path).map_err(file_error("open", path))?;
         if !archive.names().iter().any(|name| name == DESCRIPTION) {
             return Err(missing(archive.names()));
         }
@@ -74,9 +77,15 @@ impl Unpacked {
         let mut archive_warnings = archive.warnings();
         archive_warnings.extend(add_terminals(temporary.path(), &mut description));
         let names = archive.names().iter().filter(|name| !name.is_empty()).cloned().collect();
-        let (folder, temporary) = (temporary.path().to_owned(), Some(temporary));
-        let mut unpacked =
-            Unpacked { folder, temporary, names, description, warnings, archive_warnings };
+        let mut unpacked = Unpacked {
+            folder: temporary.path().to_owned(),
+            temporary: Some(temporary),
+            archive: Some(place),
+            names,
+            description,
+            warnings,
+            archive_warnings,
+        };
         unpacked.warn_of_other_names();
         Ok(unpacked)
     }
@@ -90,9 +99,15 @@ impl Unpacked {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
         let (mut description, warnings) = describe(&folder, &folder)?;
         let archive_warnings = add_terminals(&folder, &mut description).into_iter().collect();
-        let names = Vec::new();
-        let mut unpacked =
-            Unpacked { folder, temporary: None, names, description, warnings, archive_warnings };
+        let mut unpacked = Unpacked {
+            folder,
+            temporary: None,
+            archive: None,
+            names: Vec::new(),
+            description,
+            warnings,
+            archive_warnings,
+        };
         unpacked.warn_of_other_names();
         Ok(unpacked)
     }
@@ -101,6 +116,13 @@ impl Unpacked {
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// The absolute path of the archive, which may have files that are not in [`Unpacked::folder`]; `None` for an FMU
+    /// in a folder.
+    #[must_use]
+    pub fn archive(&self) -> Option<&Path> {
+        self.archive.as_deref()
     }
 
     /// The names of all entries of the archive, with a slash at the end of folders; empty for an FMU in a

@@ -1,7 +1,8 @@
 //! What is written is read again as the same, and has the same bytes each time.
 
 use std::fs;
-use std::path::Path;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
 
 use fmu_description::package::{Package, platforms};
 use fmu_description::unit::BaseUnit;
@@ -257,7 +258,66 @@ fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
     // An opened assembly, whose FMUs are folders, is written again.
     let third = bench.path("third.ssp");
     write(&opened.assembly, Some(0.5), &third).unwrap();
+    for name in ["resources/a.fmu", "resources/a_2.fmu"] {
+        assert_eq!(entry(&third, name), entry(&first, name));
+    }
     assert_eq!(links(&open(&third).unwrap().assembly), links(&opened.assembly));
+}
+
+/// An FMU with libraries for all platforms, and with files that no simulation needs.
+fn complete_fmu(bench: &Bench, name: &str) -> PathBuf {
+    let mut package = Package::new(description("m", "y output Real"));
+    for folder in ["linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin"] {
+        package.add(format!("binaries/{folder}/m.lib"), folder);
+    }
+    package.add(format!("binaries/{}/m.so", platforms()[0]), "not a library");
+    for path in ["documentation/index.html", "sources/m.c", "model.png", "resources/deep/t.csv"] {
+        package.add(path, path);
+    }
+    let path = bench.path(name);
+    package.write(&path).unwrap();
+    path
+}
+
+/// The entry `name` of an archive.
+fn entry(archive: &Path, name: &str) -> Vec<u8> {
+    let mut archive = zip::ZipArchive::new(fs::File::open(archive).unwrap()).unwrap();
+    let mut bytes = Vec::new();
+    archive.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn an_fmu_that_was_opened_is_written_with_all_its_files() {
+    let bench = Bench::new();
+    let fmu = complete_fmu(&bench, "m.fmu");
+    let expected = fs::read(&fmu).unwrap();
+    let element = Fmu { name: "m".into(), fmu, ..Fmu::default() };
+    let packed = bench.path("packed.ssp");
+    write(&Assembly { elements: vec![element], ..Assembly::default() }, None, &packed).unwrap();
+    let ssd = bench::ssd(&root(&bench::component("m", "m.fmu", "y output", ""), ""), "");
+    let osp = r#"<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1"><Simulators><Simulator name="m" source="m.fmu"/></Simulators></OspSystemStructure>"#;
+    let (ssd, osp) = (bench.file("m.ssd", ssd), bench.file("m.xml", osp));
+    for source in [&packed, &ssd, &osp] {
+        let opened = open(source).unwrap();
+        assert!(!opened.assembly.elements[0].fmu.join("documentation").exists());
+        let again = bench.path("again.ssp");
+        write(&opened.assembly, None, &again).unwrap();
+        assert!(entry(&again, "resources/m.fmu") == expected, "{}", source.display());
+    }
+}
+
+#[test]
+fn an_fmu_that_replaces_one_that_was_opened_is_written() {
+    let bench = Bench::new();
+    complete_fmu(&bench, "m.fmu");
+    let elements = bench::component("m", "m.fmu", "y output", "");
+    let mut opened = bench.open(&root(&elements, ""), "").unwrap();
+    let other = bench.fmu("other.fmu", "y output Real");
+    opened.assembly.elements[0].fmu.clone_from(&other);
+    let path = bench.path("x.ssp");
+    write(&opened.assembly, None, &path).unwrap();
+    assert_eq!(entry(&path, "resources/other.fmu"), fs::read(other).unwrap());
 }
 
 #[test]
