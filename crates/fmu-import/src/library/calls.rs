@@ -61,6 +61,7 @@ macro_rules! values {
                 let done = canary::read(self.base.guards, references, values, call);
                 self.base.check_guarded($get_name, done, || format!(" {values:?}"))
             }
+
             #[inline]
             pub(crate) fn $set(
                 &mut self,
@@ -158,6 +159,7 @@ macro_rules! derivatives {
                 });
                 self.base.check_guarded($set_name, done, String::new)
             }
+
             #[inline]
             pub(crate) fn $get(
                 &mut self,
@@ -201,6 +203,7 @@ macro_rules! equations {
                 let status = unsafe { function(self.base.pointer, time) };
                 self.base.check($set_time, status)
             }
+
             #[inline]
             pub(crate) fn set_continuous_states(
                 &mut self,
@@ -277,6 +280,7 @@ impl Component {
         let status = unsafe { function(self.base.pointer, on.into(), 0, std::ptr::null()) };
         self.base.check(NAME, status)
     }
+
     pub(crate) fn setup_experiment(
         &mut self,
         e: &fmu_description::Experiment,
@@ -293,6 +297,7 @@ impl Component {
         };
         self.base.check(NAME, status)
     }
+
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
@@ -323,6 +328,7 @@ impl Component {
         self.base.check(NAME, status)?;
         Ok(CompletedStep { enter_event_mode: event != 0, terminate_simulation: end != 0 })
     }
+
     pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],

@@ -128,6 +128,7 @@ impl Component {
         let status = unsafe { function(self.base.pointer, on.into()) };
         self.base.check(NAME, status)
     }
+
     pub(crate) fn initialize(&mut self, start: f64, stop: Option<f64>) -> Result<(), CallError> {
         const NAME: &str = "fmiInitializeSlave";
         let function = function!(self.initialize, NAME);
@@ -162,6 +163,7 @@ impl Component {
         }
         self.finish_step(status, time, size)
     }
+
     pub(crate) fn initialize_model(
         &mut self,
         tolerance: Option<f64>,
@@ -175,6 +177,7 @@ impl Component {
         self.base.check(NAME, status)?;
         Ok(info.into())
     }
+
     #[inline]
     pub(crate) fn completed_integrator_step(&mut self) -> Result<CompletedStep, CallError> {
         const NAME: &str = "fmiCompletedIntegratorStep";

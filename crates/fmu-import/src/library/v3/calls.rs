@@ -102,6 +102,7 @@ impl Component {
         let status = unsafe { function(self.base.pointer, on, pointers.len(), list) };
         self.base.check(NAME, status)
     }
+
     pub(crate) fn enter_initialization_mode(&mut self, e: &Experiment) -> Result<(), CallError> {
         const NAME: &str = "fmi3EnterInitializationMode";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
@@ -244,6 +245,7 @@ impl Component {
         });
         self.base.check_guarded(NAME, done, || format!(" {values:?}"))
     }
+
     pub(crate) fn set_binary(
         &mut self,
         references: &[u32],
@@ -307,6 +309,7 @@ impl Component {
         self.base.place.leave();
         Ok(())
     }
+
     #[inline]
     pub(crate) fn completed_integrator_step(
         &mut self,

@@ -96,6 +96,7 @@ impl Component {
     pub(crate) fn forget_input_derivatives(&mut self) {
         self.inputs.is_set = false;
     }
+
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let function = function!(self.update_discrete_states, NAME);
