@@ -85,7 +85,7 @@ def designed(text):
     try:
         report, _ = design(text, "--certificate-time", "1")
     except RuntimeError as refusal:
-        return "refused", refusal, np.nan
+        return "refused", str(refusal), np.nan
     robustness = report["robustness"]
     exact = robustness["delays"] or {"s_peaks": [point["s_peak"] for point in robustness["points"]]}
     gamma = re.search(r"gamma = ([0-9.e+-]+[0-9])", report["feedback"]["method"])
