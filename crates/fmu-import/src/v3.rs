@@ -62,14 +62,14 @@ pub(crate) struct Instance {
 macro_rules! values {
     ($(
         $get:ident $set:ident: $type:ty =
-            ($get_name:literal, $convert:expr) ($set_name:literal, $put:expr);
+            ($get_name:literal, $fill:expr) ($set_name:literal, $put:expr);
     )*) => {
         $(pub(crate) fn $get(
             &mut self,
             list: &[u32],
             values: &mut [$type],
         ) -> Result<(), CallError> {
-            self.read($get_name, list, values, $convert)
+            self.read($get_name, list, values, $fill)
         }
 
         pub(crate) fn $set(&mut self, list: &[u32], values: &[$type]) -> Result<(), CallError> {
@@ -217,7 +217,9 @@ impl Instance {
         if self.view.plain || self.plans.find(&self.view, list).is_err() {
             return self.component.get_float64(list, values);
         }
-        self.read("fmi3GetFloat64", list, values, Buffer::real)
+        self.read("fmi3GetFloat64", list, values, |buffer, place, value| {
+            fill(value, buffer.real(place))
+        })
     }
 
     #[inline]
@@ -230,12 +232,20 @@ impl Instance {
 
     values! {
         get_integer set_integer: i64 =
-            ("fmi3GetInt64", Buffer::integer) ("fmi3SetInt64", Buffer::put_integer);
+            ("fmi3GetInt64", |buffer, place, value| fill(value, buffer.integer(place)))
+            ("fmi3SetInt64", Buffer::put_integer);
         get_boolean set_boolean: i32 =
-            ("fmi3GetBoolean", Buffer::boolean) ("fmi3SetBoolean", Buffer::put_boolean);
+            ("fmi3GetBoolean", |buffer, place, value| fill(value, buffer.boolean(place)))
+            ("fmi3SetBoolean", Buffer::put_boolean);
         get_string set_string: String = ("fmi3GetString", Buffer::text) ("fmi3SetString", Buffer::put_text);
         get_binary set_binary: Vec<u8> = ("fmi3GetBinary", Buffer::bytes) ("fmi3SetBinary", Buffer::put_bytes);
     }
+}
+
+/// Sets `value` to a number, if there is one.
+fn fill<T>(value: &mut T, number: Option<T>) -> Option<()> {
+    *value = number?;
+    Some(())
 }
 
 /// Returns the error of an access to a value reference that no variable has.

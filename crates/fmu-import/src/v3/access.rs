@@ -26,13 +26,14 @@ impl Instance {
         done
     }
 
-    /// Reads values. `convert` returns one value of a buffer; `None` is an error.
+    /// Reads values. `fill` copies one value of a buffer, a text without an allocation if there is room; `None` is an
+    /// error.
     pub(super) fn read<T>(
         &mut self,
         function: &'static str,
         list: &[u32],
         values: &mut [T],
-        convert: fn(&Buffer, usize) -> Option<T>,
+        fill: fn(&Buffer, usize, &mut T) -> Option<()>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |instance, run| {
             if run.kind == NativeType::Clock {
@@ -43,15 +44,14 @@ impl Instance {
                 run.buffer.get(&mut instance.component, &run.references)?;
             }
             for &(position, place) in &run.places {
-                let Some(value) = convert(&run.buffer, place) else {
+                if fill(&run.buffer, place, &mut values[position]).is_none() {
                     let (name, kind) = (instance.view.name(list[position]), run.kind.name());
                     let what = format!(
                         "gives {name} a value of type {kind} that the importer cannot represent: it \
                          has 64 bits with a sign"
                     );
                     return Err(refused(function, what));
-                };
-                values[position] = value;
+                }
             }
             Ok(())
         })

@@ -153,9 +153,11 @@ macro_rules! others {
         })*
 
         impl Buffer {
-            $(/// Returns value number `position`; `None` if the values have another type.
-            pub(super) fn $get(&self, position: usize) -> Option<$type> {
-                if let Buffer::$variant(values) = self { Some(values[position].clone()) } else { None }
+            $(/// Copies value number `position` to `value`; `None` if the values have another type.
+            pub(super) fn $get(&self, position: usize, value: &mut $type) -> Option<()> {
+                let Buffer::$variant(values) = self else { return None };
+                value.clone_from(&values[position]);
+                Some(())
             }
 
             /// Stores a value; `None` if the values have another type.
