@@ -46,10 +46,14 @@ impl Instance {
             for &(position, place) in &run.places {
                 if fill(&run.buffer, place, &mut values[position]).is_none() {
                     let (name, kind) = (instance.view.name(list[position]), run.kind.name());
-                    let what = format!(
-                        "gives {name} a value of type {kind} that the importer cannot represent: it \
-                         has 64 bits with a sign"
-                    );
+                    let what = if run.kind == NativeType::UInt64 {
+                        format!(
+                            "gives {name} a value of type {kind} that the importer cannot \
+                             represent: it has 64 bits with a sign"
+                        )
+                    } else {
+                        format!("cannot read {name}, a variable of type {kind}")
+                    };
                     return Err(refused(function, what));
                 }
             }
