@@ -99,7 +99,8 @@ impl View {
         self.shared.call_for_request();
     }
 
-    /// Returns the next request, if there is one; waits for it up to the time `wait`, if this is stated.
+    /// Returns the next request, if there is one; waits for it up to the time `wait`, or not at all if `wait`
+    /// is `None`.
     #[must_use]
     pub fn request(&self, wait: Option<Duration>) -> Option<Request> {
         match wait {
@@ -142,7 +143,8 @@ impl View {
         self.messages.clone()
     }
 
-    /// Publishes the end of the run and closes the server. An open page may receive the end for the time `patience`.
+    /// Publishes the end of the run and closes the server. If a page is open, waits up to the time `patience`
+    /// until it has received the end.
     pub fn end(self, outcome: &str, patience: Duration) {
         let outcome = outcome.to_owned();
         // Empties the queue: the server may sleep until the next sample is due.

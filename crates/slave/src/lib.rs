@@ -43,7 +43,8 @@ pub trait Slave: Send {
     /// Only [`Slave::configure`] changes it.
     fn description(&self) -> &ModelDescription;
 
-    /// Whether the outputs depend on the present inputs only. The Jacobi method steps such a slave after all others.
+    /// Whether the outputs depend on the present inputs only, with no state in between. The Jacobi
+    /// method steps such a slave after all others, when its inputs are known.
     fn is_function(&self) -> bool {
         false
     }
@@ -246,8 +247,9 @@ pub trait Slave: Send {
         None
     }
 
-    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made; status, results and the
-    /// end of the line after it. Returns false if the slave cannot do so; the caller then logs the functions of this trait.
+    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
+    /// status, results and the end of the line after it. Returns false if the slave cannot do so; the
+    /// caller then logs the functions of this trait.
     fn log_calls(&mut self, sink: CallSink) -> bool {
         false
     }

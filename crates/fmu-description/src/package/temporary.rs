@@ -22,7 +22,8 @@ static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 #[derive(Debug)]
 pub struct TemporaryFolder {
     folder: TempDir,
-    /// The lock by which other processes see that the folder is in use; `None` if there are no locks. Released last.
+    /// The lock by which other processes see that the folder is in use; released after the folder is
+    /// removed. `None` if there are no locks.
     _lock: Option<File>,
 }
 
