@@ -1,7 +1,7 @@
 //! Call order of FMI 3.0.2: the functions allowed in each state, as sections 2.3, 3.2.1 and 4.2.1 state
 //! them.
 //!
-//! The states are those of [`call_order`](crate::call_order): [`State::StepComplete`] is Step Mode. After
+//! The states are those of [`call_order`]: [`State::StepComplete`] is Step Mode. After
 //! `fmi3Error` an instance is in state [`State::Terminated`] (section 2.3.1), so no state `Error` exists.
 
 use crate::call_order::{self, C, I, InterfaceType, M, N, State, T, V, functions};
