@@ -85,7 +85,7 @@ impl Linear {
             state,
             matrix,
             propagator: (f64::NAN, DMatrix::zeros(0, 0)),
-            slots: vec![None; 3],
+            slots: vec![None; 4],
             steps: Arc::clone(steps),
         })
     }

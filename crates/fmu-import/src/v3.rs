@@ -27,9 +27,10 @@ use buffer::Buffer;
 use clocked::ClockedRuns;
 use clocks::Clocks;
 pub(crate) use elements::ElementView;
-use modes::{Mode, State};
+use modes::Mode;
 use plan::Plans;
 use slave::{CallError, Failure};
+use states::State;
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
 /// with `loggingOn = false` alone an FMU is silent about its errors.

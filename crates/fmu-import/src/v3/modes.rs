@@ -5,7 +5,6 @@ use crate::error::refused;
 use crate::library::v3::{DoStepResult, Interface};
 use fmu_description::abi::Status;
 use fmu_description::number::seconds;
-use serde::{Deserialize, Serialize};
 use slave::{CallError, EventInfo, Events, Failure, StepResult};
 
 /// Largest number of updates of the discrete states in one event.
@@ -38,26 +37,6 @@ impl Mode {
     pub(super) fn is_initialized(self) -> bool {
         matches!(self, Mode::Event | Mode::Step)
     }
-}
-
-/// The state of the slave, besides the state of the FMU.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct State {
-    #[serde(skip)]
-    pub(super) mode: Mode,
-    /// `nextEventTime` in s.
-    pub(super) next_event: Option<f64>,
-    /// Whether an event has happened that the master has not handled yet.
-    pub(super) event: bool,
-    /// Whether the FMU has requested the end of the simulation.
-    pub(super) terminate: bool,
-    /// The time reached, in s.
-    pub(super) time: f64,
-    /// Bits of the values set last of the elements that may change in Event Mode only; for Strings and binaries a hash.
-    pub(super) held: Vec<Option<u64>>,
-    /// Values of clocked elements at their last tick, and for their next one.
-    pub(super) memory: super::clocked::Memory,
-    pub(super) clocks: super::clocks::Clocks,
 }
 
 /// Returns the difference in s below which times are equal at `time` in a step of `size` s.

@@ -1,15 +1,38 @@
 //! FMU states together with the state of the slave: mode, next event, clocks, values set last.
 
+use serde::{Deserialize, Serialize};
 use slave::CallError;
 
 use super::Instance;
-use super::modes::{Mode, State};
+use super::clocked::Memory;
+use super::clocks::Clocks;
+use super::modes::Mode;
 use crate::error::refused;
 
 /// The first bytes of a serialised state: name and version of its format.
 const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
+
+/// The state of the slave, besides the state of the FMU.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct State {
+    #[serde(skip)]
+    pub(super) mode: Mode,
+    /// `nextEventTime` in s.
+    pub(super) next_event: Option<f64>,
+    /// Whether an event has happened that the master has not handled yet.
+    pub(super) event: bool,
+    /// Whether the FMU has requested the end of the simulation.
+    pub(super) terminate: bool,
+    /// The time reached, in s.
+    pub(super) time: f64,
+    /// Bits of the values set last of the elements that may change in Event Mode only; for Strings and binaries a hash.
+    pub(super) held: Vec<Option<u64>>,
+    /// Values of clocked elements at their last tick, and for their next one.
+    pub(super) memory: Memory,
+    pub(super) clocks: Clocks,
+}
 
 /// A serialised state: whether the initialization has ended, the state of the slave, and that of the FMU.
 type Saved<'a> = (bool, State, &'a [u8]);
