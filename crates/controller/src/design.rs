@@ -281,6 +281,8 @@ impl Design {
 
     /// The design without its schedule, for the matrices and the operating point at one value of the scheduling
     /// variable; `None` if it has no schedule.
+    // Compiled with its caller: a module for browsers then has the code that copies a design once.
+    #[inline]
     #[must_use]
     pub fn unscheduled(&self) -> Option<Self> {
         self.schedule.is_some().then(|| Self { schedule: None, ..self.clone() })

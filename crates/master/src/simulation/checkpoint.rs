@@ -241,10 +241,7 @@ impl Simulation {
 
     /// Returns the faults on connections, each with the input of its connection.
     fn faults(&self) -> Vec<(Port, FaultChain)> {
-        let exchange = &self.engine.exchange;
-        let connections = self.engine.system.connections.iter().filter(|_| exchange.is_faulty);
-        let faults = connections.map(|connection| (connection.to, exchange.fault(connection.to)));
-        faults.filter_map(|(input, fault)| Some((input, fault?.clone()))).collect()
+        self.engine.exchange.faults().map(|(input, fault)| (input, fault.clone())).collect()
     }
 
     /// Returns the driven variables and the faults of this simulation with their memory in `checkpoint`. An error if
