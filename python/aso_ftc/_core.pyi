@@ -1,6 +1,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypedDict, final
+from typing import Any, TypedDict, final, type_check_only
 
 from ._slave import Slave
 
@@ -92,6 +92,7 @@ class Numbers:
     @property
     def __array_interface__(self) -> dict[str, Any]: ...
 
+@type_check_only
 class Outcome(TypedDict):
     table: Table
     end: str
