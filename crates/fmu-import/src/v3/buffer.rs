@@ -17,7 +17,7 @@ pub(super) enum ElementValue {
     Bytes(Vec<u8>),
 }
 
-/// A value of the C interface. It is no Real or Integer, and made from none, unless its type says how.
+/// A value of the C interface. The default methods are those of the types that are no numbers.
 trait Element: Clone + Default {
     /// NaN for an integer beyond 64 bits with a sign; `None` if the value is no number.
     fn real(&self) -> Option<f64> {
@@ -39,7 +39,7 @@ trait Element: Clone + Default {
         None
     }
 
-    /// Returns bits that are equal for equal values only; of a String or a binary, a hash.
+    /// Returns bits that tell a number from all others of its type; of a String or a binary, a hash.
     fn bits(&self) -> u64;
 
     fn to_value(&self) -> ElementValue {
@@ -246,7 +246,7 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns bits of value number `position` that are equal for equal values only; of a String or a binary,
+            /// Returns bits of value number `position`, which tell a number from all others; of a String or a binary,
             /// a hash.
             pub(super) fn bits(&self, position: usize) -> u64 {
                 match self {
