@@ -245,13 +245,15 @@ impl Exchange {
             system.perform(position, time, |slave| self.set_held(position, slave))?;
         }
         let results = self.reals.advance_all(system, slaves, step, run);
-        let read = |(&position, result): (&usize, Result<StepResult, CallError>)| {
-            system.perform(position, step(position).time, |slave| {
+        // Not collected: a list of unknown length grows, and allocates again.
+        let mut steps = Vec::with_capacity(slaves.len());
+        for (&position, result) in slaves.iter().zip(results) {
+            steps.push(system.perform(position, step(position).time, |slave| {
                 let done = result?;
                 self.read_discrete(position, slave).map(|()| done)
-            })
-        };
-        slaves.iter().zip(results).map(read).collect()
+            })?);
+        }
+        Ok(steps)
     }
 
     /// Whether [`Reals::pass`] can make a complete sweep.
