@@ -177,8 +177,8 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     }
 }
 
-/// Returns the names of the libraries, each with the interface types that it serves. Scheduled execution is none of
-/// these types: a library of FMI 3.0 exports all functions.
+/// Returns the names of the libraries, each with the interface types that it serves; none for a library that serves
+/// Scheduled Execution only, since one of FMI 3.0 exports all functions whatever it serves.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
     let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
