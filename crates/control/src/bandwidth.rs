@@ -106,7 +106,8 @@ pub struct ByBandwidth<T> {
 ///
 /// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin
 /// of 1/2 to infinity and a phase margin of 60 degrees in continuous time, for all weights (M. G. Safonov, M. Athans,
-/// IEEE Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale by some 10 [`lqr`].
+/// IEEE Trans. Autom. Control 22 (1977)). Method: r is enclosed on the logarithmic scale by about 10 solutions
+/// of [`lqr`].
 ///
 /// # Errors
 ///

@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-/// The matrix product A B, summed in a fixed order: each column of B weighs the columns of A.
+/// The matrix product A B, summed in a fixed order: for each column of B the columns of A times its
+/// entries.
 ///
 /// `a`: n x k; `b`: k x m. The result has the same bits on every processor. nalgebra's `*` does
 /// not: it multiplies matrices larger than 5 x 5 by kernels that depend on the features of the

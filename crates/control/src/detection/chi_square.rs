@@ -38,7 +38,8 @@ pub fn survival(degrees: u32, x: f64) -> f64 {
 /// normal vector with `degrees` entries, unit covariance and a mean of squared length `noncentrality`.
 ///
 /// A `noncentrality` below 0 counts as 0; 1 for x <= 0. Method: the Poisson mixture of the central
-/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the length is normal.
+/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the length
+/// counts as normally distributed.
 ///
 /// Source: Abramowitz and Stegun (1964), 26.4.25.
 #[must_use]
@@ -132,7 +133,7 @@ impl Terms {
         terms
     }
 
-    /// Adds two degrees: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, a half of the degrees before.
+    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, half of the degrees before.
     fn raise(&mut self) {
         let exponent = self.shape * self.half.ln() - self.half - libm::lgamma(self.shape + 1.0);
         self.survival += exponent.exp();

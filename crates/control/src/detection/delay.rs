@@ -9,7 +9,8 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// The probability of a detection within `samples`, at most as many as are computed; 0 without any.
+    /// The probability that the fault is detected within `samples` samples, beyond the last computed number within
+    /// that number; 0 if `missed` is empty.
     #[must_use]
     pub fn detected_within(&self, samples: usize) -> f64 {
         1.0 - self.missed.get(samples).or(self.missed.last()).copied().unwrap_or(1.0)
@@ -23,7 +24,8 @@ impl Delay {
         (*last <= 1e-3).then(|| self.missed.iter().sum())
     }
 
-    /// The samples within which the part `probability` of the faults is detected; None if the computed are too few.
+    /// The number of samples within which the part `probability` of the faults is detected; None if no computed number
+    /// is enough.
     #[must_use]
     pub fn quantile(&self, probability: f64) -> Option<usize> {
         self.missed.iter().position(|missed| 1.0 - missed >= probability)

@@ -17,7 +17,8 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// # Errors
 ///
-/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for the period; [`Error::Overflow`].
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for a period that is not above 0;
+/// [`Error::Overflow`].
 pub fn mean_after_step(
     effect: &StateSpace,
     period: f64,

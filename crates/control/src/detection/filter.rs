@@ -105,7 +105,7 @@ impl UnknownInput {
 /// Designs the filter whose residuals do not depend on the inputs `unknown`; None if this method has none.
 ///
 /// Measurements in which an input appears directly are left out: y becomes `N_s` y with `N_s` `E_s` = 0.
-/// An unknown-input observer (Chen and Patton 1999, section 3.2) removes those on the states. With C for `N_s` C,
+/// An unknown-input observer (Chen and Patton 1999, section 3.2) removes the inputs on the states. With C for `N_s` C,
 ///
 /// ```text
 /// H = E (C E)^+,  T = I - H C,  s = T x                               rank C E = rank E
@@ -273,7 +273,8 @@ impl DetectionFilter {
 /// Gain of the Kalman filter for correlated noise, and covariance (continuous: intensity V) of its innovation.
 ///
 /// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v, in continuous
-/// time intensities. Method: A - S V^-1 C, W - S V^-1 S' has uncorrelated noise; S V^-1 is added to the gain.
+/// time intensities. Method: the plant with A - S V^-1 C and W - S V^-1 S' has uncorrelated noise; S V^-1 is added to
+/// the gain of its filter.
 fn correlated_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

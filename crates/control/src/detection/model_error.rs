@@ -20,7 +20,8 @@ const WIDTH: f64 = 1e-2;
 /// entry by entry. The errors dA, dB, dC may vary with time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UncertainPlant {
-    /// A, B, C, D; a deviation from the operating point from the start on is a column of B, D with an input up to 1.
+    /// A, B, C, D; a deviation from the operating point that is there from the start is a column of B and D with an
+    /// input bounded by 1.
     pub nominal: StateSpace,
     /// The largest errors of the entries of A, B and C, not below 0.
     pub sizes: [DMatrix<f64>; 3],

@@ -76,7 +76,7 @@ impl DisturbedPlant {
     ///
     /// # Errors
     ///
-    /// Same as [`DisturbedPlant::check`]; [`Error::NotConverged`] for singular values.
+    /// Same as [`DisturbedPlant::check`]; [`Error::NotConverged`] if singular values are not found.
     pub fn reachable_part(&self, tolerance: f64) -> Result<(Self, usize), Error> {
         self.check()?;
         let n = self.a.nrows();

@@ -8,7 +8,7 @@ use crate::{Domain, Error, check};
 /// Relative width of the brackets of the peak gains; [`FaultBounds`] uses their upper ends.
 const WIDTH: f64 = 1e-3;
 
-/// Bounds at all times, for faults that start from rest; each in the unit of its quantity.
+/// Bounds of states and errors at all times, for faults that start from rest; each in the unit of its quantity.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FaultBounds {

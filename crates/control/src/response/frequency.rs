@@ -15,7 +15,8 @@ use std::ops::Range;
 pub struct FrequencyPoint {
     /// w in rad per unit of time.
     pub frequency: f64,
-    /// G = C (s I - A)^-1 B + D, p x m, s = j w; with the period h in sampled time z = e^(j w h) for s.
+    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time with the period h, s is replaced by
+    /// z = e^(j w h).
     pub gain: DMatrix<Complex<f64>>,
     /// The singular values of G, descending; their number is the smaller one of p and m.
     pub singular_values: Vec<f64>,
@@ -75,7 +76,8 @@ pub(crate) fn singular_values(gain: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, 
 ///
 /// # Errors
 ///
-/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade`; [`Error::NotConverged`].
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for a `per_decade` of 0;
+/// [`Error::NotConverged`].
 pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, Error> {
     system.check()?;
     check::positive("per_decade", f64::from(per_decade))?;

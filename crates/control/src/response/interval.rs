@@ -179,14 +179,16 @@ struct Node {
     weight: f64,
 }
 
-/// Three nodes, exact for the fifth degree; over 1 / 4096 of a time constant the error is below the rounding.
+/// The rule of three nodes, exact for the fifth degree; over 1 / 4096 of a time constant its error is below the
+/// rounding.
 const NODES: [Node; 3] = [
     Node { part: 0.112_701_665_379_258_31, weight: 5.0 / 18.0 },
     Node { part: 0.5, weight: 8.0 / 18.0 },
     Node { part: 0.887_298_334_620_741_7, weight: 5.0 / 18.0 },
 ];
 
-/// `row` times e^(A t), t = `part` of the shortest interval; `a`: A times its length. Later terms are rounding.
+/// `row` times e^(A t), t = `part` of the shortest interval; `a`: A times its length. Later terms are
+/// below the rounding.
 fn row_after(row: &DMatrix<f64>, a: &DMatrix<f64>, part: f64) -> DMatrix<f64> {
     let (mut term, mut sum) = (row.clone(), row.clone());
     for degree in 1..=5 {

@@ -30,7 +30,8 @@ const ACCEPTABLE: f64 = 1.02;
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
 /// first loop. A resonance of S between two of them is possible only near an eigenvalue, and all loops have the
 /// same eigenvalues. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
-/// p) for each frequency. A loop that is not stable or has no response is left out. The result is deterministic.
+/// p) for each frequency. A loop that is not stable, or whose response cannot be computed, is left out. The result is
+/// deterministic.
 #[must_use]
 pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
     let [first, second] = loops;

@@ -31,7 +31,7 @@ pub struct SensitivityPeak {
     pub point: Point,
     /// The frequency of the peak, in rad/s.
     pub frequency: f64,
-    /// Whether it is the peak of D S D^-1 with the best diagonal D, see [`super::scaled_peak`].
+    /// Whether it is the peak of D S D^-1 with the diagonal D that makes it least, see [`super::scaled_peak`].
     pub scaled: bool,
 }
 
@@ -158,7 +158,8 @@ fn through_hold(
     let square = |a: &DMatrix<f64>, b: &DMatrix<f64>| beside(a, b).resize_vertically(order, 0.0);
     let (both, gradient) = (square(&plant.a, &plant.b), square(&sampled.a, &sampled.b));
     let adjoint = both.transpose() * period;
-    // Linear in the gradient: with one of the size of the matrix the exponential needs no further squarings.
+    // The derivative is linear in the gradient: with one of the size of the matrix the exponential needs no further
+    // squarings.
     let size = gradient.amax();
     let unit = if size > 0.0 { adjoint.amax().max(f64::MIN_POSITIVE) / size } else { 1.0 };
     let zero = DMatrix::zeros(order, order);

@@ -21,7 +21,8 @@ pub trait PlantFamily {
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant with these parts of the tolerances, in continuous time or in the samples of the controller.
+    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples of
+    /// the controller.
     ///
     /// # Errors
     ///
@@ -50,7 +51,7 @@ pub struct ToleranceCase {
     pub deviations: Vec<f64>,
 }
 
-/// The parts of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs at the same time.
+/// The parts of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs in parallel.
 pub struct ToleranceSearch<'a, F> {
     /// The plants.
     pub family: &'a F,

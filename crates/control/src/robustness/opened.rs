@@ -19,7 +19,7 @@ pub struct OpenedLoop {
     peak: HInfinity,
 }
 
-#[expect(clippy::missing_errors_doc, reason = "those of the functions of the same names")]
+#[expect(clippy::missing_errors_doc, reason = "the type says: as the functions of the same names")]
 impl OpenedLoop {
     /// Opens `closed` at `at`.
     pub fn new(closed: &Loop, at: Point) -> Result<Self, Error> {

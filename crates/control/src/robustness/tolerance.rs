@@ -135,7 +135,7 @@ pub fn tolerance_test<F: PlantFamily>(
     search.result(&cases, climbed)
 }
 
-#[expect(clippy::missing_errors_doc, reason = "those of the whole test")]
+#[expect(clippy::missing_errors_doc, reason = "the type says: as the whole test")]
 impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// The deviations of the random cases.
     #[must_use]

@@ -78,7 +78,8 @@ fn closed_loop(
     Ok(a_e + b_e * k)
 }
 
-/// Same as [`integral_feedforward`], for a controllable (A, B), `controlled` = `A_e` + `B_e` K and t integrals.
+/// Same as [`integral_feedforward`], for a controllable (A, B); `controlled` is `A_e` + `B_e` K, t the number of
+/// integrals.
 fn of_controllable(
     controlled: &DMatrix<f64>,
     b: &DMatrix<f64>,

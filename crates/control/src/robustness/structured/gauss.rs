@@ -71,7 +71,7 @@ impl Gauss {
     }
 }
 
-/// A step of the Gauss method from xi: z of all stages is C xi + D w, and w adds B w to the end.
+/// A step of the Gauss method from xi: z of all stages is C xi + D w, and w adds B w to xi at the end.
 pub(super) struct Step {
     pub(super) b: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,
