@@ -78,8 +78,9 @@ const ALL: u16 = I | M | V | N | C | F | K | T | E;
 /// The states in which values may be read.
 const READ: u16 = ALL & !I;
 
-/// Declares the functions of a version of FMI, the states in which each may be called, and those that may return
-/// `Discard`: always, in model exchange, in co-simulation.
+/// Declares the functions of a version of FMI. A row of the first table has functions, then the states in which they
+/// may be called: in model exchange, in co-simulation. The second table has the functions that may return `Discard`: in
+/// both interfaces, only in model exchange, only in co-simulation.
 macro_rules! functions {
     (
         $prefix:literal, $(#[$meta:meta])* { $($($name:ident)+: $exchange:expr, $simulation:expr;)* }

@@ -68,7 +68,8 @@ impl BaseUnit {
     }
 
     /// Returns factor and offset of the conversion from this unit to `other`, `value_in_other = factor * value +
-    /// offset`; `None` if the exponents differ. A [difference](crate::RealType::is_relative) has no offset.
+    /// offset`; `None` if the exponents differ. A [difference](crate::RealType::is_relative) is
+    /// converted by the factor alone.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
         let factor = self.factor / other.factor;

@@ -282,7 +282,8 @@ impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     }
 }
 
-/// Defines methods without results: the function of FMI 2.0 that is logged, and its arguments as text.
+/// Defines methods without results. A row has the signature, the function of FMI 2.0 that is logged (or of FMI 3.0 if
+/// only that has it), and its arguments as text.
 macro_rules! calls {
     ($(fn $method:ident($($argument:ident: $type:ty),*) = $function:literal, $($text:expr),+;)*) => {
         $(fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {

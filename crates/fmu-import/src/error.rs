@@ -1,4 +1,4 @@
-//! The error of a library that cannot be loaded or used, and that of a call that is refused.
+//! The errors of a library that cannot be loaded or used, and of a call that is refused.
 
 use std::path::PathBuf;
 

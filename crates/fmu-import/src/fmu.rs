@@ -195,7 +195,7 @@ impl Fmu {
         Ok(scalar.unwrap_or_else(|| description.clone()))
     }
 
-    /// Returns the library for `interface`. That for model exchange is loaded now. The error of an FMU without the
+    /// Returns the library for `interface`; the library for model exchange is loaded by this call. The error of an FMU without the
     /// interface has the name of its file, as its folder may be temporary.
     pub(crate) fn library(&self, interface: Interface) -> Result<AnyLibrary, FmuError> {
         let Content { library, unpacked, name, binding, .. } = &*self.content;
@@ -246,8 +246,8 @@ impl Fmu {
     }
 }
 
-/// Returns the description of an instance without integration if it differs from that of its FMU: with a scalar variable
-/// for each element of an array, whose structural parameters have the values `sizes`. On failure returns the reason.
+/// Returns the description of an instance without integration if it is not the description of its FMU: with a scalar
+/// variable for each element of an array, whose structural parameters have the values `sizes`. On failure returns the reason.
 pub(crate) fn scalar_description(
     description: &ModelDescription,
     sizes: &HashMap<u32, u64>,
@@ -287,7 +287,7 @@ fn open_library(
     library.map_err(|error| with_tool_hint(description, error))
 }
 
-/// Returns the interface of FMI 3.0: without co-simulation an FMU makes steps by scheduled execution.
+/// Returns the interface of FMI 3.0: scheduled execution in place of co-simulation for an FMU without it.
 pub(crate) fn interface_of_3(
     description: &ModelDescription,
     interface: Interface,

@@ -62,7 +62,8 @@ macro_rules! of_version {
 }
 use of_version;
 
-/// Defines methods that call the method of the same name by `of_version`.
+/// Defines methods that call the method of the same name by `of_version`: signature, versions and, if a version is not
+/// listed, the C function that it lacks.
 macro_rules! methods {
     ($(
         fn $method:ident($($argument:ident: $type:ty),*) -> $result:ty =

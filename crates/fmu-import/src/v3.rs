@@ -58,8 +58,8 @@ pub(crate) struct Instance {
     sizes: HashMap<u32, u64>,
 }
 
-/// Defines methods that get and set values: the names of the functions in errors, and how a buffer gives and takes a
-/// value.
+/// Defines methods that get and set values. A row has the methods, the type of a value and, for get and set, the C
+/// function that errors name and the function that copies a value from or to a buffer.
 macro_rules! values {
     ($(
         $get:ident $set:ident: $type:ty =

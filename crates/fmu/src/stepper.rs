@@ -94,7 +94,7 @@ impl Stepper {
     }
 
     /// Advances the model to the end of the step, to the first state event or to the event at `next` in s, whichever is
-    /// first. It handles no event, and does nothing if `next` is not after the start of the step. Errors as of
+    /// first. It handles no event, and does nothing if `next` is not after the start of the step. Has the errors of
     /// [`Stepper::run`].
     pub(crate) fn run_to_event<M: Model>(
         &mut self,

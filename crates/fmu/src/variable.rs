@@ -112,7 +112,7 @@ macro_rules! constructors {
     };
 }
 
-/// Defines functions that set entries of the [`Declaration`].
+/// Defines functions that set entries of the [`Declaration`]: name and arguments, then entries with their values.
 macro_rules! setters {
     ($($(#[$documentation:meta])*
         $name:ident($($argument:ident: $type:ty),*) $($($entry:ident).+ = $value:expr),+;)*) => {

@@ -159,7 +159,7 @@ impl Package {
 ///
 /// # Errors
 ///
-/// [`PackageError::Archive`] if an entry is too large or has a path that another one has.
+/// [`PackageError::Archive`] if an entry is too large or has the path of another one.
 pub fn pack<'a>(
     target: &Path,
     entries: impl IntoIterator<Item = (&'a str, &'a [u8])>,

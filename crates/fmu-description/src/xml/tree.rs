@@ -36,7 +36,8 @@ pub(crate) struct Element<'a> {
 }
 
 impl Element<'_> {
-    /// Copies the element and its children. The reader limits the depth of elements, and so that of this recursion.
+    /// Copies the element and its children. The reader limits the depth of elements, and so the depth of this
+    /// recursion.
     pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
         super::Element {

@@ -1,4 +1,4 @@
-//! The requests to a worker: what its instance answers to each. The commands that run in every step are no requests: see
+//! The requests to a worker, and the call of its instance that answers each. The commands that run in every step are no requests: see
 //! `words`.
 
 use std::borrow::Cow;
@@ -13,8 +13,8 @@ use slave::{CallError, Events, Slave, absent};
 /// A list of the caller, or one that was received.
 type List<'a, T> = Cow<'a, [T]>;
 
-/// Defines the requests: those that the worker itself answers, and those that its instance `$slave` answers, which have
-/// the names of their functions.
+/// Defines the requests that the worker itself answers, and the requests in the table, which its instance answers. A
+/// row has the request, named as its [`Function`], with its arguments, and the call of the instance `$slave`.
 macro_rules! requests {
     ($a:lifetime, $slave:ident; $($request:ident($($argument:ident: $type:ty),*) = $answer:expr;)*) => {
         /// A request to a worker.

@@ -76,7 +76,7 @@ fn level_of(status: c_int) -> Level {
     }
 }
 
-/// Logs a message of an FMU; `time` is that of the instance in s, if it is known.
+/// Logs a message of an FMU; `time` is the time of the instance in s, if it is known.
 pub(crate) fn log_message(
     level: Level,
     instance: &str,

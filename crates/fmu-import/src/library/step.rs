@@ -179,7 +179,7 @@ macro_rules! finish_step {
                     let failure = Failure::Status(Status::Discard);
                     CallError { function: $do_step, failure, messages }
                 })?;
-                // An FMU that does not answer has no such request.
+                // An FMU that does not answer does not request the end.
                 let terminated = false $(|| {
                     let function = self.base.functions.$get_boolean_status;
                     let answer = self.base.ask(function, &$terminated, StatusKind::Terminated, 0);

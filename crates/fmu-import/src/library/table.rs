@@ -1,6 +1,7 @@
 //! The macro that declares the function table of a library, for each version of the standard.
 
-/// Declares the function table. The first function returns the version of FMI, which is to be `$version`.
+/// Declares the function table. The first row has the version of FMI that the library must have, and the function that
+/// returns it; each other row has a field of the table, the name in the standard, and the signature.
 macro_rules! functions {
     (
         $version:literal = $get_version:literal;

@@ -17,7 +17,7 @@ pub(super) enum ElementValue {
     Bytes(Vec<u8>),
 }
 
-/// A value of the C interface. The default methods are those of the types that are no numbers.
+/// A value of the C interface. The default methods are for types that are no numbers.
 trait Element: Clone + Default {
     /// NaN for an integer beyond 64 bits with a sign; `None` if the value is no number.
     fn real(&self) -> Option<f64> {
@@ -133,7 +133,8 @@ impl Element for f32 {
     }
 }
 
-/// Defines the types that are no numbers, and how a buffer gives and takes their values.
+/// Implements [`Element`] for the types that are no numbers. A row has the type, its variants in [`Buffer`] and
+/// [`ElementValue`], and the methods of a buffer that get and store a value.
 macro_rules! others {
     ($($type:ty: $variant:ident, $value:ident, $get:ident, $put:ident;)*) => {
         $(impl Element for $type {
@@ -261,7 +262,8 @@ macro_rules! buffer {
                 }
             }
 
-            /// Stores a value, or 0 or nothing if there is none of the type; returns whether there is one.
+            /// Stores a value; 0, an empty text or no bytes if there is none, or one of another type. Returns whether the
+            /// value was stored.
             pub(super) fn put_value(&mut self, position: usize, value: Option<&ElementValue>) -> bool {
                 match self {
                     $(Buffer::$variant(values) => {

@@ -24,7 +24,7 @@ const TICKS: usize = 100;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
-/// An input clock that ticks at known times. A serialised state has what changes with time.
+/// An input clock that ticks at known times. A serialised state has only what changes with time.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct TimedClock {
     #[serde(skip)]

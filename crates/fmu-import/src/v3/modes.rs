@@ -244,7 +244,7 @@ impl Instance {
     }
 
     /// Runs the model partitions of the input clocks that tick, in the order of their priorities. The clocks that tick
-    /// as a result do so until the next call.
+    /// as a result remain active until the next call.
     pub(super) fn run_partitions(&mut self) -> Result<EventInfo, CallError> {
         let time = self.state.time;
         for clock in self.state.clocks.take_partitions() {

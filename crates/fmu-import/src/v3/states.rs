@@ -34,7 +34,7 @@ pub(super) struct State {
     pub(super) clocks: Clocks,
 }
 
-/// A serialised state: whether the initialization has ended, the state of the slave, and that of the FMU.
+/// A serialised state: whether the initialization has ended, the state of the slave, the state of the FMU.
 type Saved<'a> = (bool, State, &'a [u8]);
 
 impl Instance {

@@ -137,7 +137,8 @@ macro_rules! export {
 }
 
 /// Defines exported C functions from the types of their arguments. They call the generic functions for the model. A
-/// function without another type returns a status.
+/// row has the exported name, the generic function, the types of its arguments, and the type of its result unless that
+/// is a status.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {

@@ -203,7 +203,7 @@ impl ser::Serializer for &mut LayoutHasher {
     }
 }
 
-/// Defines the serialisation of collections, whose parts may have names.
+/// Defines the serialisation of collections: the trait and its function for a part, with `name` if parts have names.
 macro_rules! parts {
     ($($collection:ident $function:ident($($name:ident)?);)*) => {
         $(impl $collection for &mut LayoutHasher {

@@ -42,7 +42,7 @@ macro_rules! slots {
 
         impl<M> Slots<M> {
             /// Appends the slot that `builder` builds to the list of its type. Returns the description of the variable
-            /// and the position of the slot. Errors as of [`Native::kind`].
+            /// and the position of the slot. Has the errors of [`Native::kind`].
             pub(crate) fn add(
                 &mut self,
                 model: &mut M,

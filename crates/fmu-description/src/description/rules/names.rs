@@ -123,7 +123,8 @@ fn after_name(text: &str) -> Option<&str> {
     None
 }
 
-/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`; `None` for others.
+/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`; `None` for other content in
+/// brackets.
 fn after_indices(text: &str) -> Option<&str> {
     let Some(inner) = text.strip_prefix('[') else {
         return Some(text);

@@ -112,7 +112,7 @@ pub(super) fn states([list, needed]: [&str; 2], problems: &mut Problems<'_>) -> 
     states
 }
 
-/// Returns the indices that the initial unknowns must have, not those of clocks and clocked variables.
+/// Returns the indices that the initial unknowns must have, without clocks and clocked variables.
 pub(super) fn initial_unknowns(
     description: &ModelDescription,
     states: &HashSet<u32>,

@@ -202,7 +202,7 @@ pub(super) fn check_declared_type<'a>(
     Some(declared_type)
 }
 
-/// Checks that min and max of a Real or Integer are within those of its declared type.
+/// Checks that min and max of a Real or Integer are within the limits of its declared type.
 fn check_limits(variable: &ScalarVariable, declared: &SimpleType, problems: &mut Problems<'_>) {
     let inside = match (&variable.kind, &declared.kind) {
         (Kind::Real(inner), Kind::Real(outer)) => {

@@ -1,4 +1,4 @@
-//! The calls of an instance: one method for each function of the standard, except those of steps and events.
+//! The calls of an instance: one method for each function of the standard, except for steps and events.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::ffi::{c_int, c_void};
