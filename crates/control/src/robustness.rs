@@ -123,7 +123,7 @@ impl Loop {
         check::shape("the controller's D", &controller.d, (plant.b.ncols(), plant.c.nrows()))?;
         let direct = plant.d.amax();
         let is_proper = direct <= 0.0 || controller.d.amax() <= 0.0;
-        let rule = "zero, as that of the controller is not";
+        let rule = "zero, because D of the controller is not";
         check::that(is_proper, "the plant's D", direct, rule)?;
         let is_same = plant.domain == controller.domain;
         check::that(is_same, "the domain", f64::NAN, "the same for plant and controller")?;

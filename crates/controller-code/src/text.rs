@@ -8,7 +8,7 @@ const WIDTH: usize = 92;
 pub(super) struct Lines(pub(super) Vec<String>);
 
 impl Lines {
-    /// Adds a line, or several.
+    /// Adds a line, or several with line feeds between them.
     pub(super) fn push(&mut self, line: impl Into<String>) {
         self.0.push(line.into());
     }

@@ -128,7 +128,7 @@ fn error_names(report: &Report, count: usize) -> Vec<String> {
     if named.len() == count { named } else { (1..=count).map(|k| k.to_string()).collect() }
 }
 
-/// Returns P, a name and a meaning, with the names of the errors for rows and columns.
+/// Returns the matrix P with the names of the errors for rows and columns; `titles`: its name and its meaning.
 fn p_matrix(report: &Report, id: &str, titles: [&str; 2], values: &[Vec<f64>]) -> Markup {
     square(id, titles, &error_names(report, values.len()), values)
 }

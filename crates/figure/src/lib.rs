@@ -64,7 +64,8 @@ pub struct Panel<'a> {
     pub y_label: &'a str,
     /// Range of the time axis; `None`: all finite times.
     pub x_range: Option<(f64, f64)>,
-    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, as a remark says.
+    /// Largest magnitude in the automatic range of the vertical axis. Larger values leave the frame, with
+    /// a remark beside the legend.
     pub y_cap: Option<f64>,
     /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,

@@ -71,7 +71,7 @@ impl ScaledProblem {
     ///
     /// Doubling computes the least semidefinite solution, which does not stabilise an unstable mode
     /// that does not appear in Q. With Q + d I every mode appears, and Newton's method converges
-    /// from there to the stabilising solution. The errors are those of doubling for Q + d I.
+    /// from there to the stabilising solution. The errors are the errors of doubling for Q + d I.
     pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
         let effect = symmetric_part(&(&self.equation.b * self.equation.b.transpose()));
         let solve = |q: &DMatrix<f64>| match self.equation.domain {

@@ -29,7 +29,7 @@ pub(crate) struct Output {
     pub(crate) row: usize,
 }
 
-/// Returns the outputs of the loop: states, state estimation errors, fault estimation errors. Their rows are those of
+/// Returns the outputs of the loop: states, state estimation errors, fault estimation errors. Their rows are rows of
 /// [x; e; eps], which also has states of filters and delays, and rates of faults.
 pub(crate) fn outputs(designed: &Solution) -> Vec<Output> {
     let (all, states) = (designed.plant.a.nrows(), designed.linear.plant_states());

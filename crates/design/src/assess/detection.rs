@@ -309,7 +309,7 @@ fn test_report(decoupling: &Decoupling<'_>, test: &PlannedTest) -> Result<Test, 
     })
 }
 
-/// Predicts the detection of a fault by the test that is for it.
+/// Predicts the detection of a fault by its own test, or by the only test if there is one for all faults.
 fn fault_report(
     problem: &Problem,
     parts: &[Part<'_>],

@@ -14,8 +14,8 @@ pub(crate) struct EntryTolerances {
     pub(crate) placed: Tolerances,
 }
 
-/// Returns the tolerances that a plant file states: those of whole matrices for the entries that are not structural, and
-/// those of named entries. `order`: the number of states of each delay.
+/// Returns the tolerances that a plant file states, of whole matrices for the entries that are not structural, and of
+/// named entries. `order`: the number of states of each delay.
 pub(crate) fn tolerances(
     linear: &LinearPlant,
     order: usize,

@@ -30,7 +30,7 @@ const LARGEST_ORDER: usize = 30;
 const RATES: [f64; 3] = [0.5, 0.125, 0.03125];
 /// Number of losses between 0 and the largest one at which the decay rate is tested.
 pub(crate) const LOSSES: u32 = 10;
-/// Decay rates below this part of that of the intact loop count as zero.
+/// Decay rates below this part of the decay rate of the intact loop count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
 /// Decay rates of the state feedback, relative to the required one, that are tried in turn: the observer
 /// slows the loop.

@@ -259,7 +259,7 @@ impl LawProblem<'_> {
     }
 }
 
-/// Returns what an instability is, in words.
+/// Returns the definition of the instability in a time domain, with its unit, for a report.
 pub(crate) fn measure(domain: Domain) -> &'static str {
     match domain {
         Domain::Continuous => "largest real part of the eigenvalues, 1/s",

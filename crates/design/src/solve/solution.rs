@@ -291,7 +291,7 @@ impl Solution {
         self.model().complete(gains)
     }
 
-    /// Returns what the loop is computed for.
+    /// Returns plant, filter and time domain for which the loop is computed.
     pub(crate) fn model(&self) -> LoopModel<'_> {
         let Self { linear, plant, filter, domain, .. } = self;
         LoopModel { linear, plant, filter: filter.as_deref(), domain: *domain }

@@ -281,7 +281,7 @@ pub(crate) fn commanded(plant: FaultyPlant, domain: Domain) -> StateSpace {
     StateSpace { a, b, c, d, domain }
 }
 
-/// What a loop is computed for.
+/// Plant, filter and time domain for which a loop is computed.
 #[derive(Clone, Copy)]
 pub(crate) struct LoopModel<'a> {
     /// The plant without measurement filter.
