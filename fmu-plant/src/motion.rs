@@ -201,7 +201,7 @@ impl Motion {
     /// interval shorter than the suggested step takes one step: seven evaluations of the dynamics, of
     /// which the first finds sine, cosine and exponential remembered; nothing is allocated.
     ///
-    /// After an error the state is the one at the time that it states.
+    /// After an error the state is the state at [`Failure::time`].
     pub(crate) fn advance(
         &mut self,
         parameters: &Parameters,

@@ -29,7 +29,8 @@ impl<'a> Plant<'a> {
         Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force, memory }
     }
 
-    /// The derivative of the state: by [`Plant::memory`] at the start or the end of a step, by [`Direct`] inside.
+    /// The derivative of the state. `functions`: [`Plant::memory`] at the start or the end of a step, [`Direct`] inside
+    /// it.
     #[inline]
     pub(crate) fn derivative(
         &self,

@@ -108,7 +108,8 @@ pub struct Linearise {
 /// # Errors
 ///
 /// [`LineariseError`] if a name or value is invalid, if a function of the FMU fails, if the FMU offers
-/// none of the three methods, if a state that is left out influences the others, or if the third method is inaccurate.
+/// none of the three methods, if a state that is left out influences the others, or if the result of the third
+/// method is not accurate enough.
 pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, LineariseError> {
     let description = &fmu.elements()?;
     let parts = Parts::of(description, request)?;

@@ -236,7 +236,8 @@ fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option
 }
 
 /// Returns the continuous system whose exact step is the map: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
-/// the drift over one step; `None` without a real logarithm. The logarithm is in units of typical sizes and pulses.
+/// the drift over one step; `None` without a real logarithm. The logarithm is taken in units of the typical
+/// sizes and of the pulse heights.
 fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
     let (n, width) = discrete.change.shape();
     let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();

@@ -1,4 +1,5 @@
-//! The threads of the server: one accepts connections, one calls for samples, one per connection answers it.
+//! The threads of the server: one accepts connections, one calls the run for samples, and one for each connection
+//! answers its request.
 
 use std::io;
 use std::net::{TcpListener, TcpStream};

@@ -311,7 +311,7 @@ impl System {
     }
 }
 
-/// Returns the positions of the variables by name. A name that two variables have stands for the first one.
+/// Returns the positions of the variables by name. A name that two variables have refers to the first one.
 fn by_name(description: &ModelDescription) -> HashMap<String, usize> {
     let variables = description.variables.iter().enumerate().rev();
     variables.map(|(position, variable)| (variable.name.clone(), position)).collect()

@@ -21,8 +21,8 @@ pub(crate) fn optional<'a, T>(
     table.get(key).as_ref().map(read).transpose()
 }
 
-/// Reads a table with a number above 0 for some of `names`; returns that of each name, if it is stated, or its error,
-/// so that callers report mistakes in the order of the names.
+/// Reads a table with a number above 0 for some of `names`. Returns for each name the number, `None` if there is none,
+/// or its error, so that callers report mistakes in the order of the names.
 pub(crate) fn positives(
     table: &Table<'_>,
     key: &str,

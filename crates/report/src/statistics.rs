@@ -28,7 +28,8 @@ pub struct Statistics {
 /// The quantity over which a mean is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Basis {
-    /// Time, of this length in s: the integral by the trapezoidal rule (integers and Booleans are held), divided by it.
+    /// Time, of this length in s: the integral by the trapezoidal rule (integers and Booleans are held), divided by the
+    /// length.
     Time(f64),
     /// This number of finite values, each with the same weight: some rows have none, or the time does not advance.
     Values(u64),

@@ -162,7 +162,8 @@ impl ForwardControl {
         Self { bounds, law: Law::new(exponent.max(1.0)), requested: bounds.smallest }
     }
 
-    /// Returns the size of the next step in s after one of `size` s with this measure (target: 1; NaN: infinite).
+    /// Returns the size of the next step in s after a step of `size` s with this measure, whose target is at most 1; NaN
+    /// counts as infinite.
     ///
     /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {

@@ -57,7 +57,7 @@ impl Element {
     }
 }
 
-/// An archive, and the folder into which those of its files were unpacked that a simulation on this platform needs.
+/// An archive, and the folder with the files that were unpacked from it: all that a simulation on this platform needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
     /// Path of the archive.

@@ -222,8 +222,8 @@ impl Instance {
     }
 }
 
-/// Scheduled execution (FMI 3.0.2, section 5): a tick of an input clock activates its model partition. The master takes
-/// such an FMU for one of co-simulation whose steps do nothing and whose events run the partitions.
+/// Scheduled execution (FMI 3.0.2, section 5): a tick of an input clock activates its model partition. The master treats
+/// such an FMU as an FMU for co-simulation whose steps do nothing and whose events run the partitions.
 impl Instance {
     pub(super) fn is_scheduled(&self) -> bool {
         self.interface == Interface::ScheduledExecution

@@ -48,7 +48,7 @@ impl Integrated {
 
     /// Returns the bytes of the state of the integration and of the state of the FMU.
     pub(super) fn serialize(&mut self) -> Result<Vec<u8>, CallError> {
-        // In a temporary slot after those of the master.
+        // In a temporary slot after the slots of the master.
         let slot = self.saved.len();
         self.save_integration(slot);
         let saved = self.saved.pop().unwrap_or_default();
@@ -72,7 +72,7 @@ impl Integrated {
             return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&fmu_state)?;
-        // In a temporary slot after those of the master.
+        // In a temporary slot after the slots of the master.
         let slot = self.saved.len();
         self.saved.push(saved);
         self.restore_integration(slot);

@@ -37,7 +37,7 @@ pub struct Checkpoint {
     slaves: Vec<(String, String, Vec<u8>)>,
 }
 
-/// The state of the master without that of the scenario.
+/// The state of the master without driven variables and faults.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct MasterState {
     time: f64,
@@ -135,7 +135,7 @@ impl Simulation {
         Ok(KeptState { master: self.master_state(), scenario, slot })
     }
 
-    /// Returns to a kept state of this simulation, with the driven variables and faults of then. `state` is the last
+    /// Returns to a kept state of this simulation, with its driven variables and faults. `state` is the last
     /// result of [`Simulation::keep`] with its slot: an older one has lost its FMU states.
     ///
     /// # Errors
