@@ -27,7 +27,8 @@ impl FileLock {
 }
 
 /// Locks a file, which is created if it is missing. Returns `None` if another [`FileLock`], of this or another process,
-/// has the lock. Without locks in the file system, or the right to open the file, assumes that it is free.
+/// has the lock. Without locks in the file system, or the right to open the file, assumes that it is free. Raises
+/// `OSError` if the file cannot be opened for another reason.
 #[pyfunction]
 pub(crate) fn lock_file(path: PathBuf) -> PyResult<Option<FileLock>> {
     let file = open(&path)?;
@@ -39,7 +40,7 @@ pub(crate) fn lock_file(path: PathBuf) -> PyResult<Option<FileLock>> {
     Ok(Some(FileLock { file: Mutex::new(file) }))
 }
 
-/// Opens a file to lock it; `None` if it may not be created. A file of another user is opened for reading.
+/// Opens a file to lock it, for reading if it may not be written; `None` if it may not be read either.
 fn open(path: &Path) -> io::Result<Option<File>> {
     match File::options().read(true).write(true).create(true).truncate(false).open(path) {
         Err(error)

@@ -1,4 +1,4 @@
-"""What the scripts that write reference files of the crate control share: where they write, matrices as text, held inputs."""
+"""Functions of the scripts that write reference files of control: path of the file, matrices as text, held inputs."""
 
 import sys
 from pathlib import Path

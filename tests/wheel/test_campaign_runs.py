@@ -319,8 +319,8 @@ def test_of_two_commands_on_one_folder_the_second_is_refused_until_the_first_one
         before = state()
         status, out, messages = done(*words)
         assert (status, out, messages.count("\n")) == (2, "", 1)
-        assert f"another process does a campaign in the folder {folder} now: wait for its end" in messages
-        with pytest.raises(af.ConfigurationError, match="another process does a campaign"):
+        assert f"another process runs a campaign in the folder {folder}: wait for its end" in messages
+        with pytest.raises(af.ConfigurationError, match="another process runs a campaign"):
             af.campaign.Campaign.from_toml(file).run(folder, workers=1, progress=False)
         assert first.poll() is None and state() == before
         # Its workers remain; a lock that they had inherited would, too.

@@ -56,7 +56,7 @@ def test_a_folder_in_which_another_process_searches_is_refused(tmp_path):
     words = [sys.executable, "-I", "-c", text, str(tmp_path / "search")]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         other.stdout.readline()
-        with pytest.raises(af.ConfigurationError, match="another process does a campaign in the folder"):
+        with pytest.raises(af.ConfigurationError, match="another process runs a campaign in the folder"):
             study.worst_case(tmp_path / "search", "y", workers=1)
         other.communicate("\n")
     assert not list((tmp_path / "search").glob("batch-*"))

@@ -446,7 +446,7 @@ class Campaign:
 
         Raises:
             ConfigurationError: something is wrong that is known before the first run, the folder has
-                another campaign, or another process does a campaign in it.
+                another campaign, or another process runs a campaign in it.
             Error: the scheduler was lost, or the disk is full. The same call goes on.
         """
         from ._engine import execute

@@ -62,7 +62,7 @@ def locked(folder: Path) -> Iterator[None]:
     """Keep other processes from a campaign in this folder, which is created if it is missing.
 
     Raises:
-        ConfigurationError: another process does a campaign in the folder.
+        ConfigurationError: another process runs a campaign in the folder.
         ResultsError: the folder cannot be written.
     """
     try:
@@ -73,7 +73,7 @@ def locked(folder: Path) -> Iterator[None]:
         raise ResultsError(f"cannot write {folder}: {reason}", "Results", {"path": str(folder)}) from None
     if lock is None:
         raise ConfigurationError(
-            f"another process does a campaign in the folder {folder} now: wait for its end, or choose another folder"
+            f"another process runs a campaign in the folder {folder}: wait for its end, or choose another folder"
         )
     try:
         yield

@@ -131,7 +131,7 @@ def _batches(
     variant = copy.copy(campaign)
     variant.stop, variant.keep = {}, {}
     count = None if workers is None else whole("workers", plain(workers), 1)
-    # Between two batches the search has none of their folders locked.
+    # Each batch locks its folder only while it runs; this lock keeps other processes out between two batches.
     with locked(path.absolute()), Session(count, scheduler) as session:
         yield _Batches(variant, path, session, measure)
 
