@@ -21,7 +21,7 @@ pub struct OpenedLoop {
 
 #[expect(clippy::missing_errors_doc, reason = "the type says: as the functions of the same names")]
 impl OpenedLoop {
-    /// Opens `closed` at `at`.
+    /// Opens `closed` at `at`, with the errors of [`crate::response::h_infinity`].
     pub fn new(closed: &Loop, at: Point) -> Result<Self, Error> {
         let sensitivity = KnownResponse::new(closed.sensitivity(at))?.swept()?;
         // T = I - S: C of S with the opposite sign, and no D.
