@@ -195,8 +195,8 @@ impl Fmu {
         Ok(scalar.unwrap_or_else(|| description.clone()))
     }
 
-    /// Returns the library for `interface`; the library for model exchange is loaded by this call. The error of an FMU without the
-    /// interface has the name of its file, as its folder may be temporary.
+    /// Returns the library for `interface`; the library for model exchange is loaded by this call. The error of an FMU
+    /// without the interface has the name of its file, as its folder may be temporary.
     pub(crate) fn library(&self, interface: Interface) -> Result<AnyLibrary, FmuError> {
         let Content { library, unpacked, name, binding, .. } = &*self.content;
         let description = &unpacked.description;
@@ -247,7 +247,8 @@ impl Fmu {
 }
 
 /// Returns the description of an instance without integration if it is not the description of its FMU: with a scalar
-/// variable for each element of an array, whose structural parameters have the values `sizes`. On failure returns the reason.
+/// variable for each element of an array, whose structural parameters have the values `sizes`. On failure returns the
+/// reason.
 pub(crate) fn scalar_description(
     description: &ModelDescription,
     sizes: &HashMap<u32, u64>,

@@ -1,5 +1,5 @@
-//! The requests to a worker, and the call of its instance that answers each. The commands that run in every step are no requests: see
-//! `words`.
+//! The requests to a worker, and the call of its instance that answers each. The commands that run in every step are no
+//! requests: see `words`.
 
 use std::borrow::Cow;
 
