@@ -7,7 +7,8 @@ use master::{
 
 use super::until;
 
-/// A slave without equations: `values[k]` is the value of the references `k`, `k + n`, ... for `n` values.
+/// A slave without equations: `values[k]` is the value of the references `k`, `k + n`, ... for `n` values. Only the
+/// references below `n` can be set.
 pub(crate) struct Memory {
     description: ModelDescription,
     values: Vec<f64>,
@@ -18,11 +19,6 @@ impl Memory {
         let description = ModelDescription::parse(description).unwrap();
         Box::new(Self { description, values: values.to_vec() })
     }
-
-    fn value(&mut self, reference: u32) -> &mut f64 {
-        let count = self.values.len();
-        &mut self.values[reference as usize % count]
-    }
 }
 
 impl Slave for Memory {
@@ -31,13 +27,13 @@ impl Slave for Memory {
     }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         for (value, &reference) in values.iter_mut().zip(references) {
-            *value = *self.value(reference);
+            *value = self.values[reference as usize % self.values.len()];
         }
         Ok(())
     }
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
         for (&value, &reference) in values.iter().zip(references) {
-            *self.value(reference) = value;
+            self.values[reference as usize] = value;
         }
         Ok(())
     }
