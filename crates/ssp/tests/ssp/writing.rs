@@ -300,7 +300,8 @@ fn an_fmu_that_was_opened_is_written_with_all_its_files() {
     let (ssd, osp) = (bench.file("m.ssd", ssd), bench.file("m.xml", osp));
     for source in [&packed, &ssd, &osp] {
         let opened = open(source).unwrap();
-        assert!(!opened.assembly.elements[0].fmu.join("documentation").exists());
+        let folder = &opened.assembly.elements[0].fmu;
+        assert!(folder.is_dir() && !folder.join("documentation").exists());
         let again = bench.path("again.ssp");
         write(&opened.assembly, None, &again).unwrap();
         assert!(entry(&again, "resources/m.fmu") == expected, "{}", source.display());
