@@ -64,7 +64,8 @@ pub(super) const FRICTION_INITIALLY: [&str; 15] = [
     "linearised",
 ];
 
-/// What the initial accelerations depend on besides: together all except the position.
+/// Mass and damping of the cart: the initial accelerations depend on them in addition to [`FRICTION_INITIALLY`], thus on
+/// all except the position.
 pub(super) const CART: [&str; 2] = ["M", "F_x"];
 
 /// All variables, in the order of the description.
