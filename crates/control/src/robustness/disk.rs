@@ -5,7 +5,7 @@ use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::to_complex;
 use crate::response::{HInfinity, KnownResponse, norm_of};
-use crate::{Domain, Error, StateSpace};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
 pub(super) const WIDTH: f64 = 1e-4;
@@ -113,8 +113,9 @@ pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error>
 ///
 /// # Errors
 ///
-/// Same as [`crate::response::h_infinity`].
+/// Same as [`crate::response::h_infinity`]; [`Error::Shape`] for a system with other numbers of inputs and outputs.
 pub fn scaled_peak(system: &StateSpace) -> Result<ScaledPeak, Error> {
+    check::square("D", &system.d)?;
     peak_of(&KnownResponse::new(system.clone())?)
 }
 

@@ -180,6 +180,17 @@ fn disk_margins_agree_with_slicot_and_are_certified() {
     }
 }
 
+/// A change of each channel by its own factor needs as many inputs as outputs.
+#[test]
+fn a_system_that_is_not_square_has_no_scaled_peak() {
+    for (p, m) in [(2, 3), (3, 2), (1, 2)] {
+        let (a, b) = (DMatrix::from_element(1, 1, -1.0), DMatrix::from_element(1, m, 1.0));
+        let (c, d) = (DMatrix::from_element(p, 1, 1.0), DMatrix::zeros(p, m));
+        let system = StateSpace { a, b, c, d, domain: Domain::Continuous };
+        assert!(matches!(scaled_peak(&system), Err(Error::Shape { .. })), "{p} x {m}");
+    }
+}
+
 #[test]
 fn margins_of_single_channels_agree_with_python_control() {
     for case in cases(RECORDED, "loop") {
