@@ -41,11 +41,11 @@ pub(crate) fn set(
     let converted = match ValueType::of(&system.variable(port).kind) {
         ValueType::Real => value.extract().map(Value::Real),
         ValueType::Integer => value.extract().map(Value::Integer),
-        // Every text but the empty one is true, also "false".
         ValueType::Boolean if value.is_instance_of::<PyString>() => {
             Err(PyTypeError::new_err("expected True or False, found a text"))
         }
-        ValueType::Boolean => value.is_truthy().map(Value::Boolean),
+        // Any object has a truth value, also None and a list.
+        ValueType::Boolean => value.extract().map(|number: f64| Value::Boolean(number != 0.0)),
         ValueType::String => value.extract().map(Value::String),
         ValueType::Binary => value.extract().map(Value::Binary),
     };
