@@ -32,7 +32,7 @@ impl SourceFileSet {
     pub(super) fn is_cpp(&self, file: &str) -> bool {
         let extension = Path::new(file).extension().unwrap_or_default();
         match &self.language {
-            Some(language) => language.starts_with("C++"),
+            Some(language) => language.to_ascii_uppercase().starts_with("C++"),
             None => ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known)),
         }
     }
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_stated_language_is_that_of_every_file() {
-        for (language, is_cpp) in [("C99", false), ("C++11", true)] {
+        for (language, is_cpp) in [("C99", false), ("C++11", true), ("c++11", true)] {
             let language = Some(language.to_owned());
             let set = SourceFileSet { language, ..SourceFileSet::default() };
             assert_eq!(["solver.c", "model.cpp"].map(|file| set.is_cpp(file)), [is_cpp; 2]);
