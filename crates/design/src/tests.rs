@@ -600,6 +600,22 @@ fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
     assert_eq!(message, "plant.toml:5:11: fault `leak` cannot be seen from the measurements y1");
 }
 
+/// The fault acts on the measurement with the gain 1 at rest; W has hardly any noise for the second state, whose mode
+/// the observer therefore leaves at -0.01.
+#[test]
+fn a_warning_of_slow_estimates_names_w() {
+    let text = "A = [[-1, 0], [0, -0.01]]\nB = [[1, 0], [0, 1]]\nC = [[1, 1]]\n\
+                [[faults]]\nname = \"f\"\nactuator = \"u1\"\n\
+                [feedback]\neigenvalues = [-1, -2]\n[observer]\nW = [1, 1e-8, 1]\nV = [1]\n";
+    let warning = |file: &PlantFile<'_>| {
+        let designed = design(file).unwrap();
+        crate::assess::slow_estimates::warning(file, &designed.nominal).unwrap()
+    };
+    let warning = read(text, warning).unwrap().unwrap();
+    let time = warning.split(' ').nth(4).unwrap().parse::<f64>().unwrap();
+    assert!((time - 400.0).abs() < 0.1 && warning.contains("or a larger W"), "{warning}");
+}
+
 /// The level and the reasons of a plant file.
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {

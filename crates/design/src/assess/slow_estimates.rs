@@ -15,7 +15,8 @@ const SLOW: f64 = 0.05;
 const SETTLED: f64 = 4.0;
 
 /// Returns a warning if the slowest mode of the observer is much slower than that of the feedback: a combination of
-/// faults hardly acts on the measurements. Only observers by weights or by a bandwidth are examined.
+/// states and faults hardly acts on the measurements, or has little noise in W. Only observers by weights or by a
+/// bandwidth are examined.
 pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Option<String>, Error> {
     let requirement = &file.observer.requirement;
     if !matches!(requirement, Requirement::Bandwidth(_) | Requirement::Weights { .. }) {
@@ -29,12 +30,14 @@ pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Optio
     }
     let faults = &solution.linear.faults;
     let names = joined(faults.iter().map(|fault| fault.name.as_str()));
-    let cause = match faults.len() {
-        1 => format!("{names} hardly acts on the measurements if it is constant"),
-        _ => format!("a constant combination of {names} hardly acts on the measurements"),
+    let [cause, remedy] = match requirement {
+        Requirement::Weights { .. } => [", or has little noise in W", ", or a larger W"],
+        _ => [""; 2],
     };
     Ok(Some(format!(
-        "the estimates settle in {} s, the feedback in {} s: {cause}; expected fewer faults or another measurement",
+        "the estimates settle in {} s, the feedback in {} s: a combination of the states and \
+         {names} hardly acts on the measurements{cause}; expected fewer faults or another \
+         measurement{remedy}",
         rounded(SETTLED / observer),
         rounded(SETTLED / feedback)
     )))
