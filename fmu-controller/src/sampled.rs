@@ -95,14 +95,14 @@ impl Sampler {
         self.start + self.next * self.period
     }
 
-    /// The instant in s of the next sample, at most `end`; `None` if it is not due until `end`.
+    /// The instant in s of the next sample, at most `end`; `None` if it is due after `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.next_instant();
         (next <= end + TOLERANCE * self.period).then_some(next.min(end))
     }
 
-    /// The time in s from `start` to the next sample, negative if the sample was due before; `None` if it is not due
-    /// until `end`.
+    /// The time in s from `start` to the next sample, negative if the sample was due before; `None` if it is due
+    /// after `end`.
     pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
         let elapsed = self.next * self.period;
         let due = elapsed <= end - self.start + TOLERANCE * self.period;
