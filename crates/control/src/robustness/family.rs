@@ -21,8 +21,8 @@ pub trait PlantFamily {
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples of
-    /// the controller.
+    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or sampled at
+    /// the sample time of the controller.
     ///
     /// # Errors
     ///
