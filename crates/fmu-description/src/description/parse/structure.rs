@@ -13,7 +13,7 @@ pub(super) const ANYTHING: &str = "read as depending on anything";
 /// anything, and a row with such an index is skipped. Outputs that are missing from `Outputs` are read as
 /// depending on anything. Such an index of a row in `Derivatives` is an error.
 pub(super) fn read(root: Node<'_>, variables: &[ScalarVariable]) -> Result<ModelStructure> {
-    let Some(element) = child(root)? else {
+    let Some(element) = model_structure(root)? else {
         let missing = missing_outputs(&[], variables).map(|(row, _)| row);
         return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
     };
@@ -29,7 +29,7 @@ pub(super) fn read(root: Node<'_>, variables: &[ScalarVariable]) -> Result<Model
 }
 
 /// Returns the element `ModelStructure`, or warns that there is none.
-pub(super) fn child(root: Node<'_>) -> Result<Option<Node<'_>>> {
+pub(super) fn model_structure(root: Node<'_>) -> Result<Option<Node<'_>>> {
     let element = root.optional_child("ModelStructure")?;
     if element.is_none() {
         let place = "<fmiModelDescription>".to_owned();

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::variables::{A_REFERENCE, References};
 use crate::description::parse::attributes::{Node, Result};
 use crate::description::parse::structure::{
-    ANYTHING, add_outputs, child, kinds, missing_outputs, words,
+    ANYTHING, add_outputs, kinds, missing_outputs, model_structure, words,
 };
 use crate::description::{ModelStructure, ScalarVariable, Unknown};
 
@@ -19,7 +19,7 @@ pub(super) fn read(
     variables: &[ScalarVariable],
     references: &References,
 ) -> Result<ModelStructure> {
-    let Some(element) = child(root)? else {
+    let Some(element) = model_structure(root)? else {
         let missing = missing(&[], variables, references).map(|(row, _)| row);
         return Ok(ModelStructure { outputs: missing.collect(), ..ModelStructure::default() });
     };
