@@ -12,7 +12,7 @@ mod typed;
 
 use crate::model::{Failure, Model};
 use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
-use describe::{describe_aliases, describe_variables, keep_derivative};
+use describe::{describe_aliases, describe_variables, replace_type};
 use fmu_description::call_order::{InterfaceType, settable};
 use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
@@ -146,7 +146,7 @@ impl<M: Model> Interface<M> {
                 .assign_reference(model, variable, fields)
                 .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
             let variable = &mut description.variables[position + 1];
-            keep_derivative(&mut variable.kind, kind);
+            replace_type(&mut variable.kind, kind);
             variable.value_reference = value_reference;
         }
         describe_aliases(aliases, description);

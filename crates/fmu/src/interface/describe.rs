@@ -138,15 +138,15 @@ pub(super) fn describe_aliases(aliases: Vec<(usize, String)>, description: &mut 
         if alias.variability != Variability::Constant {
             kind.clear_start();
         }
-        keep_derivative(&mut alias.kind, kind);
+        replace_type(&mut alias.kind, kind);
         alias.value_reference = value_reference;
     }
 }
 
 /// Replaces the type but keeps the attribute `derivative`, which is set before the type.
-pub(super) fn keep_derivative(place: &mut Kind, mut kind: Kind) {
-    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
+pub(super) fn replace_type(current: &mut Kind, mut kind: Kind) {
+    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*current, &mut kind) {
         new.derivative = *derivative;
     }
-    *place = kind;
+    *current = kind;
 }
