@@ -20,7 +20,7 @@ pub(crate) const INT64: u32 = 1 << 31;
 pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) kind: NativeType,
-    /// The value reference of FMI 2.0 of the first element; the others follow.
+    /// The value reference of FMI 2.0 of the first element, with the mark of its place, if any; the others follow.
     first: u32,
     /// Number of elements.
     count: u32,
