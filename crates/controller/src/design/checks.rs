@@ -172,7 +172,7 @@ impl Design {
         None
     }
 
-    /// Describes the first entry that is missing, not allowed, or without its counterpart.
+    /// Describes the first entry that is missing, not allowed, or does not fit the others.
     fn contradiction(&self) -> Option<String> {
         let lists = [
             (self.states.len(), "state"),
@@ -184,7 +184,8 @@ impl Design {
             return Some(format!("at least one {name} is needed"));
         }
         if self.actuators.len() > 64 {
-            return Some("more than 64 actuators".to_owned());
+            let count = self.actuators.len();
+            return Some(format!("found {count} actuators, expected at most 64"));
         }
         match (self.sample_time, self.estimator, self.experiment.step_size) {
             (Some(_), None, _) => {
@@ -272,7 +273,7 @@ impl Design {
             } else if case.loss.is_some() != case.time.is_some() || limit.is_some() && !lost {
                 "loss and time belong together, and to a fault with loss_of"
             } else if limit.is_some_and(|(loss, time)| !(loss > 0.0 && (0.0..1e9).contains(&time))) {
-                "expected a loss above 0 and a time of at least 0 s"
+                "expected a loss above 0 and a time of at least 0 s and below 1e9 s"
             } else {
                 return None;
             };
