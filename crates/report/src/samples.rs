@@ -22,7 +22,7 @@ pub(crate) struct Collector {
     block: Samples,
     /// Number of rows of a block; all rows remain if it is 1.
     length: usize,
-    /// Whether the second half of the columns is subtracted from the first one.
+    /// Whether the columns are pairs, each of one of the first half and one of the second half.
     is_paired: bool,
     /// Whether the present block is the last one.
     is_last: bool,
