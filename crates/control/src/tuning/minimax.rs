@@ -57,8 +57,8 @@ pub(super) fn direction(cuts: &[Cut], inverse: &DMatrix<f64>) -> Direction {
     Direction { step, multipliers: multipliers.iter().copied().collect(), decrease }
 }
 
-/// Updates the inverse Hessian matrix for a step and the change of the gradient (BFGS); leaves it without positive
-/// curvature.
+/// Updates the inverse Hessian matrix for a step and the change of the gradient (BFGS); no update if the curvature
+/// along the step is not positive.
 pub(super) fn update(inverse: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<f64>) {
     let curvature = step.dot(change);
     if curvature <= 1e-10 * step.norm() * change.norm() {
