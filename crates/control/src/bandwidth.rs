@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Factor by which the weight changes while the bandwidth is not yet enclosed.
 const STRIDE: f64 = 100.0;
-/// Number of strides after which a loop gain counts as out of reach.
+/// Number of strides after which a loop gain of one counts as out of reach.
 const STRIDES: usize = 6;
 /// Largest distance of the loop gain from one.
 const ACCURACY: f64 = 1e-6;
