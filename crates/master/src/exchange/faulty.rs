@@ -5,7 +5,7 @@ use crate::fault::FaultChain;
 use crate::system::Port;
 
 impl Reals {
-    /// Puts a fault on the connection to an input; returns false if the input has no connection.
+    /// Puts a fault on the connection to an input; returns false if no connection of Reals leads there.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
         let Some(k) = self.layout.input_ports.iter().position(|&port| port == input) else {
             return false;
