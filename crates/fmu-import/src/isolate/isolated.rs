@@ -383,7 +383,7 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
     }
 }
 
-/// A function that returns the description of an integrated instance from the description of the instance.
+/// Converts the description of an instance for model exchange to that of the slave that integrates it.
 pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 
 /// Returns the number of variables that the shared memory is made for. Pages that no call needs take no memory.
