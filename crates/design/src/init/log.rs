@@ -27,7 +27,8 @@ pub struct LogOptions {
     /// The columns that are measurements; empty for all columns besides stated inputs or, without stated inputs, for
     /// those called `y`, `y1` and so on.
     pub outputs: Vec<String>,
-    /// The number of states; None for the smallest one that predicts the last quarter of the logs about best.
+    /// The number of states; None for the smallest one that predicts the last quarter of the logs nearly as well as
+    /// the best one.
     pub order: Option<usize>,
 }
 
