@@ -31,7 +31,7 @@ pub enum EntryPoint {
     Loss {
         /// The actuator, from 0.
         actuator: usize,
-        /// The command, in its unit, below which no loss is estimated.
+        /// The command, in its unit, at which the estimate is half of the loss.
         least_command: f64,
     },
     /// An input of the plant's FMU.
@@ -198,7 +198,7 @@ fn entry_point(
     }
     if let Some(actuator) = table.get("loss_of") {
         let at = position(&actuator, actuators, "actuator")?;
-        let meaning = "the command, in its unit, below which no loss of effectiveness is estimated";
+        let meaning = "the command, in its unit, at which the estimate is half of the loss";
         let least_command = table.require("least_command", meaning)?.positive()?;
         return Ok(EntryPoint::Loss { actuator: at, least_command });
     }

@@ -18,7 +18,7 @@ pub struct Loss {
     pub fault: usize,
     /// The position of the actuator.
     pub actuator: usize,
-    /// u_e, the smallest command from which the loss can be estimated.
+    /// u_e, the command at which the estimate is half of the loss; it tends to the loss for larger commands.
     pub least_command: f64,
 }
 
@@ -80,7 +80,7 @@ signals! {
     Fault {
         /// The actuator whose loss of effectiveness this fault is.
         loss_of: Option<String>,
-        /// The smallest command from which the loss can be estimated.
+        /// The command at which the estimate is half of the loss; see [`Loss::least_command`].
         least_command: Option<f64>,
     }
 }
