@@ -230,8 +230,8 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         );
     }
 
-    /// Compares each statistic with its threshold, notes alarms, and decides. `None`: the window of the test is not
-    /// complete.
+    /// Compares each statistic with its threshold, notes alarms, and decides. `statistics`: for each test its statistic
+    /// and its estimate of the sample of the onset; `None` while the window of the test is not complete.
     #[inline(always)]
     fn compare(&mut self, sample: u32, statistics: impl Iterator<Item = Option<(N, u32)>>) {
         let outcomes = self.statistic.iter_mut().zip(self.alarmed.iter_mut()).zip(self.threshold);
