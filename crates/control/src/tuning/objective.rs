@@ -183,7 +183,7 @@ impl ClosedLoop {
     }
 }
 
-/// The largest singular value; None if an entry is not finite.
+/// The largest singular value; None if it cannot be computed, as for an entry that is not finite.
 fn norm(x: &ComplexMatrix) -> Option<f64> {
     if x.ncols() == 1 || x.nrows() == 1 {
         return Some(x.norm()).filter(|value| value.is_finite());
