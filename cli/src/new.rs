@@ -119,7 +119,7 @@ fn is_fmu(folder: &Path) -> bool {
 
 /// Writes the files into a temporary folder next to `target` and then renames it. Creates the parent folders.
 fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
-    // The components are without a slash at the end, after which the temporary folder would be inside of the target.
+    // Drops a slash at the end, after which the temporary folder would be inside of the target.
     let target: PathBuf = std::path::absolute(target)?.components().collect();
     let mut partial = target.clone().into_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
