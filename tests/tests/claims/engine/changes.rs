@@ -159,6 +159,16 @@ fn a_fault_without_a_connection_leaves_all_faults_as_they_are() {
 }
 
 #[test]
+fn a_second_chain_of_faults_of_one_input_is_named() {
+    let mut simulation = simulation(FIRST, &Algorithm::new(0.01));
+    let mut scenario = resolve(FIRST, simulation.system(), 0.01);
+    let chain = scenario.faults[0].clone();
+    scenario.faults.push(chain);
+    let error = simulation.change_scenario(scenario).unwrap_err().to_string();
+    assert!(error.contains("b.u0 has two chains of faults"), "{error}");
+}
+
+#[test]
 fn there_is_no_next_change_in_the_last_step() {
     let mut simulation = simulation(FIRST, &Algorithm::new(0.25));
     let mut actual = Vec::new();
