@@ -213,11 +213,11 @@ impl Unpacked {
         }
     }
 
-    /// Whether the FMU has source code, in `sources`.
+    /// Whether the FMU has source code: a file in `sources`.
     #[must_use]
     pub fn has_sources(&self) -> bool {
-        self.names.iter().any(|name| name.starts_with("sources/"))
-            || self.folder().join("sources").is_dir()
+        self.names.iter().any(|name| name.starts_with("sources/") && !name.ends_with('/'))
+            || below(&self.folder().join("sources")).next().is_some()
     }
 
     /// The paths of the files in the folders of platforms in `binaries`, in upper or lower case; sorted, at most 20.

@@ -293,6 +293,22 @@ fn of_several_entries_with_one_name_the_last_is_used_with_a_warning() {
 }
 
 #[test]
+fn an_empty_folder_sources_is_no_source_code() {
+    let description = (DESCRIPTION, XML, 0o100_644);
+    let code = raw::archive(&[description, ("sources/a.c", "", 0o100_644)]);
+    assert!(opened(&code).unwrap().has_sources());
+    let empty = opened(&raw::archive(&[description, ("sources/", "", 0o40_755)])).unwrap();
+    assert!(!empty.has_sources());
+    let error = empty.library("M").unwrap_err().to_string();
+    assert!(!error.contains("source code"), "{error}");
+    let sources = empty.folder().join("sources");
+    fs::create_dir_all(&sources).unwrap();
+    assert!(!Unpacked::in_folder(empty.folder()).unwrap().has_sources());
+    fs::write(sources.join("a.c"), "").unwrap();
+    assert!(Unpacked::in_folder(empty.folder()).unwrap().has_sources());
+}
+
+#[test]
 fn files_that_are_no_fmus_are_refused_with_the_reason() {
     let absent = Unpacked::open(Path::new("/nowhere/M.fmu")).unwrap_err();
     assert!(matches!(absent, PackageError::File { action: "open", .. }), "{absent}");
