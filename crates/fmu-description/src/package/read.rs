@@ -71,7 +71,7 @@ impl Unpacked {
         if !archive.names().iter().any(|name| name == DESCRIPTION) {
             return Err(missing(archive.names()));
         }
-        let temporary = folder()?;
+        let temporary = temporary_folder()?;
         archive.unpack(temporary.path(), is_needed)?;
         let (mut description, warnings) = describe(temporary.path(), path)?;
         let mut archive_warnings = archive.warnings();
@@ -286,12 +286,12 @@ fn is_platform(folder: &str) -> bool {
 /// Same as [`Unpacked::open`], but the archive needs no `modelDescription.xml`.
 pub fn unpack_archive(path: &Path) -> Result<(TemporaryFolder, Vec<String>), PackageError> {
     let mut archive = Archive::open(path)?;
-    let folder = folder()?;
+    let folder = temporary_folder()?;
     archive.unpack(folder.path(), |_| true)?;
     Ok((folder, archive.warnings()))
 }
 
-fn folder() -> Result<TemporaryFolder, PackageError> {
+fn temporary_folder() -> Result<TemporaryFolder, PackageError> {
     TemporaryFolder::new().map_err(file_error("create a folder in", std::env::temp_dir()))
 }
 
