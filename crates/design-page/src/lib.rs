@@ -184,7 +184,7 @@ fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
     all.into_iter().filter_map(section).collect()
 }
 
-/// The content of a section about a list; none if that is empty.
+/// Returns the content of a section about a list; `None` if the list is empty.
 fn any<T>(list: &[T], content: impl FnOnce() -> Markup) -> Option<Markup> {
     (!list.is_empty()).then(content)
 }
