@@ -219,10 +219,15 @@ def constant(name):
     return change
 
 
+def late(signals):
+    signals["u2"] = np.where(np.arange(400) < 300, 2.5, 3.0)
+
+
 REFUSED = {
     "gap": (gap, [], "row 101 (6 s): expected the next sample after 0.05"),
     "hole": (hole, [], "row 42 (2.05 s), y2: expected a number, found NaN"),
     "command": (constant("u2"), [], "command u2 is 2.5 throughout"),
+    "late command": (late, [], "command u2 is 2.5 throughout the first three quarters of the log"),
     "measurement": (constant("y1"), [], "measurement y1 is 2.5 throughout"),
     "short": (lambda signals: {name: column[:60] for name, column in signals.items()}, [], "at least 100 rows, found 60"),
     "unknown": (lambda signals: None, ["--inputs", "u1,v"], "there is no column v; expected one of u1, u2, y1, y2"),

@@ -11,7 +11,7 @@ use plant_file::signals::Signal;
 
 /// The fewest samples of a log.
 const SAMPLES: usize = 100;
-/// Changes below this part of the mean are rounding.
+/// Changes below this part of the value are rounding.
 const CONSTANT: f64 = 1e-12;
 /// Singular values of the inputs below this part of the largest do not excite the plant.
 const EXCITATION: f64 = 1e-4;
@@ -36,13 +36,15 @@ pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
     let commands = constant_signal(inputs, logs, |log| &log.record.inputs);
     if let Some((name, value)) = commands {
         return Err(format!(
-            "command {name} is {value} throughout; expected a log in which it changes: its effect cannot be identified"
+            "command {name} is {value} throughout the first three quarters of the log, which estimate the plant; \
+             expected a log in which it changes there: its effect cannot be identified"
         ));
     }
     let measurements = constant_signal(outputs, logs, |log| &log.record.outputs);
     if let Some((name, value)) = measurements {
         return Err(format!(
-            "measurement {name} is {value} throughout; expected a log in which it moves, or --outputs without it"
+            "measurement {name} is {value} throughout the first three quarters of the log, which estimate the plant; \
+             expected a log in which it moves there, or --outputs without it"
         ));
     }
     Ok(())
