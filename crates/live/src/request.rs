@@ -61,7 +61,7 @@ pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<HttpRequ
     Ok(request)
 }
 
-/// Appends the bytes that arrive next, if any; a refusal after `deadline`, `None` if the connection is closed.
+/// Appends the bytes that arrive next, if any. Refuses after `deadline`; the error is `None` if the connection ends.
 fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
     let late = Some((408, "the request took too long"));
     let left = deadline.saturating_duration_since(Instant::now());
