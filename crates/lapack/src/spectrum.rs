@@ -35,12 +35,13 @@ pub(crate) fn symmetric_eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix
 /// without a rotation.
 fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) -> bool {
     let coupling = m[(p, q)];
-    let scale = m[(p, p)].abs() + m[(q, q)].abs();
-    if coupling.abs() <= f64::EPSILON * scale {
+    // Neither sum nor difference of the diagonal overflows in these forms.
+    let negligible = f64::EPSILON * m[(p, p)].abs() + f64::EPSILON * m[(q, q)].abs();
+    if coupling.abs() <= negligible {
         (m[(p, q)], m[(q, p)]) = (0.0, 0.0);
         return false;
     }
-    let theta = (m[(q, q)] - m[(p, p)]) / (2.0 * coupling);
+    let theta = (0.5 * m[(q, q)] - 0.5 * m[(p, p)]) / coupling;
     let tangent = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
     let c = 1.0 / tangent.hypot(1.0);
     let s = c * tangent;

@@ -106,6 +106,23 @@ fn syevr_finds_the_eigenvalues_of_the_second_difference() {
     }
 }
 
+/// The eigenvalues of [[a, b], [b, a]] are a - |b| and a + |b|, those of [[15, 8], [8, -15]] are -17 and 17.
+#[test]
+fn syevr_finds_eigenvalues_below_the_largest_number() {
+    for ([a, b, d], expected) in [
+        ([1e308, 5e307, 1e308], [5e307, 1.5e308]),
+        ([-1e308, 5e307, -1e308], [-1.5e308, -5e307]),
+        ([5e307, -1e308, 5e307], [-5e307, 1.5e308]),
+        ([1.5e308, 8e307, -1.5e308], [-1.7e308, 1.7e308]),
+    ] {
+        let actual = syevr(b'V', b'U', &DMatrix::from_row_slice(2, 2, &[a, b, b, d]));
+        for (value, expected) in actual.values.iter().zip(expected) {
+            assert!((value / expected - 1.0).abs() < 1e-14, "{value:e} {expected:e}");
+        }
+        assert_orthonormal(&matrix(2, 2, 1, &actual.vectors));
+    }
+}
+
 #[test]
 fn syevr_of_entries_that_are_not_finite_ends_with_nothing_finite() {
     let mut a = symmetric(4, 26);
