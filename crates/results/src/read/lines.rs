@@ -113,6 +113,7 @@ fn unit(cell: &[u8]) -> String {
     text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']).trim().to_owned()
 }
 
+/// Calls the visitor for each row, as [`super::Table::visit`] says; the time is the first of `positions`.
 pub(super) fn visit(
     path: &Path,
     layout: &Layout,
