@@ -86,7 +86,7 @@ pub enum Outcome<T, C = &'static str> {
 }
 
 impl<T, C> Outcome<T, C> {
-    /// The solution, if there is one.
+    /// The solution, if one was found.
     pub fn optimal(self) -> Option<T> {
         match self {
             Self::Optimal(answer) => Some(answer),
