@@ -115,8 +115,11 @@ fn sizes(a: &DMatrix<f64>, b: &DMatrix<f64>, output: &DMatrix<f64>) -> Result<[u
 /// Scales rows and columns to about length one.
 fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
     let mut m = m.clone();
+    let unit = |length: f64| if length.is_normal() { 1.0 / length } else { 1.0 };
+    // By the largest entries first: then no square in a length overflows or vanishes.
+    m.row_iter_mut().for_each(|mut row| row *= unit(row.amax()));
+    m.column_iter_mut().for_each(|mut column| column *= unit(column.amax()));
     for _ in 0..SWEEPS {
-        let unit = |length: f64| if length > 0.0 { 1.0 / length } else { 1.0 };
         m.row_iter_mut().for_each(|mut row| row *= unit(row.norm()));
         m.column_iter_mut().for_each(|mut column| column *= unit(column.norm()));
     }

@@ -345,7 +345,11 @@ fn constant_references_need_commands_independent_outputs_and_no_zero_at_the_orig
     let [a, b] = [matrix(2, &[0.0, 1e-6, -2e6, -3.0]), matrix(2, &[0.0, 1e6])];
     let zero = tracking_rank(&a, &b, &matrix(1, &[0.0, 1e-6])).unwrap();
     assert_eq!((zero.rank, zero.expected, zero.outputs), (2, 3, 1));
-    assert!(tracking_rank(&a, &b, &matrix(1, &[1.0, 0.0])).unwrap().is_full());
+    // In any unit of the measurement.
+    for unit in [1e-200, 1.0, 1e200] {
+        let full = tracking_rank(&a, &b, &matrix(1, &[unit, 0.0])).unwrap();
+        assert_eq!((full.rank, full.outputs), (3, 1), "{unit:e}");
+    }
 }
 
 #[test]
