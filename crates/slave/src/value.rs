@@ -177,6 +177,7 @@ impl fmt::Display for Value {
     }
 }
 
+/// Reads an integer, or the name of an item of the declared type.
 fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<Value, String> {
     if let Ok(number) = text.parse() {
         return Ok(Value::Integer(number));
@@ -186,6 +187,9 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
     if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
         return Ok(Value::Integer(*number));
     }
+    if items.is_empty() {
+        return Err("an integer".to_owned());
+    }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))
 }
@@ -193,6 +197,14 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
 #[cfg(test)]
 mod tests {
     use super::Value;
+    use fmu_description::{IntegerType, Kind};
+
+    #[test]
+    fn an_enumeration_without_items_expects_an_integer() {
+        let kind = Kind::Enumeration(IntegerType::default());
+        assert_eq!(Value::parse(&kind, &[], "7"), Ok(Value::Integer(7)));
+        assert_eq!(Value::parse(&kind, &[], "on"), Err("an integer".to_owned()));
+    }
 
     #[test]
     fn an_infinite_real_is_near_itself_only() {
