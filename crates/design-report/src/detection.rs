@@ -81,11 +81,11 @@ pub struct Test {
     pub threshold: f64,
     /// Predicted mean time between its false alarms, in s.
     pub false_alarm_interval: f64,
-    /// The disturbances and the other faults that do not act on it.
+    /// The disturbances and the other faults from which it is decoupled.
     pub decoupled: Vec<DecoupledInput>,
 }
 
-/// An unknown input that a test does not react to.
+/// An unknown input from which a test is decoupled: a constant one does not act on its residuals in steady state.
 #[derive(Serialize, JsonSchema)]
 pub struct DecoupledInput {
     /// Its name.
