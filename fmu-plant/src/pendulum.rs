@@ -15,7 +15,7 @@ use crate::response::Response;
 
 mod variables;
 
-/// Inverted pendulum on a cart with Stribeck friction; fields without a comment have the name of their variable.
+/// Inverted pendulum on a cart with Stribeck friction; `u`, `f_a`, `f_fric` and `regime` are variables of the FMU.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct FrictionPendulum {
     parameters: Parameters,
