@@ -44,9 +44,9 @@ struct Map {
     deviations: DMatrix<f64>,
 }
 
-/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]].
+/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]], both at the start of the
+/// record.
 struct Discrete {
-    /// The coefficients at the start of the record.
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
     /// The coefficients of the powers of time, for `change` and for `outputs`; no columns without drift.
