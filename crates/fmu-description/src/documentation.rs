@@ -257,7 +257,7 @@ macro_rules! show_attributes {
     };
 }
 
-/// The flags of both interfaces in FMI 3.0.
+/// The last flags of model exchange and of co-simulation in FMI 3.0.
 macro_rules! common_3 {
     ($flags:ident) => {
         show_attributes! { ($flags)
