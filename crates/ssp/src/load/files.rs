@@ -24,7 +24,7 @@ const CAPACITY: u64 = 64 << 20;
 pub(super) enum Missing {
     /// The reference is wrong; the sentence belongs to the position of the reference.
     Reference(String),
-    /// The target is wrong.
+    /// The target cannot be read, or its content is wrong; the error names it.
     Content(SspError),
 }
 
