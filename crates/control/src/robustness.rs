@@ -88,18 +88,21 @@ pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> 
         }
         Domain::Sampled { .. } => (plant.a.clone(), plant.b.clone()),
     };
-    let domain = Domain::Sampled { period };
-    if plant.d.amax() <= 0.0 {
-        return Ok(StateSpace { a, b, domain, ..plant.clone() });
-    }
+    let held = StateSpace { a, b, domain: Domain::Sampled { period }, ..plant.clone() };
+    Ok(if plant.d.amax() <= 0.0 { held } else { with_previous_command(held) })
+}
+
+/// The sampled plant whose D acts on the previous command v, a further state: the state is [x; v], D becomes zero.
+fn with_previous_command(plant: StateSpace) -> StateSpace {
+    let StateSpace { a, b, c, d, domain } = plant;
     let (n, m) = b.shape();
-    Ok(StateSpace {
+    StateSpace {
         a: a.resize(n + m, n + m, 0.0),
         b: stacked(&b, &DMatrix::identity(m, m)),
-        c: beside(&plant.c, &plant.d),
-        d: DMatrix::zeros(plant.c.nrows(), m),
+        c: beside(&c, &d),
+        d: DMatrix::zeros(c.nrows(), m),
         domain,
-    })
+    }
 }
 
 /// The loop y = G u, u = K y of a plant G and a controller K, of which one is strictly proper.

@@ -1,7 +1,7 @@
 //! The effect of single entries of the plant's matrices on a peak of S.
 
 use super::scaling::scaled_norm;
-use super::{Loop, Point, held_plant};
+use super::{Loop, Point, held_plant, with_previous_command};
 use crate::blocks::{ComplexMatrix, beside, block_2x2, to_complex};
 use crate::exponential::exponential;
 use crate::svd::ComplexSvd;
@@ -63,13 +63,18 @@ pub fn peak_derivatives(
     controller: &StateSpace,
     peak: &SensitivityPeak,
 ) -> Result<PeakDerivatives, Error> {
+    plant.check()?;
+    let (n, m) = plant.b.shape();
     let model = match controller.domain {
         Domain::Continuous => plant.clone(),
-        Domain::Sampled { period } => held_plant(plant, period)?,
+        Domain::Sampled { period } => {
+            let held = held_plant(plant, period)?;
+            // Entries of D that are zero would act on the previous command, too.
+            if held.a.nrows() > n { held } else { with_previous_command(held) }
+        }
     };
     let closed = Loop::new(model, controller.clone())?;
     let mut derivatives = closed.derivatives(peak)?;
-    let (n, m) = plant.b.shape();
     derivatives.a = derivatives.a.view((0, 0), (n, n)).into();
     derivatives.b = derivatives.b.rows(0, n).into();
     if derivatives.c.ncols() > n {

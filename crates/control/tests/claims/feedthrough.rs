@@ -132,20 +132,23 @@ fn a_controller_takes_its_own_commands_off_the_measurements() {
 
 #[test]
 fn derivatives_of_the_peak_are_differences() {
-    for domain in [Domain::Continuous, SAMPLED] {
-        let controller_system = controller(domain);
+    let strict = StateSpace { d: DMatrix::zeros(2, 2), ..plant() };
+    let cases = [Domain::Continuous, SAMPLED]
+        .map(|domain| [plant(), strict.clone()].map(|plant| (domain, plant)));
+    for (domain, plant) in cases.iter().flatten() {
+        let controller_system = controller(*domain);
         for (point, scaled) in [(Point::Input, false), (Point::Output, true)] {
             let peak = SensitivityPeak { point, frequency: 2.3, scaled };
             let value = |plant: &StateSpace| {
                 peak_derivatives(plant, &controller_system, &peak).expect("a value")
             };
-            let computed = value(&plant());
+            let computed = value(plant);
             for (which, slopes) in
                 [&computed.a, &computed.b, &computed.c, &computed.d].into_iter().enumerate()
             {
                 for at in 0..slopes.len() {
                     let moved = |change: f64| {
-                        let mut plant = plant();
+                        let mut plant = plant.clone();
                         let StateSpace { a, b, c, d, .. } = &mut plant;
                         let matrices = [a, b, c, d];
                         matrices.into_iter().nth(which).expect("four")[at] += change;
