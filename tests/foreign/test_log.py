@@ -275,6 +275,17 @@ def test_logs_of_different_columns_are_refused(aso_ftc, tmp_path):
         assert done.returncode == 2 and message in done.stderr, done.stderr
 
 
+def test_logs_in_different_units_are_refused(aso_ftc, tmp_path):
+    signals = columns(*log(TANKS, rows=400, noise=0.02))
+    paths = [
+        write(tmp_path / f"{unit}.csv", {f"y2 [{unit}]" if name == "y2" else name: signals[name] for name in signals})
+        for unit in ("m", "mm")
+    ]
+    done = aso_ftc("design", "--init", *paths, "--out", tmp_path / "plant.toml")
+    message = "mm.csv: expected y2 in m as in the first log, found mm"
+    assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
 def test_logs_of_different_sample_times_are_refused(aso_ftc, tmp_path):
     times, u, y = log(TANKS, rows=400, noise=0.02)
     paths = [write(tmp_path / "one.csv", columns(times, u, y)), write(tmp_path / "two.csv", columns(2 * times, u, y))]

@@ -44,7 +44,7 @@ impl LogOptions {
     }
 }
 
-/// Identifies the plant. Logs after the first one must have the same columns and sample time.
+/// Identifies the plant. Logs after the first one must have the same columns, units and sample time.
 pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Error> {
     let logs = read::logs(paths, options)?;
     let names: Vec<_> = paths.iter().map(|path| shown(path)).collect();

@@ -39,7 +39,7 @@ pub(in crate::init) fn is_log(path: &Path, ending: &str) -> bool {
     }
 }
 
-/// Reads all logs; an error if one has other columns or another sample time than the first.
+/// Reads all logs; an error if one has other columns or units, or another sample time, than the first.
 pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, Error> {
     let mut logs: Vec<Log> = Vec::new();
     for path in paths {
@@ -52,6 +52,15 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
                 return Err(invalid(format!(
                     "expected the columns {expected} as in the first log, found {names}; the same columns in the same \
                      order are needed, or --inputs and --outputs"
+                )));
+            }
+            let conflict = first.signals().zip(log.signals()).find_map(|(signal, other)| {
+                let (expected, unit) = (signal.unit.as_ref()?, other.unit.as_ref()?);
+                (unit != expected).then_some((&signal.name, expected, unit))
+            });
+            if let Some((name, expected, unit)) = conflict {
+                return Err(invalid(format!(
+                    "expected {name} in {expected} as in the first log, found {unit}; convert one of them"
                 )));
             }
             let (expected, period) = (first.period, log.period);
@@ -67,10 +76,13 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
 }
 
 impl Log {
-    /// Returns the names of the commands, then of the measurements.
+    /// Returns the commands, then the measurements.
+    fn signals(&self) -> impl Iterator<Item = &Signal> {
+        self.inputs.iter().chain(&self.outputs)
+    }
+
     fn names(&self) -> String {
-        let names = self.inputs.iter().chain(&self.outputs).map(|signal| signal.name.as_str());
-        names.collect::<Vec<_>>().join(", ")
+        self.signals().map(|signal| signal.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     fn read(table: &Table, options: &LogOptions) -> Result<Self, String> {
