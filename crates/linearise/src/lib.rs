@@ -202,7 +202,10 @@ fn by_derivatives(
     initialise(&mut component, parts, request)?;
     let rates: Vec<Part> = states
         .iter()
-        .map(|state| Part { reference: state.derivative, ..state.part.clone() })
+        .map(|state| {
+            let name = format!("der({})", state.part.name);
+            Part { name, reference: state.derivative, ..state.part.clone() }
+        })
         .collect();
     let raw = RawResult {
         states: states.iter().map(|state| state.part.clone()).collect(),

@@ -413,6 +413,17 @@ fn names_and_values_that_do_not_fit_are_refused_with_a_reason() {
     });
 }
 
+/// With pump = 1e308, (pump - flow) / lag is infinite, while all states, inputs and outputs are finite.
+#[test]
+fn a_derivative_that_is_not_finite_is_named_in_both_interfaces() {
+    let simulation = changed("DrainedTank.fmu", |xml| without("ModelExchange", xml));
+    for fmu in [open("DrainedTank.fmu"), simulation] {
+        expect_refusal(&fmu, &["der(flow) is inf, expected a finite number"], |request| {
+            request.at = at(&[("pump", "1e308"), ("lag", "0.001")]);
+        });
+    }
+}
+
 #[test]
 fn without_a_step_of_its_own_an_fmu_is_linearised_by_steps_of_several_sizes() {
     let fmu = changed("DrainedTank.fmu", |xml| {
