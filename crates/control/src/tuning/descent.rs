@@ -21,15 +21,15 @@ const SUFFICIENT: f64 = 1e-2;
 const FLAT: f64 = 1e-5;
 /// A round that decreases gamma by less than this part is the last one if the peak is on the grid, see `BETWEEN`.
 const PROGRESS: f64 = 1e-3;
-/// A norm that is above the values of the grid by this part adds its frequency.
+/// A norm that exceeds the largest value of the grid by at most this part counts as on the grid.
 const BETWEEN: f64 = 2e-3;
 
 impl Tuning<'_> {
     /// Tunes the parameters from `start`; `scales`: the size of each parameter.
     ///
     /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid
-    /// of frequencies, with a BFGS matrix of the sum of their multipliers; frequencies at which the
-    /// verified norm is larger join the grid. The result is a local minimum at best; gamma is verified.
+    /// of frequencies, with a BFGS matrix of the sum of their multipliers; after each of these searches the
+    /// frequency of the verified norm joins the grid. The result is a local minimum at best; gamma is verified.
     ///
     /// Source: P. Apkarian and D. Noll, Nonsmooth H-infinity synthesis, IEEE Trans. Autom. Control 51
     /// (2006); J. V. Burke, D. Henrion, A. S. Lewis and M. L. Overton, HIFOO (2006).
