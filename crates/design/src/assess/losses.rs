@@ -105,7 +105,7 @@ fn reason(report: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
 /// The name of the loop with the compensation on.
 const ON: &str = "compensation on";
 
-/// A controller that the design can become.
+/// The closed loop of the design with the compensation of faults on or off.
 struct Variant {
     name: &'static str,
     meaning: &'static str,
