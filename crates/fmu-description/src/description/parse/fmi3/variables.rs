@@ -172,7 +172,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     stated
 }
 
-/// Reads a `Dimension`; neither `start` nor `valueReference` is an error, of both `start` counts.
+/// Reads a `Dimension`; with both `start` and `valueReference`, `start` counts; without both, returns an error.
 fn dimension(element: Node<'_>) -> Result<Dimension> {
     let start = element.optional_counter("start").map(Dimension::Fixed);
     let reference = reference(element, "valueReference")?.map(Dimension::Variable);
