@@ -59,11 +59,11 @@ impl Tag {
         self
     }
 
-    /// Inserts `version` as the first attribute: the lowest version that has all added content.
+    /// Inserts `version` behind the namespaces: the lowest version that has all added content.
     pub(super) fn versioned(mut self) -> Self {
         let version = if self.newer { "2.0" } else { "1.0" };
-        let is_space = |(name, _): &&(String, String)| name.starts_with("xmlns");
-        let place = self.attributes.iter().take_while(is_space).count();
+        let is_namespace = |(name, _): &&(String, String)| name.starts_with("xmlns");
+        let place = self.attributes.iter().take_while(is_namespace).count();
         self.attributes.insert(place, ("version".to_owned(), version.to_owned()));
         self
     }
