@@ -77,8 +77,8 @@ impl SampledMatrices {
         Ok(Some(Box::new(Self { a, b, domain, only_samples: None, hold_integral })))
     }
 
-    /// Converts columns of inputs in sampled time into those of the plant x' = a x + b u; they stay the same if `a` is
-    /// in sampled time.
+    /// Converts columns of further inputs, such as faults, from sampled time to the time domain of `a`; NaN if rounding
+    /// makes the integral singular.
     pub fn input_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         // The integral has no zero eigenvalue if the logarithm exists.
         let solved = self.hold_integral.clone().lu().solve(columns);
