@@ -135,7 +135,7 @@ impl Search<'_> {
         Ok(chosen)
     }
 
-    /// Whether the eigenvalues with a gain are in the region and its norm keeps the bound.
+    /// Whether the loop of a gain has all eigenvalues in the region and a norm of at most the required bound.
     fn is_usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
         let all = eigenvalues(&(self.system)(gain, &self.performance).a)?;
         let inside = |value| self.required.region.contains(value, self.required.domain);
