@@ -149,7 +149,8 @@ impl Axis {
     }
 }
 
-/// Returns each power of ten from `low` to `high` whose exponent is a multiple of `stride`, with labels.
+/// Returns each power of ten from `low` to `high`, with a tolerance of 0.1 %, whose exponent is a multiple of `stride`,
+/// and its label.
 fn powers(low: f64, high: f64, stride: i32) -> Vec<(f64, String)> {
     (-300..=300)
         .filter(|power| power % stride == 0)
