@@ -187,7 +187,7 @@ impl Compiler {
         } else {
             ("CC", ["cc", "gcc", "clang"], "C")
         };
-        let stated = std::env::var_os(variable).map(|command| words(&command));
+        let stated = std::env::var_os(variable).map(|command| absolute(words(&command)));
         let commands = stated.filter(|words| !words.is_empty()).map_or_else(
             || known.map(|program| vec![OsString::from(program)]).to_vec(),
             |words| vec![words],
@@ -217,6 +217,17 @@ impl Compiler {
         command.args(&self.words[1..]);
         command
     }
+}
+
+/// Makes the path of the program absolute, because files are compiled in the folder of the sources; a name stays.
+fn absolute(mut words: Vec<OsString>) -> Vec<OsString> {
+    if let Some(program) = words.first_mut()
+        && Path::new(&*program).components().count() > 1
+        && let Ok(path) = std::path::absolute(&*program)
+    {
+        *program = path.into_os_string();
+    }
+    words
 }
 
 /// Splits a command at its white space. Its words may be any bytes.

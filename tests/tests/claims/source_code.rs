@@ -87,6 +87,17 @@ fn a_built_fmu_gives_the_results_of_its_library_also_if_it_is_not_in_utf_8() {
 }
 
 #[test]
+fn a_compiler_may_have_a_relative_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let known = Command::new("sh").args(["-c", "command -v cc"]).output().unwrap().stdout;
+    let known = OsStr::from_bytes(known.trim_ascii());
+    std::os::unix::fs::symlink(known, folder.path().join("compiler")).unwrap();
+    let output = run(folder.path(), "./compiler", &[&RUN[..], &["--compile"]].concat());
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+#[test]
 fn an_fmu_of_a_system_structure_is_built_too() {
     let folder = tempfile::tempdir().unwrap();
     let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
