@@ -135,31 +135,46 @@ pub(super) fn visit(
         if let Some(error) = wrong {
             return Err(error);
         }
-        let line = record.position().map_or(0, ::csv::Position::line);
+        let line = || line_of(path, &record);
         let mut count = record.len();
         if layout.is_closed && count == columns.len() + 1 {
             count -= 1;
         }
         if count != columns.len() {
-            wrong = Some(unreadable(path, &ragged(line, count, columns.len(), layout.delimiter)));
+            wrong = Some(unreadable(path, &ragged(line(), count, columns.len(), layout.delimiter)));
             continue;
         }
         for (value, position) in row.iter_mut().zip(positions) {
             let cell = &record[*position];
             *value = number(cell, layout.delimiter).ok_or_else(|| ResultsError::Number {
                 path: path.to_owned(),
-                line,
+                line: line(),
                 name: columns[*position].name.clone(),
                 text: String::from_utf8_lossy(cell).into_owned(),
             })?;
         }
-        clock.check(row[0], || format!("line {line}"))?;
+        clock.check(row[0], || format!("line {}", line()))?;
         visitor(row[0], &row[1..]);
     }
     match wrong {
         Some(error) if is_ended(path) => Err(error),
         _ => Ok(()),
     }
+}
+
+/// Returns the line on which a record starts; its position may be before a line break or empty lines.
+fn line_of(path: &Path, record: &ByteRecord) -> u64 {
+    let start = record.position().map_or(0, ::csv::Position::byte);
+    let mut line = 1;
+    let bytes = open(path).into_iter().flat_map(|file| BufReader::new(file).bytes());
+    for (position, byte) in (0..).zip(bytes) {
+        match byte {
+            Ok(b'\n') => line += 1,
+            Ok(byte) if byte == b'\r' || position < start => {}
+            _ => break,
+        }
+    }
+    line
 }
 
 /// Returns what is wrong with a line that has more or fewer values than names.

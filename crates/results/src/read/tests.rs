@@ -64,6 +64,21 @@ fn a_last_line_that_is_ended_and_has_too_few_values_is_an_error() {
 }
 
 #[test]
+fn errors_name_the_line_that_an_editor_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, expected) in [
+        ("time,x\r\n0,1\r\n1\r\n2,3\r\n", "line 3 has 1 value,"),
+        ("time,x\r\n1,1\r\n0,2\r\n", "line 3: time is 0 after 1"),
+        ("time,x\r\n0,a\r\n", "line 2: x is"),
+        ("\u{feff}time,x\n\n0,1\n\r\n\n1\n2,3\n", "line 6 has 1 value,"),
+        ("time,\"x\ny\"\n0,1\n1\n2,3\n", "line 4 has 1 value,"),
+    ] {
+        let refused = written(folder.path(), "a.csv", text).column(1).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{text:?}: {refused}");
+    }
+}
+
+#[test]
 fn layouts_of_other_programs_are_read() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
