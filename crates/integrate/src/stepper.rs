@@ -171,9 +171,9 @@ impl Stepper {
                 }
                 Ok(error) if error.is_finite() => {
                     let ratio = SAFETY * error.powf(-1.0 / self.order());
-                    self.memory.size = size * ratio.max(SHRINK);
+                    (self.memory.size, cause) = (size * ratio.max(SHRINK), None);
                 }
-                Ok(_) => self.memory.size = size * RETREAT,
+                Ok(_) => (self.memory.size, cause) = (size * RETREAT, None),
                 Err(error) if error.failure == Failure::Status(Status::Discard) => {
                     self.memory.size = size * RETREAT;
                     cause = Some(error);

@@ -100,6 +100,23 @@ fn a_state_without_a_derivative_ends_the_run_by_its_name() {
     assert!((time - 0.5).abs() < 1e-9, "{time}");
 }
 
+/// The FMU refuses long steps; the derivative of shorter ones is NaN, and it is the reason.
+#[test]
+fn a_refusal_before_the_last_trial_step_is_not_the_cause() {
+    let mut stepper = Stepper::new(Method::Explicit, Scale::new(1e-6, 1e-8, vec![1.0]));
+    let mut derivative = |t: f64, _: &[f64], slope: &mut [f64]| {
+        slope[0] = if t > 0.0 { f64::NAN } else { 1.0 };
+        let failure = Failure::Status(Status::Discard);
+        let error = CallError { function: "fmi2GetDerivatives", failure, messages: Vec::new() };
+        if t > 1e-9 { Err(error) } else { Ok(()) }
+    };
+    let error = stepper.advance(&mut derivative, &[0.0], 0.0, 1.0).unwrap_err();
+    assert!(
+        matches!(error, StepError::Size { state: 0, is_finite: false, cause: None, .. }),
+        "{error:?}"
+    );
+}
+
 /// The first step of 1e-6 s that is chosen for such states is less than four units in the last place of the time.
 #[test]
 fn states_at_rest_at_zero_are_integrated_in_seconds_since_1970() {
