@@ -176,14 +176,15 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for A or B of `controller` or for `commands`;
-/// [`Error::OutOfRange`] for a direct term of `controller`.
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for A or B of `controller`, for `commands` or for
+/// `feedthrough`; [`Error::OutOfRange`] for a direct term of `controller`.
 pub fn with_feedthrough(
     controller: &StateSpace,
     commands: &DMatrix<f64>,
     feedthrough: &DMatrix<f64>,
 ) -> Result<StateSpace, Error> {
     let (p, m) = feedthrough.shape();
+    check::finite("D", feedthrough)?;
     let k = check::square("A", &controller.a)?;
     check::shape("B", &controller.b, (k, p))?;
     check::shape("C of the commands", commands, (m, k))?;

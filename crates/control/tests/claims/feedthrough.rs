@@ -122,7 +122,11 @@ fn a_controller_takes_its_own_commands_off_the_measurements() {
             assert_same(&response(&computed, s), &(regular.try_inverse().expect("regular") * k));
         }
     }
-    let controller_system = StateSpace { d: DMatrix::identity(2, 2), ..controller(SAMPLED) };
+    let controller_system = controller(SAMPLED);
+    let infinite = matrix(2, 2, &[0.0, f64::INFINITY, 1.3, 0.2]);
+    let refused = with_feedthrough(&controller_system, &controller_system.c, &infinite);
+    assert!(matches!(refused, Err(Error::NotFinite { matrix: "D", .. })), "{refused:?}");
+    let controller_system = StateSpace { d: DMatrix::identity(2, 2), ..controller_system };
     let refused = with_feedthrough(&controller_system, &controller_system.c, &d);
     assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
     let refused =
