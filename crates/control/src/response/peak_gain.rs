@@ -168,7 +168,8 @@ impl Piece {
     }
 }
 
-/// The lower and the upper bound of the integral of |h| over all time.
+/// The lower and the upper bound of the integral of |h| over all time. They differ by at most `width` times the lower
+/// one, plus the rounding errors and the bound of the integral after the longest of `lengths`.
 fn integral(
     lengths: &[Length],
     trajectory: &mut Trajectory,
@@ -180,7 +181,8 @@ fn integral(
     // The pieces of each length: products with all of their states at once are fast.
     let mut pieces: Vec<Vec<Piece>> = lengths.iter().map(|_| Vec::new()).collect();
     pieces[longest] = from_starts(&lengths[longest], vec![start]);
-    for _ in 0..ROUNDS {
+    let error = |iterations| Error::NotConverged { what: "the peak-to-peak gain", iterations };
+    for round in 0..ROUNDS {
         let sum = |part: fn(&Bounds) -> f64| -> f64 {
             pieces.iter().flatten().map(|piece| part(&piece.bounds)).sum()
         };
@@ -193,7 +195,7 @@ fn integral(
             return Ok((lower, upper + tail));
         }
         if count > MOST_INTERVALS {
-            break;
+            return Err(error(round));
         }
         let least = share.max(widest / WIDEST);
         for length in 1..=longest {
@@ -207,7 +209,7 @@ fn integral(
             }
         }
     }
-    Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })
+    Err(error(ROUNDS))
 }
 
 /// The pieces of one length with these starts.

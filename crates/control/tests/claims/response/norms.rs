@@ -39,6 +39,16 @@ fn the_peak_gain_of_an_oscillator_is_a_hyperbolic_cotangent() {
     }
 }
 
+/// More than 1e5 oscillations in a time constant: the limit is the number of intervals, not the 200 rounds.
+#[test]
+fn a_peak_gain_that_needs_too_many_intervals_states_the_rounds_that_were_made() {
+    let refused = peak_gain(&oscillator(70.0, 1e-6), 1e-3);
+    assert!(
+        matches!(refused, Err(Error::NotConverged { iterations, .. }) if iterations < 200),
+        "{refused:?}"
+    );
+}
+
 /// The first output sees a lag as it is, and the oscillator, on which the second input acts, 1e16 times more weakly.
 #[test]
 fn an_output_keeps_the_peak_gain_of_what_it_sees_far_more_weakly() {
