@@ -14,8 +14,8 @@ use plant_file::PlantFile;
 const SETTLED: f64 = 15.0;
 /// The most samples of a response that are computed.
 const MOST_SAMPLES: usize = 20_000;
-/// A constant fault leaves no trace if its steady mean is at most this part of its largest mean, or, with a further
-/// input decoupled, of its steady mean without.
+/// A constant fault leaves no trace if the steady mean of the residuals is at most this part of their largest mean, or,
+/// with decoupled inputs, of their steady mean with none.
 const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
