@@ -279,8 +279,8 @@ impl Design {
         !self.reconfigurations.is_empty() || self.fallback.is_some()
     }
 
-    /// The design without its schedule, for the matrices and the operating point at one value of the scheduling
-    /// variable; `None` if it has no schedule.
+    /// Copies the design without its schedule, as a place for the matrices and the operating point at one value of the
+    /// scheduling variable; `None` if there is no schedule.
     // Compiled with its caller: a module for browsers then has the code that copies a design once.
     #[inline]
     #[must_use]
