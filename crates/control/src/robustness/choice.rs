@@ -6,7 +6,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 
-/// Frequencies for each decade at which the loops are compared.
+/// Number of frequencies per decade at which the loops are compared.
 const PER_DECADE: u32 = 12;
 /// The first loop is preferred unless another one is lower by more than this factor.
 const ADVANTAGE: f64 = 1.1;
