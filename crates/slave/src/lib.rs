@@ -400,7 +400,7 @@ pub enum StepResult {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{function} {}{}", self.failure_text(), joined(.messages))]
 pub struct CallError {
-    /// Name of the FMI function.
+    /// Name of the FMI function, or what failed in its place, such as an integration.
     pub function: &'static str,
     /// How the call failed.
     pub failure: Failure,
