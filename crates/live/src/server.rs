@@ -45,7 +45,7 @@ fn call_for_samples(site: &Site) {
         let is_watched = shared.store().is_watched();
         if is_watched {
             shared.call_for_sample();
-            thread::sleep(SAMPLE.max(COSTS * shared.cost().min(Duration::from_secs(1))));
+            thread::sleep(SAMPLE.max(COSTS * shared.sample_duration().min(Duration::from_secs(1))));
         } else {
             thread::sleep(IDLE);
         }

@@ -31,7 +31,7 @@ pub(crate) struct Shared {
     flags: AtomicU8,
     phase: AtomicU8,
     /// Time in ns that the last sample took.
-    cost: AtomicU64,
+    sample_duration: AtomicU64,
     /// Number of events that were dropped because the queue was full.
     pub(crate) dropped: AtomicU64,
     /// Whether the view is closed, so that the threads of the server end.
@@ -45,7 +45,7 @@ impl Shared {
         Self {
             flags: AtomicU8::new(REQUEST),
             phase: AtomicU8::new(phase as u8),
-            cost: AtomicU64::new(0),
+            sample_duration: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
             closed: AtomicBool::new(false),
             events: Mutex::new(events),
@@ -83,13 +83,13 @@ impl Shared {
         self.phase.store(phase as u8, Ordering::Release);
     }
 
-    pub(crate) fn cost(&self) -> Duration {
-        Duration::from_nanos(self.cost.load(Ordering::Relaxed))
+    pub(crate) fn sample_duration(&self) -> Duration {
+        Duration::from_nanos(self.sample_duration.load(Ordering::Relaxed))
     }
 
-    pub(crate) fn set_cost(&self, cost: Duration) {
-        let nanoseconds = u64::try_from(cost.as_nanos()).unwrap_or(u64::MAX);
-        self.cost.store(nanoseconds, Ordering::Relaxed);
+    pub(crate) fn set_sample_duration(&self, duration: Duration) {
+        let nanoseconds = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        self.sample_duration.store(nanoseconds, Ordering::Relaxed);
     }
 
     /// Moves all events of the run into the store and returns the locked store. During the run only threads of the

@@ -124,7 +124,7 @@ impl View {
     /// Sets the time that the last sample took. The server then calls for samples so rarely that samples of
     /// up to a second take at most 2 % of the time, apart from the samples that a page requests.
     pub fn set_cost(&self, cost: Duration) {
-        self.shared.set_cost(cost);
+        self.shared.set_sample_duration(cost);
     }
 
     /// Publishes an intervention at `time` in s. It is dropped and counted if the server cannot take it at once.
