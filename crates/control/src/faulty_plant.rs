@@ -66,7 +66,7 @@ impl FaultyPlant {
         self.c.clone().resize_horizontally(n + q, 0.0)
     }
 
-    /// `F_0` = [-`F_a`; 0], (n + q) x q: the fault enters (11) as -`F_0` `f_a`.
+    /// `F_0` = [-`F_a`; 0], (n + q) x q: a fault f enters the error dynamics (11) as -`F_0` f.
     #[must_use]
     pub fn augmented_fault(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
