@@ -331,7 +331,7 @@ impl AsoController {
     }
 }
 
-/// The rounding error in s to expect of an importer that adds up its steps to `time`.
+/// The distance in s from `time` that counts as a rounding error of an importer.
 fn clock_rounding(time: f64) -> f64 {
     8.0 * f64::EPSILON * time.abs()
 }
