@@ -46,7 +46,7 @@ pub trait ModelExchange: Slave {
     /// `fmi2GetEventIndicators`: a state event is a change between z > 0 and z <= 0.
     fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError>;
 
-    /// `fmi2GetNominalsOfContinuousStates`.
+    /// `fmi2GetNominalsOfContinuousStates`. The default returns [`Failure::Missing`](crate::Failure::Missing).
     fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
         let _ = nominals;
         Err(absent("fmi2GetNominalsOfContinuousStates"))
