@@ -80,7 +80,7 @@ impl Region {
         check::that(is_in_range && domain == Domain::Continuous, "sector", angle, rule)
     }
 
-    /// The parts with the names by which a conflict reports them, with frequencies divided by `unit`.
+    /// The parts with the names by which a conflict reports them, for s or z divided by `unit`.
     fn parts(&self, domain: Domain, unit: f64) -> Vec<(&'static str, Shape)> {
         let disc = |center: f64, radius: f64| {
             Shape::Disc(Disc { center: center / unit, radius: radius / unit })
