@@ -116,8 +116,8 @@ impl AsoController {
         self.measurement_check.as_ref().is_some_and(|check| check.is_lost)
     }
 
-    /// Sets the measurements by `take`. Returns whether they end a rest: the detection then restarts at `time` in s,
-    /// and y_f has to start from them.
+    /// Sets the measurements by `take`. Returns whether they end a rest: the detection has then restarted at `time` in
+    /// s, and the caller must start y_f from them.
     fn take_measurements(
         &mut self,
         time: f64,
