@@ -275,7 +275,7 @@ impl ObserverProblem<'_> {
 }
 
 impl FeedbackProblem<'_> {
-    /// Returns the channel from the faults to the weighted measurements and commands.
+    /// Returns the channel from the faults to the measurements, then the commands, with their constant weights.
     fn performance(&self, required: NormRequirement<'_>) -> Performance {
         let (m, p) = (self.b.ncols(), self.c.nrows());
         let mut feedthrough = DMatrix::zeros(p + m, m);
