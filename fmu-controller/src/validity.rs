@@ -116,8 +116,10 @@ impl MeasurementCheck {
         }
         let mut held = self.held_since.iter().zip(&self.longest);
         self.is_held = self.held_since.iter().any(Option::is_some);
+        // The times of the importer are rounded.
+        let rounding = 8.0 * f64::EPSILON * start.abs();
         self.is_lost = held.any(|(since, longest)| {
-            since.is_some_and(|since| start - since >= longest * (1.0 - HOLD_ROUNDING))
+            since.is_some_and(|since| start - since >= longest * (1.0 - HOLD_ROUNDING) - rounding)
         });
     }
 

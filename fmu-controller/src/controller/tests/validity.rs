@@ -117,6 +117,19 @@ fn a_measurement_that_is_lost_ends_at_the_operating_point_and_starts_anew_from_t
     }
 }
 
+/// The longest hold is 10 steps; in seconds since 1970 they are 0.099999905 s.
+#[test]
+fn a_hold_lasts_as_many_steps_in_seconds_since_1970() {
+    for start_time in [0.0, 1.7e9] {
+        let mut model = held("", "range = [-2.0, 2.0]\nlongest_hold = 0.1");
+        model.initialize(&Experiment { start_time, ..Experiment::default() }).unwrap();
+        for k in 0..20_u32 {
+            advance(&mut model, start_time + 0.01 * f64::from(k), 0.01, [1e300, 0.0]);
+            assert_eq!(outputs(&model).1, [true, k >= 10], "{start_time} {k}");
+        }
+    }
+}
+
 #[test]
 fn an_input_derivative_that_leads_out_of_the_range_is_not_used() {
     let mut checked = held("", "range = [-2.0, 2.0]");
