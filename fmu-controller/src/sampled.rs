@@ -33,8 +33,8 @@ use crate::number::Number;
 use crate::signals::{OperatingPoint, Signals, Values};
 use aso_controller::design::{Design, Estimator};
 
-/// The part of the sample time by which a sample may be early: an importer adds up its steps with
-/// rounding.
+/// The part of the sample time by which a sample may be early, in addition to 8 units of rounding of the time: an
+/// importer adds up its steps with rounding.
 const TOLERANCE: f64 = 1e-4;
 
 /// Clock and state of a sampled controller.
@@ -98,15 +98,15 @@ impl Sampler {
     /// The instant in s of the next sample, at most `end`; `None` if it is due after `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.next_instant();
-        (next <= end + TOLERANCE * self.period).then_some(next.min(end))
+        let tolerance = TOLERANCE * self.period + 8.0 * f64::EPSILON * end.abs();
+        (next <= end + tolerance).then_some(next.min(end))
     }
 
     /// The time in s from `start` to the next sample, negative if the sample was due before; `None` if it is due
     /// after `end`.
     pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
-        let elapsed = self.next * self.period;
-        let due = elapsed <= end - self.start + TOLERANCE * self.period;
-        due.then_some(elapsed - (start - self.start))
+        self.next_until(end)?;
+        Some(self.next * self.period - (start - self.start))
     }
 
     /// Takes the next sample, `offset` s after the measurements in `values` were given: computes z, e

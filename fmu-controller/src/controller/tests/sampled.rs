@@ -120,6 +120,25 @@ fn in_model_exchange_each_sample_is_a_time_event() {
     }
 }
 
+/// Seconds since 1970 are rounded by up to 0.12 us.
+#[test]
+fn an_event_at_the_announced_time_takes_the_sample_in_seconds_since_1970() {
+    for period in [1e-3, 1e-4] {
+        let (mut model, _) = tamed(([1, 1, 1, 1], "l", "c"));
+        model.design.sample_time = Some(period);
+        model.sampler = Sampler::new(&model.design);
+        let start_time = 1.7e9;
+        model.initialize(&Experiment { start_time, ..Experiment::default() }).unwrap();
+        let mut time = start_time;
+        for k in 1..=1000_u32 {
+            let next = model.event(time).unwrap().next_event_time;
+            let required = start_time + f64::from(k) * period;
+            assert_eq!(next, Some(required), "{period} {k}");
+            time = required;
+        }
+    }
+}
+
 #[test]
 fn compensate_and_t_on_act_at_samples() {
     let (mut model, _) = tamed(([2, 2, 2, 2], "--", "c"));
