@@ -315,9 +315,9 @@ pub(crate) fn warnings(unpacked: &Unpacked) -> impl Iterator<Item = String> {
 
 /// Converts `error`, with the tool that the FMU declares to need (`needsExecutionTool`), if any.
 pub(crate) fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
-    let simulation = description.co_simulation.as_ref().map(|flags| flags.needs_execution_tool);
-    let exchange = description.model_exchange.as_ref().map(|flags| flags.needs_execution_tool);
-    if simulation != Some(true) && exchange != Some(true) {
+    let stepped = description.stepped().is_some_and(|flags| flags.needs_execution_tool);
+    let exchange = description.model_exchange.as_ref();
+    if !stepped && !exchange.is_some_and(|flags| flags.needs_execution_tool) {
         return FmuError::Load(error);
     }
     let tool = description.generation_tool.clone();

@@ -77,10 +77,11 @@ fn resource_path(folder: &Path) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use fmu_description::Version;
     use fmu_description::package::{Package, TemporaryFolder};
+    use fmu_description::{ModelDescription, Version};
 
     use super::*;
+    use crate::LoadError;
 
     #[test]
     fn an_fmu_that_offers_model_exchange_only_lacks_the_interface() {
@@ -98,5 +99,26 @@ mod tests {
         assert!(matches!(error, FmuError::NoInterface { .. }), "{error}");
         let expected = "M.fmu: the FMU lacks an interface, expected the element CoSimulation or ScheduledExecution";
         assert_eq!(error.to_string(), expected);
+    }
+
+    /// The flag is an attribute of `ScheduledExecution`, too (FMI 3.0.2, section 5.4).
+    #[test]
+    fn an_error_of_scheduled_execution_names_the_tool_that_it_needs() {
+        for (flag, expected) in [("true", Some("Bench 4")), ("false", None)] {
+            let description = ModelDescription::parse(format!(
+                r#"<fmiModelDescription fmiVersion="3.0"
+ modelName="M" instantiationToken="t" generationTool="Bench 4">
+<ScheduledExecution modelIdentifier="M" needsExecutionTool="{flag}"/>
+<ModelVariables><Float64 name="time" valueReference="0" causality="independent"/></ModelVariables>
+<ModelStructure/></fmiModelDescription>"#
+            ));
+            let (model, reason) = ("M".to_owned(), "no reason".to_owned());
+            let error = LoadError::Unsupported { model, reason };
+            let actual = match with_tool_hint(&description.unwrap(), error) {
+                FmuError::NeedsTool { tool, .. } => Some(tool),
+                _ => None,
+            };
+            assert_eq!(actual.as_deref(), expected);
+        }
     }
 }
