@@ -177,9 +177,13 @@ fn an_incomplete_fmu_is_not_written() {
     let mut without_index = Package::new(XML.to_owned());
     without_index.add("sources/a.c", "");
     without_index.add("documentation/other.html", "");
+    let mut other_case = Package::new(XML.to_owned());
+    other_case.add("sources/a.c", "");
+    other_case.add("documentation/Index.html", "");
     for (package, target, said) in [
         (empty, "M.fmu", "binaries or sources"),
         (without_index, "M.fmu", "index.html"),
+        (other_case, "M.fmu", "documentation/index.html"),
         (package(), "M.zip", ".fmu"),
     ] {
         let error = package.write(&folder.path().join(target)).unwrap_err().to_string();

@@ -115,7 +115,7 @@ impl Package {
         let has_code = self.has_folder("binaries/") || self.has_folder("sources/");
         demand(has_code, "binaries or sources", "neither")?;
         let documented =
-            !self.has_folder("documentation/") || earlier.contains("documentation/index.html");
+            !self.has_folder("documentation/") || self.has_file("documentation/index.html");
         demand(documented, "documentation/index.html", "documentation without it")?;
         if self.version == Version::V3 {
             self.check_folders_of_3()?;
@@ -137,9 +137,13 @@ impl Package {
         self.entries.iter().any(|(path, _)| path.starts_with(name))
     }
 
+    fn has_file(&self, name: &str) -> bool {
+        self.entries.iter().any(|(path, _)| path == name)
+    }
+
     /// Checks the rules of FMI 3.0 on single folders (sections 2.4.10, 2.5.1.1, 2.5.1.2).
     fn check_folders_of_3(&self) -> Result<(), PackageError> {
-        let has = |name: &str| self.entries.iter().any(|(path, _)| path == name);
+        let has = |name: &str| self.has_file(name);
         let described = !self.has_folder("sources/") || has("sources/buildDescription.xml");
         demand(described, "sources/buildDescription.xml", "sources without it")?;
         let license = ["txt", "html", "spdx"]
