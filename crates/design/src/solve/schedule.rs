@@ -239,7 +239,7 @@ pub(crate) fn coupled(
             let filter = design.filter.as_deref();
             let controller =
                 complete_controller(&point.model, &point.gains, filter, design.domain)?;
-            let mut changed = slopes[side].act_on(&controller.commands, filter.is_some(), j);
+            let mut changed = slopes[side].move_point(&controller.commands, filter.is_some(), j);
             slopes[side].move_references(design, &mut changed, j);
             let whole = Loop::new(point.physical, changed)?;
             worst = worst.max(instability(&whole.dynamics(), design.domain)?);
@@ -300,11 +300,11 @@ impl Slopes {
         }
     }
 
-    /// Returns `system`, the controller with its filter, scheduled by its measurement `j`.
+    /// Returns `system`, the controller with its filter, with the terms of [`coupled`] in theta, its measurement `j`.
     ///
     /// Its states are the filtered measurements, if there are any, x_hat, the filtered measurements of the model,
     /// f_hat, and the integrals; the last two have no operating point.
-    fn act_on(&self, system: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
+    fn move_point(&self, system: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
         let filtered = if is_filtered { &self.y[..] } else { &[] };
         let slopes = [filtered, &self.x, filtered].concat();
         let z = DMatrix::from_column_slice(slopes.len(), 1, &slopes);
