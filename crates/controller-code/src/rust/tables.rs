@@ -126,7 +126,7 @@ static RESIDUAL_FILTER: Filter<'static, {}> = Filter {{
         };
         lines.push(format!(
             "
-/// The first sets of gains, without the fall-back.
+/// The sets of gains.
 fn sets() -> Sets<'static, ACTUATORS> {{
     let gone = SET_GONE.split_at({}).0;
     Sets {{ gone, single: &[{single}], fall_back: {fall_back} }}
