@@ -41,7 +41,7 @@ struct Inequality {
 }
 
 impl<'a> Barrier<'a> {
-    /// `size`: the size of M, to which the largest G is relative.
+    /// `size`: an upper bound of the norm of M, to which the largest G is relative.
     pub(super) fn new(m: &'a ComplexMatrix, blocks: &[Block], size: f64) -> Self {
         Self { m, directions: directions(blocks), largest_g: LARGEST_G * size }
     }
