@@ -33,7 +33,7 @@ pub trait PlantFamily {
     /// of A, B, C and D. They guide the search only.
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
 
-    /// The ascending multiples of the tolerances at which the worst direction is tested, from 1e-6 to at most 16.
+    /// The ascending multiples of the tolerances for tests of the worst direction; by default from 1e-6 to at most 16.
     fn multiples(&self) -> Vec<f64> {
         let factor = |multiple: f64| if multiple < SMALL { 2.0 } else { FACTOR };
         let next =

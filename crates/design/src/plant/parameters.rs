@@ -202,7 +202,7 @@ impl PlantFamily for ParameterFamily<'_> {
         self.directions.iter().map(slope).collect()
     }
 
-    /// Returns [`STEPS`] equal steps up to the limits: beyond them a parameter may have no meaning.
+    /// Returns [`STEPS`] multiples in equal steps up to 1, the limits: beyond them a parameter may have no meaning.
     fn multiples(&self) -> Vec<f64> {
         (1..=STEPS).map(|step| f64::from(step) / f64::from(STEPS)).collect()
     }
