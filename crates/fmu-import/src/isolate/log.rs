@@ -38,7 +38,7 @@ const MESSAGE: usize = CATEGORY + TEXT + 32;
 /// The levels; a message holds the index into this list.
 const LEVELS: [Level; 5] = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE];
 
-/// Sends the [`tracing`] events of the worker to the master.
+/// Sends the [`tracing`] events with messages of the FMU from the worker to the master.
 pub(super) struct Forward {
     shared: Arc<Shared>,
     /// Number of words written.
