@@ -22,8 +22,9 @@ pub enum NoiseDistribution {
 /// A series of random numbers with random access.
 ///
 /// A sample is the output of the `ChaCha` stream cipher with 8 rounds (Bernstein 2008). The stream
-/// is the number of the sample; the key is the SHA-256 hash of seed, place and name. A sample
-/// therefore does not depend on earlier samples, and different names give independent series.
+/// is the number of the sample, or the bits of the time if each communication point has a sample; the key is the
+/// SHA-256 hash of seed, place and name. A sample therefore does not depend on earlier samples, and different names
+/// give independent series.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RandomSeries {
     key: [u8; 32],
