@@ -10,7 +10,8 @@ pub(crate) fn on_signal(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<(
     Ok(fmu_import::crash::on_ending_signal(move |signal| react(u8::try_from(signal).unwrap_or(0)))?)
 }
 
-/// Calls `react` in a thread with [`INTERRUPT`] at each Ctrl-C. A second call is an error.
+/// Calls `react` in a thread with [`INTERRUPT`] at each Ctrl-C and Ctrl-Break, and when the console is closed. A second
+/// call is an error.
 #[cfg(not(unix))]
 pub(crate) fn on_signal(react: impl Fn(u8) + Send + 'static) -> anyhow::Result<()> {
     Ok(ctrlc::set_handler(move || react(INTERRUPT))?)
