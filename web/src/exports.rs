@@ -42,7 +42,7 @@ pub extern "C" fn set() -> i32 {
 }
 
 /// Makes up to `steps` steps. Keeps a row after each step whose number since the start is a multiple of `every`,
-/// and after the last one; returns 1 if a step failed. So a row is older than a change that is made at its
+/// and after the last one of the run; returns 1 if a step failed. So a row is older than a change that is made at its
 /// time, as in the results of the command.
 #[unsafe(no_mangle)]
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
