@@ -105,6 +105,24 @@ fn points_in_seconds_since_1970_are_apart() {
     assert_eq!([0.5, 1.0].map(|time| ticks.value(epoch + time)), [0.0, 3.0]);
 }
 
+/// A jump of another column of the same table repeats the time.
+#[test]
+fn a_tick_counts_in_every_row_of_its_time() {
+    for rows in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+        let [first, second, third] = rows;
+        let points = [(0.0, 0.0), (1.0, first), (1.0, second), (1.0, third), (2.0, 0.0)];
+        let ticks = track(&points, Interpolation::Points);
+        assert_eq!(breaks(&ticks, 0.0), [1.0], "{rows:?}");
+        for time in [1.0 - 1e-10, 1.0, 1.0 + 1e-10] {
+            assert_at(&ticks, time, 1.0, 0.0);
+        }
+        for time in [0.0, 0.5, 1.5, 2.0] {
+            assert_at(&ticks, time, 0.0, 0.0);
+        }
+    }
+    assert_at(&track(&[(0.0, 0.0), (0.0, 1.0)], Interpolation::Points), 0.0, 1.0, 0.0);
+}
+
 #[test]
 fn a_single_point_is_a_constant() {
     for between in [Interpolation::Line, Interpolation::Hold] {

@@ -21,12 +21,14 @@ pub enum Interpolation {
 
 /// A sampled signal: values at points in time, ascending.
 ///
-/// * Up to the first time, the value is the first one; after the last time, the last one.
+/// * Up to the first time, the value is the first one, also if this time occurs more than once; after the last time,
+///   the last one.
 /// * Linear interpolation between `v_i` at `t_i` and the next point is `w v_i + (1 - w) v_(i+1)`
 ///   with `w = (t_(i+1) - t) / (t_(i+1) - t_i)`.
-/// * If a time occurs more than once, the signal jumps; its value there is the last one.
+/// * If a later time occurs more than once, the signal jumps; its value there is the last one.
 /// * A held value starts at its time.
-/// * The ticks of a clock are points: the value between them is 0.
+/// * The ticks of a clock are points: the value between them is 0. Of several points at one time, one that is not 0
+///   counts.
 /// * Times with a relative difference of at most 1e-9 are equal, unless they differ by more than 1 us; FMPy has no such
 ///   limit.
 ///
@@ -120,8 +122,9 @@ impl Track {
         let right = self.not_below(time, *cursor);
         *cursor = right;
         if self.between == Interpolation::Points {
-            let around = right.saturating_sub(1)..=right.min(last);
-            let mut here = around.filter(|&point| near(times[point], time));
+            let is_here = |point: &usize| near(times[*point], time);
+            let before = (0..right).rev().take_while(is_here);
+            let mut here = before.chain((right..=last).take_while(is_here));
             let point = here.find(|&point| values[point] != 0.0);
             return Sample::held(point.map_or(0.0, |point| values[point]));
         }
