@@ -579,14 +579,21 @@ fn resumed_path(path: &Path, time: f64) -> PathBuf {
     if is_stream(path) {
         return path.to_owned();
     }
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // Digits after a point are a part of the name, not an ending.
+    let is_ending = |text: &str| text.contains(|letter: char| !letter.is_ascii_digit());
+    let (name, ending) = match name.rsplit_once('.') {
+        Some((name, ending)) if !name.is_empty() && is_ending(ending) => {
+            (name, format!(".{ending}"))
+        }
+        _ => (&*name, String::new()),
+    };
     // The file may belong to a run that was itself resumed.
     let stem = match name.rsplit_once("-from-") {
         Some((stem, time)) if time.parse::<f64>().is_ok() => stem,
-        _ => &name,
+        _ => name,
     };
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}-from-{}.{ending}", seconds(time)))
+    path.with_file_name(format!("{stem}-from-{}{ending}", seconds(time)))
 }
 
 /// Whether `path` has the extension of an FMU, or is the folder of an unpacked one.
@@ -658,6 +665,9 @@ mod tests {
             ("a/results.csv", "a/results-from-2.5.csv"),
             ("a/results-from-1.csv", "a/results-from-2.5.csv"),
             ("log-from-lab.csv", "log-from-lab-from-2.5.csv"),
+            ("a/trace", "a/trace-from-2.5"),
+            ("trace-from-1.5", "trace-from-2.5"),
+            ("k=1.5.csv", "k=1.5-from-2.5.csv"),
             (STANDARD_OUTPUT, STANDARD_OUTPUT),
         ] {
             assert_eq!(resumed_path(Path::new(path), 2.5), Path::new(expected));
