@@ -101,7 +101,8 @@ impl Exchange {
         let wrong = faults.iter().find(|(input, _)| !carries_numbers(system, *input));
         if let Some((input, _)) = wrong {
             return Err(contradiction(format!(
-                "{} has a fault, expected a connected input that is no String and no clock",
+                "{} has a fault, expected a connected input that is no String, no binary and no \
+                 clock",
                 system.name(*input)
             )));
         }
