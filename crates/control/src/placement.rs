@@ -158,11 +158,11 @@ pub fn place_balanced(
 ///
 /// The gain is computed as in [`place_balanced`], with the peak of S over the unit circle; only the
 /// tolerance differs. `poles`: n eigenvalues in the z plane, zero allowed, with the same rules.
-/// Tolerance: the distance of each
-/// eigenvalue from the requested p is at most 1e-2 |p - 1|, verified. The decay of a slow
-/// eigenvalue is then accurate to 1e-2 of itself, a fast one to about 1e-2. The tolerance cannot be
-/// much smaller: k eigenvalues near zero for each input move by the k-th root of a rounding error
-/// of A + B K, which hardly changes the samples.
+/// Tolerance: the distance of each eigenvalue from the requested p is at most 1e-2 |p - 1|, verified
+/// (p = 1: see [`Quality::pole_error`]). The decay of a slow eigenvalue is then accurate to 1e-2 of
+/// itself, a fast one to about 1e-2. The tolerance cannot be much smaller: k eigenvalues near zero
+/// for each input move by the k-th root of a rounding error of A + B K, which hardly changes the
+/// samples.
 ///
 /// # Example
 ///
