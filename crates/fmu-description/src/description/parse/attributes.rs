@@ -166,7 +166,8 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Reads the `xs:double` of a limit in FMI 3.0; `default` if it is missing, `None` if it is infinite.
+    /// Reads the `xs:double` of a limit in FMI 3.0 as [`Node::number`] does, but `INF` and `-INF` give `None` without a
+    /// warning; `default` if it is missing.
     pub(super) fn bound(&self, name: &'static str, default: Option<f64>) -> Result<Option<f64>> {
         match self.attribute(name).map(|text| text.trim_matches(WHITE_SPACE)) {
             Some("INF" | "-INF") => Ok(None),
