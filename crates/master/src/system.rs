@@ -206,7 +206,7 @@ impl System {
     pub fn connect_equal_units(&mut self) -> Result<Vec<Connection>, SystemError> {
         let before = self.connections.len();
         let (outputs, inputs) = (self.free_outputs(), self.free_inputs());
-        let unit = |port: Port| self.dimension(port).map(str::to_owned);
+        let unit = |port: Port| self.unit_name(port).map(str::to_owned);
         let input_units: Vec<_> = inputs.iter().map(|&input| unit(input)).collect();
         let output_units: Vec<_> = outputs.iter().map(|&output| unit(output)).collect();
         for (&to, unit) in inputs.iter().zip(&input_units) {
@@ -245,12 +245,12 @@ impl System {
     #[must_use]
     pub fn candidates(&self, input: Port) -> Vec<Port> {
         let dependent = self.dependent_slaves(input.slave);
-        let has_unit = self.dimension(input).is_some();
+        let has_unit = self.unit_name(input).is_some();
         let mut outputs = self.free_outputs();
         outputs.retain(|&output| {
             output.slave != input.slave
                 && self.variable(output).kind.element() == self.variable(input).kind.element()
-                && self.dimension(output) == self.dimension(input)
+                && self.unit_name(output) == self.unit_name(input)
                 && (self.variable(output).name == self.variable(input).name
                     || has_unit && !dependent[output.slave])
         });

@@ -17,8 +17,8 @@ impl System {
         Some((name, base))
     }
 
-    /// Returns the unit of a variable; `None` if it has none or is dimensionless.
-    pub(super) fn dimension(&self, port: Port) -> Option<&str> {
+    /// Returns the name of the unit of a variable; `None` if it has none or is dimensionless.
+    pub(super) fn unit_name(&self, port: Port) -> Option<&str> {
         let real = self.variable(port).kind.as_real()?;
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
