@@ -7,10 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Largest number of rounds; each round halves the intervals with the widest bounds.
+/// Largest number of rounds; each round halves the intervals whose bounds differ most.
 const ROUNDS: usize = 200;
-/// A round halves only intervals whose bounds are wider than the widest ones divided by this.
-const WIDEST: f64 = 32.0;
+/// A round halves only intervals whose bounds differ by more than the largest such difference divided by this.
+const GAP_RATIO: f64 = 32.0;
 const MOST_INTERVALS: usize = 1 << 18;
 /// Number of outputs that share the states after an impulse.
 const OUTPUTS_AT_ONCE: usize = 8;
@@ -197,7 +197,7 @@ fn integral(
         if count > MOST_INTERVALS {
             return Err(error(round));
         }
-        let least = share.max(widest / WIDEST);
+        let least = share.max(widest / GAP_RATIO);
         for length in 1..=longest {
             let wide = |piece: &mut Piece| piece.gap() > least;
             let wide: Vec<_> =
