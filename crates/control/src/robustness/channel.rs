@@ -17,7 +17,7 @@ const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.
 const TESTED_GAINS_IF_LARGE: u32 = 8;
 const LARGE: usize = 100;
-/// Where the sign of Im T changes, L crosses the real axis if its angle to it is below this; else it has a pole.
+/// Where Im T changes its sign, L crosses the real axis if |Im L / Re L| is at most this; otherwise L has a pole there.
 const ON_AXIS: f64 = 1e-6;
 
 /// The margins of one channel while the other channels are closed and exact.
