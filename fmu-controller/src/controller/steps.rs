@@ -238,8 +238,8 @@ impl AsoController {
         self.has_slopes = false;
     }
 
-    /// The controller with z', f_hat', u' and E_hat', which are computed when they are read. Those of a sampled
-    /// controller and of one that rests are zero.
+    /// Computes z', f_hat', u' and E_hat' unless they are up to date; returns the controller. They are zero if it is
+    /// sampled or rests.
     pub(crate) fn with_slopes(&mut self) -> &mut Self {
         if !self.has_slopes && self.sampler.is_none() {
             if self.is_resting() {
