@@ -172,7 +172,7 @@ impl Engine {
     }
 
     /// Returns where a step from `time` that was planned to end at `end` ends earlier: at the first known event, jump
-    /// or kink within it; all in s. `None` if it ends at `end`; reports a change that then takes effect late.
+    /// or kink within it; all in s. `None` if it ends at `end`; warns of the first change that then takes effect late.
     #[inline]
     pub(crate) fn earlier_end(&mut self, time: f64, end: f64) -> Option<f64> {
         match self.division {
