@@ -83,7 +83,7 @@ impl Table {
         bytes.map(|field| field.name().clone()).collect()
     }
 
-    /// Returns the columns with bytes as hexadecimal digits, as they were recorded, but without the prefix.
+    /// Returns the columns as they were recorded, with bytes as hexadecimal digits, but under the names of this table.
     fn recorded(&self) -> Columns {
         let arrays = self.batch.columns().iter().skip(1);
         let columns = self.columns.iter().skip(1).cloned();
