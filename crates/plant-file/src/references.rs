@@ -9,7 +9,7 @@ use crate::signals::{Signal, description, name, position, position_of, unit};
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct References {
-    /// Signals of the controller FMU. Their operating points follow from those of the measurements.
+    /// The references as inputs of the controller FMU, without operating points; see [`References::completed`].
     pub signals: Vec<Signal>,
     /// H, t x p: each reference is the set point of its row times the measurements.
     pub h: DMatrix<f64>,
