@@ -213,12 +213,12 @@ impl Builder {
         let parameters: Vec<_> =
             parameters(old).into_iter().map(|parameter| self.index(parameter)).collect();
         let states = states(old);
-        let later = |rows: &[Unknown]| {
+        let with_parameters = |rows: &[Unknown]| {
             self.rows(rows, |row| if states.contains(&row) { &[] } else { parameters.as_slice() })
         };
         ModelStructure {
-            outputs: later(&structure.outputs),
-            derivatives: later(&structure.derivatives),
+            outputs: with_parameters(&structure.outputs),
+            derivatives: with_parameters(&structure.derivatives),
             initial_unknowns: self.rows(&structure.initial_unknowns, |_| &[]),
             ..ModelStructure::default()
         }
