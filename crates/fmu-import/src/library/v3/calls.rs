@@ -23,21 +23,21 @@ modes! {
 }
 
 values! {
-    fn get_float32, set_float32: f32 = "fmi3GetFloat32" "fmi3SetFloat32", number length;
-    fn get_float64, set_float64: f64 = "fmi3GetFloat64" "fmi3SetFloat64", number length;
-    fn get_int8, set_int8: i8 = "fmi3GetInt8" "fmi3SetInt8", number length;
-    fn get_uint8, set_uint8: u8 = "fmi3GetUInt8" "fmi3SetUInt8", number length;
-    fn get_int16, set_int16: i16 = "fmi3GetInt16" "fmi3SetInt16", number length;
-    fn get_uint16, set_uint16: u16 = "fmi3GetUInt16" "fmi3SetUInt16", number length;
-    fn get_int32, set_int32: i32 = "fmi3GetInt32" "fmi3SetInt32", number length;
-    fn get_uint32, set_uint32: u32 = "fmi3GetUInt32" "fmi3SetUInt32", number length;
-    fn get_int64, set_int64: i64 = "fmi3GetInt64" "fmi3SetInt64", number length;
-    fn get_uint64, set_uint64: u64 = "fmi3GetUInt64" "fmi3SetUInt64", number length;
-    fn get_boolean, set_boolean: u8 = "fmi3GetBoolean" "fmi3SetBoolean", number length;
+    fn get_float32, set_float32: f32 = "fmi3GetFloat32" "fmi3SetFloat32", reference_count length;
+    fn get_float64, set_float64: f64 = "fmi3GetFloat64" "fmi3SetFloat64", reference_count length;
+    fn get_int8, set_int8: i8 = "fmi3GetInt8" "fmi3SetInt8", reference_count length;
+    fn get_uint8, set_uint8: u8 = "fmi3GetUInt8" "fmi3SetUInt8", reference_count length;
+    fn get_int16, set_int16: i16 = "fmi3GetInt16" "fmi3SetInt16", reference_count length;
+    fn get_uint16, set_uint16: u16 = "fmi3GetUInt16" "fmi3SetUInt16", reference_count length;
+    fn get_int32, set_int32: i32 = "fmi3GetInt32" "fmi3SetInt32", reference_count length;
+    fn get_uint32, set_uint32: u32 = "fmi3GetUInt32" "fmi3SetUInt32", reference_count length;
+    fn get_int64, set_int64: i64 = "fmi3GetInt64" "fmi3SetInt64", reference_count length;
+    fn get_uint64, set_uint64: u64 = "fmi3GetUInt64" "fmi3SetUInt64", reference_count length;
+    fn get_boolean, set_boolean: u8 = "fmi3GetBoolean" "fmi3SetBoolean", reference_count length;
 }
 
 strings! {
-    fn get_string, set_string = "fmi3GetString" "fmi3SetString", number length;
+    fn get_string, set_string = "fmi3GetString" "fmi3SetString", reference_count length;
 }
 
 equations! {
@@ -81,7 +81,7 @@ states! {
 
 /// Returns the number of references. Variables may be arrays: there may be more values.
 #[inline]
-fn number<T>(references: &[u32], _values: &[T]) -> usize {
+fn reference_count<T>(references: &[u32], _values: &[T]) -> usize {
     references.len()
 }
 
