@@ -5,6 +5,9 @@ const DEPTH: u32 = 20;
 
 /// The largest number of evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
 const EVALUATIONS: u32 = 100;
+/// The number of evaluations after which `locate` bisects: at a jump or a multiple zero regula falsi hardly narrows the
+/// interval.
+const SECANTS: u32 = 45;
 
 /// A polynomial of degree 4 on `[0, 1]` by its Bernstein coefficients.
 ///
@@ -115,7 +118,7 @@ impl Quartic {
 /// The result of [`search`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Crossing {
-    /// The margin is negative at this length, and not negative at most `width` before it.
+    /// The margin is negative or NaN at this length; at most `width` before it, it is not negative or the step starts.
     At(f64),
     /// The margin is negative at none of the lengths that were tried, of which this is the longest one, or it is NaN
     /// there.
@@ -148,11 +151,11 @@ pub fn search(
     }
 }
 
-/// Narrows a crossing of `margin` between 0, where it is `at_start >= 0`, and `ceiling`, a pair of
-/// length and margin, where it is negative. Returns the upper end of the last interval, where it is
-/// negative.
+/// Narrows a crossing of `margin`, which is `at_start >= 0` at 0 and negative at `ceiling`, a pair of length and
+/// margin. Returns the upper end of the last interval, where it is negative or NaN.
 ///
-/// Method: regula falsi with the Illinois rule, until the interval is at most `width` wide, or for 100 evaluations.
+/// Method: regula falsi with the Illinois rule, after 45 evaluations bisection, until the interval is at most `width`
+/// wide, or for 100 evaluations.
 pub fn locate(
     at_start: f64,
     ceiling: (f64, f64),
@@ -162,13 +165,17 @@ pub fn locate(
     let (mut low, mut at_low) = (0.0, at_start);
     let (mut high, mut at_high) = ceiling;
     let mut moved_low = None;
-    for _ in 0..EVALUATIONS {
+    for count in 0..EVALUATIONS {
         let distance = high - low;
         if distance <= width {
             break;
         }
-        let guess = low + distance * at_low / (at_low - at_high);
-        let guess = guess.max(low + width / 2.0).min(high - width / 2.0);
+        let secant = low + distance * at_low / (at_low - at_high);
+        let guess = if count < SECANTS {
+            secant.max(low + width / 2.0).min(high - width / 2.0)
+        } else {
+            low + distance / 2.0
+        };
         let value = margin(guess);
         let moves_low = value >= 0.0;
         let again = moved_low == Some(moves_low);
@@ -249,6 +256,19 @@ mod tests {
         let actual = locate(margin(0.0), (1.0, margin(1.0)), WIDTH, margin);
         assert!((actual - root).abs() < 2e-15 && margin(actual) < 0.0);
         assert!(count.get() < 20, "{} evaluations", count.get());
+    }
+
+    #[test]
+    fn jumps_and_multiple_zeros_are_located_to_the_width() {
+        let margins: [fn(f64) -> f64; 3] = [
+            |s| (0.3 - s).powi(5),
+            |s| if s < 0.3 { 1.0 } else { -1e-9 },
+            |s| if s < 0.3 { 0.3 - s } else { -f64::MIN_POSITIVE },
+        ];
+        for (number, margin) in margins.into_iter().enumerate() {
+            let actual = locate(margin(0.0), (1.0, margin(1.0)), WIDTH, margin);
+            assert!((0.3..0.3 + 2e-15).contains(&actual), "{number}: {actual}");
+        }
     }
 
     #[test]

@@ -114,6 +114,19 @@ fn a_zero_exactly_at_the_end_of_a_step_is_an_event() {
 }
 
 #[test]
+fn an_indicator_that_stays_at_zero_has_its_event_where_it_reaches_zero() {
+    let derivative = |_: f64, _: &[f64], slope: &mut [f64]| {
+        slope[0] = 1.0;
+        Ok(())
+    };
+    let mut system = system(derivative, |_, y, z| z[0] = (0.6 - y[0]).max(0.0));
+    let mut integrator = Integrator::new(vec![1.0], 1);
+    integrator.start(&mut system, 0.0, &[0.0], 1.0).unwrap();
+    assert_eq!(integrator.advance(&mut system, 1.0), Ok(Reached::Event));
+    assert!((integrator.time() - 0.6).abs() < 1e-12, "{}", integrator.time());
+}
+
+#[test]
 fn an_indicator_that_is_nan_only_close_to_its_zero_stops_the_integration_before_it() {
     let derivative = |_: f64, _: &[f64], slope: &mut [f64]| {
         slope[0] = 1.0;
