@@ -31,7 +31,7 @@ pub(crate) fn examine(
             warnings.extend(windup(file, scheduled, [pair[0], pair[1]])?);
         }
     } else {
-        warnings.extend(missed(file, scheduled, references, &all)?);
+        warnings.extend(feedforward(file, scheduled, references, &all)?);
     }
     Ok(warnings)
 }
@@ -85,12 +85,11 @@ fn windup(
     }
 }
 
-/// Returns the warning that references without integral action are exact at the points only; None if they are exact
-/// between them, too.
+/// Examines the feedforward between the points: a warning if a reference is exact at the points only.
 ///
 /// Between them the constant H y is G N_r r, G = H C (I - A - B K_x)^-1 B, in continuous time H C (-A - B K_x)^-1 B,
 /// with all matrices interpolated.
-fn missed(
+fn feedforward(
     file: &PlantFile<'_>,
     scheduled: &Scheduled,
     references: &References,
@@ -127,7 +126,7 @@ fn missed(
     Ok(Some(file.error_at(&references.action_places[0], message)))
 }
 
-/// Returns the largest relative error of a reference at rest after a step.
+/// Returns the largest relative error at rest of an output after a step of its own reference.
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();
