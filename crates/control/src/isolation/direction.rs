@@ -56,7 +56,7 @@ fn signs(products: &DMatrix<f64>) -> Vec<Vec<f64>> {
 }
 
 /// Multipliers of the shortest v with `s_j` `u_j'` v >= 1, times the signs `s_j`, scaled so that the smallest
-/// of the products is 1; None if there is no such v.
+/// of the products is 1; None if the sweeps find no such v.
 ///
 /// `products`: `u_i'` `u_j`.
 fn multipliers(products: &DMatrix<f64>, signs: &[f64]) -> Option<DVector<f64>> {
