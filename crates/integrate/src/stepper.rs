@@ -336,7 +336,8 @@ impl Stepper {
     }
 }
 
-/// The root mean square of `values`, relative to the tolerances from `a` to `b`; NaN if `b` is not finite.
+/// The root mean square of `values`, each relative to its tolerance in a step from the states `a` to `b`; NaN if `b` is
+/// not finite.
 fn norm(scale: &Scale, values: &[f64], a: &[f64], b: &[f64]) -> f64 {
     let part = |(i, value): (usize, &f64)| (value / scale.weight(i, a[i], b[i])).powi(2);
     let sum: f64 = values.iter().enumerate().map(part).sum();
