@@ -58,7 +58,7 @@ static PROCESS: AtomicU32 = AtomicU32::new(0);
 static FORKED_BY: AtomicUsize = AtomicUsize::new(NOT_FORKED);
 const NOT_FORKED: usize = usize::MAX;
 
-/// Returns whether an FMU forked this process.
+/// Returns whether this process is a copy that `fork` has made.
 fn is_forked() -> bool {
     std::process::id() != PROCESS.load(Ordering::Relaxed)
 }

@@ -117,7 +117,7 @@ impl Instance {
         done
     }
 
-    /// Steps in parts, each up to an event, a discarded part or an early return of the FMU.
+    /// Steps in parts, each up to an event or an early return of the FMU; of a part that it discards, tries half.
     fn step_in_parts(
         &mut self,
         time: f64,
