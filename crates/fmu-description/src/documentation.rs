@@ -16,9 +16,9 @@ th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap
 /// Name of the file in `documentation/` with the author's part of the page.
 pub const FRAGMENT: &str = "model.html";
 
-/// Renders the page of a model: its description, version, author and GUID, `model_html` with the author's
-/// equations and text, the variables, the log categories, the default experiment, the capabilities in
-/// co-simulation and model exchange, and the licence. A section without content is absent.
+/// Renders the page of a model: its description, version, author, copyright, tool and time of generation, and GUID,
+/// `model_html` with the author's equations and text, the variables, the log categories, the default experiment, the
+/// capabilities in co-simulation and model exchange, and the licence. A section without content is absent.
 ///
 /// The page is one self-contained file without scripts, well-formed as HTML and as XML if `model_html`
 /// is. Texts of `description` are escaped; the author's fragment `model_html` is inserted unchanged.
