@@ -328,7 +328,8 @@ fn read_at_start(
     Ok(())
 }
 
-/// Iterates the instant at the start time; returns the slaves with events, and the one that requested the end.
+/// Iterates the events at the start time; returns the slaves whose events the master handles, and the request of one of
+/// them for the end of the simulation, if any.
 fn first_instant(
     system: &mut System,
     scenario: &mut Scenario,
