@@ -60,7 +60,7 @@ impl Detection {
             0 => Method::Cusum,
             windows if windows == file.tests.len() => Method::Window,
             _ => {
-                let text = "only the FMU has this controller: its detection has cumulative sums and windows";
+                let text = "detection has cumulative sums and windows; only the FMU can have both";
                 return Err(Error(text.to_owned()));
             }
         };
