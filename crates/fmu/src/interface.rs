@@ -301,9 +301,9 @@ pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescript
 }
 
 impl<M> Interface<M> {
-    /// Removes clocks and structural parameters, which FMI 2.0 does not have, from the description, and sets the GUID
-    /// of what remains. Arrays have their present extents. An error for a variable of another type that FMI 2.0 does
-    /// not have.
+    /// Removes clocks and structural parameters, which FMI 2.0 does not have, and dependencies on them from the
+    /// description, and sets the GUID of what remains. Arrays have their present extents. An error for a variable of
+    /// another type that FMI 2.0 does not have.
     pub(crate) fn restrict(&mut self, description: &mut ModelDescription) -> Result<(), Failure> {
         let left_out = |variable: &ScalarVariable| {
             variable.causality == Causality::StructuralParameter
@@ -311,11 +311,19 @@ impl<M> Interface<M> {
         };
         if description.variables.iter().any(left_out) {
             description.variables.retain(|variable| !left_out(variable));
-            // The variables that are left out are the last ones.
+            // The variables that are left out are the last ones, and dependencies are in ascending order.
             let count = description.variables.len();
             let structure = &mut description.structure;
-            for rows in [&mut structure.outputs, &mut structure.initial_unknowns] {
+            let (outputs, derivatives) = (&mut structure.outputs, &mut structure.derivatives);
+            for rows in [outputs, derivatives, &mut structure.initial_unknowns] {
                 rows.retain(|row| row.index as usize <= count);
+                for row in rows {
+                    let Some(known) = &mut row.dependencies else { continue };
+                    known.retain(|index| *index as usize <= count);
+                    if let Some(kinds) = &mut row.kinds {
+                        kinds.truncate(known.len());
+                    }
+                }
             }
             description.guid = String::new();
             self.guid = Guid::of(description);

@@ -103,7 +103,7 @@ mod tests {
     use serde::{Deserialize, Serialize};
 
     use super::*;
-    use crate::{About, Model, Variable, describe_3, problems};
+    use crate::{About, Model, Variable, describe, describe_3, problems};
 
     /// A vector of `LENGTH` elements whose extent is said to be n = 2; the last element states `OTHER`.
     #[derive(Clone, Serialize, Deserialize)]
@@ -130,6 +130,39 @@ mod tests {
             let n = Variable::structural("n", "", |slave: &mut Self| &mut slave.n);
             std::iter::once(n).chain(v).collect()
         }
+    }
+
+    /// The initial value of y depends on n.
+    #[derive(Clone, Serialize, Deserialize)]
+    struct Count {
+        n: u64,
+        y: f64,
+    }
+
+    impl Model for Count {
+        const IDENTIFIER: &'static str = "Count";
+
+        fn about(&self) -> About {
+            About::default()
+        }
+
+        fn new(_: &Path) -> Result<Self, Failure> {
+            Ok(Self { n: 2, y: 0.0 })
+        }
+
+        fn variables(&self) -> Vec<Variable<Self>> {
+            let y = Variable::real("y", "", |count: &mut Self| &mut count.y);
+            let n = Variable::structural("n", "", |count: &mut Self| &mut count.n);
+            vec![n, y.output(&[]).initially(["n"])]
+        }
+    }
+
+    #[test]
+    fn a_description_of_fmi_2_states_no_dependency_on_a_structural_parameter() {
+        assert_eq!(problems::<Count>(Path::new("")), Ok(vec![]));
+        let description = describe::<Count>(Path::new("")).unwrap();
+        assert!(description.problems().is_empty(), "{:?}", description.problems());
+        assert_eq!(description.structure.initial_unknowns[0].dependencies, Some(vec![]));
     }
 
     fn refusal<M: Model>() -> String {
