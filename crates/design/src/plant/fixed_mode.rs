@@ -5,7 +5,8 @@ use control::rank::Mode;
 use nalgebra::Complex;
 
 /// Returns `the eigenvalue -2 1/s, which x2 dominates`, with the eigenvalue in the plane in which the plant file states
-/// it: of the sampled loop if `sampled`, otherwise in 1/s; `name` returns the name of a state.
+/// it: of the sampled loop if `sampled`, or if it is 0, which no rate gives; otherwise in 1/s. `name` returns the name
+/// of a state.
 pub(crate) fn described_in(
     mode: &Mode,
     domain: Domain,
@@ -13,7 +14,9 @@ pub(crate) fn described_in(
     name: impl Fn(usize) -> String,
 ) -> String {
     let (eigenvalue, unit) = match domain {
-        Domain::Sampled { period } if !sampled => (mode.eigenvalue.ln() / period, " 1/s"),
+        Domain::Sampled { period } if !sampled && mode.eigenvalue.norm() > 0.0 => {
+            (mode.eigenvalue.ln() / period, " 1/s")
+        }
         Domain::Sampled { .. } => (mode.eigenvalue, " of the sampled loop"),
         Domain::Continuous => (mode.eigenvalue, " 1/s"),
     };

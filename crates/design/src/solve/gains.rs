@@ -151,7 +151,9 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
         let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
         let near = |one: &Complex<f64>| (one - stated).norm();
         let nearest = (0..rest.len()).min_by(|&i, &j| near(&rest[i]).total_cmp(&near(&rest[j])));
-        match nearest.filter(|&at| near(&rest[at]) <= SAME * stated.norm()) {
+        // No p has e^(p T) = 0.
+        let largest = if stated.is_finite() { SAME * stated.norm() } else { 0.0 };
+        match nearest.filter(|&at| near(&rest[at]) <= largest) {
             Some(at) => drop(rest.swap_remove(at)),
             None => return Err(Refusal::Fixed(mode.clone())),
         }
@@ -203,4 +205,29 @@ fn partly_assigned(
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
     unique(gain, method)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// e^(p T) is 0 for no p, so that an eigenvalue in 1/s cannot be that of the mode.
+    #[test]
+    fn a_fixed_mode_at_zero_takes_no_requested_eigenvalue_of_the_continuous_loop() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.5, 0.0, 0.0, 0.0]);
+        let b = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+        let mut fixed = uncontrollable_modes(&a, &b).unwrap();
+        assert_eq!(fixed.len(), 1);
+        fixed[0].eigenvalue = Complex::new(0.0, 0.0);
+        let real = |values: [f64; 2]| values.map(|value| Complex::new(value, 0.0)).to_vec();
+        let domain = Domain::Sampled { period: 0.1 };
+        let refused = movable(&Requirement::Eigenvalues(real([-1.0, -7.0])), &fixed, domain);
+        assert!(matches!(refused, Err(Refusal::Fixed(_))));
+        let Ok(assignment) =
+            movable(&Requirement::SampledEigenvalues(real([0.9, 0.0])), &fixed, domain)
+        else {
+            panic!("the eigenvalue 0 of the sampled loop is requested");
+        };
+        assert_eq!(assignment.movable, [Complex::new(0.9, 0.0)]);
+    }
 }
