@@ -205,11 +205,17 @@ impl<M: Model> Interface<M> {
 }
 
 /// Splits the variables into their declarations and their fields. Variables that descriptions of FMI 2.0 leave out come
-/// last, so that the others keep their indices without them.
+/// last, then their aliases, so that the others keep their indices without them.
 fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
     let (last, first): (Vec<_>, Vec<_>) =
         variables.into_iter().partition(|variable| variable.declaration.is_left_out_of_2());
-    first.into_iter().chain(last).map(|variable| (variable.declaration, variable.fields)).unzip()
+    let is_alias_of_last = |variable: &Variable<M>| {
+        matches!(&variable.declaration.base, Base::Alias(of)
+            if last.iter().any(|target| target.declaration.name == *of))
+    };
+    let (aliases, first): (Vec<_>, Vec<_>) = first.into_iter().partition(is_alias_of_last);
+    let all = first.into_iter().chain(last).chain(aliases);
+    all.map(|variable| (variable.declaration, variable.fields)).unzip()
 }
 
 pub(crate) fn real(number: Number) -> RealType {

@@ -40,3 +40,53 @@ impl Clocks {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+    use crate::{About, Model, Variable, describe};
+
+    /// A gain with a clock, whose alias comes first.
+    #[derive(Clone, Serialize, Deserialize)]
+    struct Gain {
+        tick: bool,
+        u: f64,
+        y: f64,
+    }
+
+    impl Model for Gain {
+        const IDENTIFIER: &'static str = "Gain";
+
+        fn about(&self) -> About {
+            About::default()
+        }
+
+        fn new(_: &Path) -> Result<Self, Failure> {
+            Ok(Self { tick: false, u: 0.0, y: 0.0 })
+        }
+
+        fn variables(&self) -> Vec<Variable<Self>> {
+            vec![
+                Variable::alias("beat", "", "tick"),
+                Variable::triggered_clock("tick", "", |gain: &mut Self| &mut gain.tick).input(),
+                Variable::real("u", "", |gain: &mut Self| &mut gain.u).input(),
+                Variable::real("y", "", |gain: &mut Self| &mut gain.y).output(&["u"]),
+            ]
+        }
+    }
+
+    #[test]
+    fn a_description_of_fmi_2_has_neither_clocks_nor_their_aliases() {
+        let description = describe::<Gain>(Path::new("")).unwrap();
+        let names = description.variables.iter().map(|variable| variable.name.as_str());
+        assert_eq!(names.collect::<Vec<_>>(), ["time", "u", "y"]);
+        let rows = description.structure.outputs.iter();
+        let rows: Vec<_> = rows.map(|row| (row.index, row.dependencies.as_deref())).collect();
+        assert_eq!(rows, [(3, Some(&[2][..]))]);
+        assert!(description.problems().is_empty(), "{:?}", description.problems());
+    }
+}
