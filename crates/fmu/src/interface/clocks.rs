@@ -50,7 +50,7 @@ mod tests {
     use super::*;
     use crate::{About, Model, Variable, describe};
 
-    /// A gain with a clock, whose alias comes first.
+    /// A gain with a clock, on which the output depends, and whose alias comes first.
     #[derive(Clone, Serialize, Deserialize)]
     struct Gain {
         tick: bool,
@@ -74,7 +74,7 @@ mod tests {
                 Variable::alias("beat", "", "tick"),
                 Variable::triggered_clock("tick", "", |gain: &mut Self| &mut gain.tick).input(),
                 Variable::real("u", "", |gain: &mut Self| &mut gain.u).input(),
-                Variable::real("y", "", |gain: &mut Self| &mut gain.y).output(&["u"]),
+                Variable::real("y", "", |gain: &mut Self| &mut gain.y).output(&["tick", "u"]),
             ]
         }
     }
