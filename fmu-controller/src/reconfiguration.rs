@@ -103,8 +103,8 @@ impl Reconfigurator {
         gone_before ^ self.gone
     }
 
-    /// The time in s of the next decision by an estimate that is above its fraction now; `None` if none is, or all of
-    /// these are decided.
+    /// The time in s at which the next actuator counts as gone if the estimated losses above their fractions stay
+    /// there; `None` if there are none, or all of them are decided.
     pub(crate) fn next_decision(&self, design: &Design) -> Option<f64> {
         let ends =
             design.reconfigurations.iter().zip(&self.above_since).filter_map(|(case, since)| {
