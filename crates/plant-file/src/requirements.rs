@@ -284,7 +284,7 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64)> {
     }
 }
 
-/// Reads a bound of the norm, or the text "least" (`None`). `remedy`: what "least" needs, if it is not possible.
+/// Reads a bound of the norm, or the text "least" (`None`). `remedy`: what the file lacks for "least", if anything.
 fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     if !entry.is_text() {
         return entry.positive().map(Some);
@@ -292,7 +292,7 @@ fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     match (entry.text()?, remedy) {
         ("least", None) => Ok(None),
         ("least", Some(remedy)) => Err(entry.error(format!(
-            "\"least\" needs {remedy}: without, ever larger gains lower the norm without end"
+            "\"least\" needs {remedy}: without it, ever larger gains lower the norm without end"
         ))),
         (other, _) => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
     }
