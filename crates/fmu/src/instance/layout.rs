@@ -75,7 +75,7 @@ impl LayoutHasher {
         }
     }
 
-    /// Adds a variant of an enum: its name and its number, which the bytes contain.
+    /// Adds a variant of the enum `name`: its kind, its number, which the serialised bytes contain, and its name.
     fn variant(&mut self, kind: &str, name: &str, number: u32, variant: &str) {
         self.words([kind, name]);
         self.add(u64::from(number));
