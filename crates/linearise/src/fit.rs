@@ -63,9 +63,9 @@ pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>, noise: &[f64]) -
     let mut solution = r.solve_upper_triangular(&(qr.q().transpose() * y))?;
     let residual = y - &scaled * &solution;
     let inverse = r.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
-    let freedom = f64::from(u32::try_from(rows.saturating_sub(columns).max(1)).ok()?).sqrt();
+    let freedom = f64::from(u32::try_from(rows.saturating_sub(columns).max(1)).ok()?);
     let mut deviations = DMatrix::from_fn(columns, y.ncols(), |i, j| {
-        inverse.row(i).norm() * (residual.column(j).norm() / freedom + noise[j])
+        inverse.row(i).norm() * (residual.column(j).norm() / freedom.sqrt() + noise[j])
     });
     for (row, length) in lengths.iter().enumerate() {
         solution.row_mut(row).scale_mut(1.0 / length);
