@@ -92,7 +92,7 @@ pub struct AsoController {
     /// Made from `design` in the first step, and again after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
-    /// Space for the derivatives of the interpolated design with respect to time, and of the signals.
+    /// Buffer for the time derivatives of the interpolated design and of the signals.
     #[serde(skip)]
     rates: Option<Box<(Design, Signals)>>,
 }
