@@ -110,7 +110,7 @@ impl AssignableSubspaces {
         side_by_side(units.len(), columns)
     }
 
-    /// The directions, of length one, nearest to given eigenvectors: one column for a real eigenvalue, two for a
+    /// The directions, of length one, nearest to `eigenvectors`, which have one column for a real eigenvalue, two for a
     /// pair.
     pub(crate) fn directions_of(&self, eigenvectors: &DMatrix<f64>) -> Vec<DVector<f64>> {
         let mut column = 0;
