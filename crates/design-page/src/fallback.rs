@@ -24,7 +24,7 @@ pub(super) fn fallback(fallback: &FallbackReport) -> Markup {
                  rate, too."
             } @else {
                 "The estimated faults are not compensated: with the compensation the loop would not decay \
-                 at the required rate in all cases. What they cause stays in the states."
+                 at the required rate in all cases. Their effect on the states remains."
             }
         }
         @match &fallback.whole {
