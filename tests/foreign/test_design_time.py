@@ -39,7 +39,7 @@ def test_a_search_says_where_it_is_every_ten_seconds_and_ends_at_an_interrupt(tm
         assert lines[0].startswith("10 s, ") and lines[0].endswith(": gains\n"), lines
         process.send_signal(signal.SIGINT)
         rest = process.communicate(timeout=PATIENCE)[1]
-    assert "interrupted: the design ends with what there is" in rest and "the design was interrupted" in rest
+    assert "interrupted: the design leaves out optional work" in rest and "the design was interrupted" in rest
     assert process.returncode == 2
 
 

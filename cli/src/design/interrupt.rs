@@ -21,7 +21,7 @@ pub(super) fn listen() -> anyhow::Result<Arc<AtomicBool>> {
         if signal != INTERRUPT || raised.swap(true, Ordering::Relaxed) {
             crash::leave(128 + signal);
         }
-        eprintln!("interrupted: the design ends with what there is; Ctrl-C again ends it at once");
+        eprintln!("interrupted: the design leaves out optional work; Ctrl-C again ends it at once");
     };
     on_signal(react).context("Ctrl-C cannot be handled")?;
     Ok(flag)
