@@ -74,7 +74,7 @@ macro_rules! export {
 
         // Unit tests of the model call no C function; without them they are compiled in a third of the time.
         #[cfg(test)]
-        const _: &str = <$model as $crate::Model>::IDENTIFIER;
+        const _: &::core::primitive::str = <$model as $crate::Model>::IDENTIFIER;
 
         // A block and absolute paths, so that no name conflicts with names of the model's module.
         #[cfg(not(test))]
