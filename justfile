@@ -11,7 +11,7 @@ quick:
 test:
     scripts/test
 
-# Unit tests with debug assertions and overflow checks; the page in a browser; FMUs for Windows under wine.
+# Systematic faults; the page in a browser; FMUs for Windows under wine.
 test-long:
     scripts/test-long
 
