@@ -24,7 +24,7 @@ use plant_file::signals::{Signal, is_one_unit, is_one_unit_of_differences};
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;
 
-/// Part of the largest entry of a row of C below which an entry of D or G counts as zero.
+/// Part of the largest entry of a row of C below which an entry of D or G counts as zero, in units of typical sizes.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Part of the largest entry of a row above which the error of a linearisation is more than rounding.
@@ -521,7 +521,7 @@ fn inaccuracy(linearised: &Linearisation) -> Option<f64> {
 /// their differences. An error above [`INACCURATE`] of the row, as at a kink, removes no entry.
 pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
     let Linearisation { states, inputs, faults, matrices, .. } = linearised;
-    let linearise::Matrices { c, d, g, .. } = matrices;
+    let linearise::Matrices { d, g, .. } = matrices;
     let errors = match &linearised.method {
         Method::FiniteDifferences { errors, .. } => Some(errors),
         Method::DirectionalDerivatives { .. } => None,
@@ -529,16 +529,18 @@ pub(crate) fn direct_terms(linearised: &Linearisation) -> [DMatrix<f64>; 2] {
     let joined = matrices.joined();
     let columns = states.iter().chain(inputs).chain(faults);
     let typical: Vec<f64> = columns.map(|signal| signal.typical).collect();
-    let largest = |row: usize| {
+    let largest = |row: usize, columns: usize| {
         let entries = joined.row(states.len() + row);
-        entries.iter().zip(&typical).map(|(entry, size)| entry.abs() * size).fold(0.0, f64::max)
+        let sizes = entries.iter().zip(&typical).take(columns);
+        sizes.map(|(entry, size)| entry.abs() * size).fold(0.0, f64::max)
     };
     let significant = |values: &DMatrix<f64>, errors: Option<&DMatrix<f64>>, first: usize| {
         values.map_with_location(|row, column, entry| {
             let error = errors.map_or(0.0, |errors| errors[(row, column)]);
-            let is_rounding = error * typical[first + column] <= INACCURATE * largest(row);
+            let size = typical[first + column];
+            let is_rounding = error * size <= INACCURATE * largest(row, typical.len());
             let rounding = if is_rounding { error } else { 0.0 };
-            let negligible = rounding.max(NEGLIGIBLE * c.row(row).amax());
+            let negligible = rounding.max(NEGLIGIBLE * largest(row, states.len()) / size);
             if entry.abs() <= negligible { 0.0 } else { entry }
         })
     };
@@ -596,6 +598,15 @@ mod tests {
     fn a_direct_term_within_the_error_of_its_difference_is_none() {
         let linearised = differences([&[-1.0], &[2.0, 1e-7], &[1e-7]], [0.0, 1e-6]);
         assert_eq!(direct_terms(&linearised), [row(&[2.0, 0.0]), row(&[0.0])]);
+    }
+
+    /// `y = 1e9 x + D u`, x of 1e-9: the first input acts half as much as x, the second one 1e-10 times as much.
+    #[test]
+    fn a_direct_term_counts_beside_the_typical_size_of_the_states() {
+        let mut linearised = differences([&[-1.0], &[0.5, 1e-10], &[0.0]], [0.0; 2]);
+        linearised.matrices.c = row(&[1e9]);
+        linearised.states[0].typical = 1e-9;
+        assert_eq!(direct_terms(&linearised), [row(&[0.5, 0.0]), row(&[0.0])]);
     }
 
     /// `y = x + max(u_1, 0)`: the difference at 0 is 1/2, and may be off by 1/2.
