@@ -1,7 +1,7 @@
 //! Temporary folders. On Unix, the next process removes those of a killed process.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, Once, PoisonError, TryLockError};
 
@@ -33,18 +33,21 @@ impl TemporaryFolder {
     ///
     /// # Errors
     ///
-    /// If the folder cannot be created, or if other processes remove 10 folders before they are locked.
+    /// If the folder cannot be created or opened, or if other processes remove 10 folders before they are locked.
     pub fn new() -> io::Result<Self> {
         static CLEARED: Once = Once::new();
         let parent = std::env::temp_dir();
         CLEARED.call_once(|| remove_abandoned(&parent));
         for _ in 0..ATTEMPTS {
             let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(&parent)?;
-            if let Ok(lock) = lock(folder.path()) {
-                let mut folders = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
-                folders.push(folder.path().to_owned());
-                return Ok(Self { folder, _lock: lock });
-            }
+            let lock = match lock(folder.path()) {
+                Ok(lock) => lock,
+                Err(error) if is_taken(&error) => continue,
+                Err(error) => return Err(error),
+            };
+            let mut folders = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
+            folders.push(folder.path().to_owned());
+            return Ok(Self { folder, _lock: lock });
         }
         Err(io::Error::other("other processes remove the folders as soon as they are made"))
     }
@@ -85,6 +88,11 @@ pub fn remove_abandoned_folders() {
     remove_abandoned(&std::env::temp_dir());
 }
 
+/// Returns whether the error of [`lock`] says that another process is removing the folder, or has removed it.
+fn is_taken(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::NotFound)
+}
+
 /// Locks the folder at `path`; `None` without locks, an error if another process has locked or removed it.
 #[cfg(unix)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
@@ -92,12 +100,12 @@ fn lock(path: &Path) -> io::Result<Option<File>> {
     let file = File::open(path)?;
     match file.try_lock() {
         Ok(()) => {}
-        Err(std::fs::TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
+        Err(std::fs::TryLockError::WouldBlock) => return Err(ErrorKind::WouldBlock.into()),
         // The file system has no locks, so no other process can hold one.
         Err(std::fs::TryLockError::Error(_)) => return Ok(None),
     }
     let same = std::fs::symlink_metadata(path)?.ino() == file.metadata()?.ino();
-    if same { Ok(Some(file)) } else { Err(io::ErrorKind::NotFound.into()) }
+    if same { Ok(Some(file)) } else { Err(ErrorKind::NotFound.into()) }
 }
 
 #[cfg(not(unix))]
@@ -139,6 +147,18 @@ mod tests {
         drop(lock);
         remove_abandoned(parent.path());
         assert_eq!((used.exists(), other.exists()), (false, true));
+    }
+
+    /// Another attempt helps against other processes, but not if too many files are open.
+    #[test]
+    fn a_folder_is_taken_if_it_is_locked_or_removed() {
+        const EMFILE: i32 = 24;
+        let folder = tempfile::tempdir().unwrap();
+        let error = |path: &Path| lock(path).unwrap_err();
+        let _lock = lock(folder.path()).unwrap();
+        assert!(is_taken(&error(folder.path())));
+        assert!(is_taken(&error(&folder.path().join("gone"))));
+        assert!(!is_taken(&io::Error::from_raw_os_error(EMFILE)));
     }
 
     #[test]
