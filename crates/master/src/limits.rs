@@ -202,6 +202,9 @@ impl Watch {
     ) {
         let reported = &mut self.reported;
         self.watched.retain(|input| {
+            if *reported == NAMED {
+                return false;
+            }
             let Some(value) = input.value(reals, &integer) else { return true };
             let Some(why) = input.limits.refuse(value) else { return true };
             *reported += 1;
@@ -217,5 +220,27 @@ impl Watch {
         if *reported >= NAMED {
             self.watched.clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn five_inputs_are_reported_if_more_leave_their_limits_at_once() {
+        let limits = Limits { min: 0.0, max: 1.0, tolerance: 0.0, items: Vec::new() };
+        let watched = |number: usize| Watched {
+            name: format!("a.u{number}"),
+            source: Source::Real(number),
+            transformation: Transformation::Identity,
+            limits: limits.clone(),
+        };
+        let mut watch = Watch { watched: (0..9).map(watched).collect(), reported: 0 };
+        // The first one is within its limits.
+        let reals = [0.5, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
+        watch.check(0.0, &reals, |_| None);
+        assert_eq!(watch.reported, 5);
+        assert!(watch.is_empty());
     }
 }
