@@ -316,8 +316,8 @@ impl Exchange {
         while let Some((port, value)) = self.reals.report_derivative(slave) {
             let name = system.name(port);
             tracing::warn!(
-                "{name}: its output derivative (fmi2GetRealOutputDerivatives) is {value} at \
-                 t = {} s; connections from {name} are held while it is not finite",
+                "{name}: its output derivative is {value} at t = {} s; connections from {name} are \
+                 held while it is not finite",
                 seconds(time)
             );
         }
