@@ -110,7 +110,14 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
 /// Returns the text of a cell in the line of the units, without the brackets around it.
 fn unit(cell: &[u8]) -> String {
     let text = String::from_utf8_lossy(cell);
-    text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']).trim().to_owned()
+    let text = text.trim();
+    let inside = |(open, close): (char, char)| {
+        let inner = text.strip_prefix(open)?.strip_suffix(close)?;
+        // The brackets of `(m/s)/(rad/s)` are two pairs.
+        let is_pair = inner.find(close).is_none_or(|end| inner[..end].contains(open));
+        is_pair.then(|| inner.trim())
+    };
+    [('[', ']'), ('(', ')')].into_iter().find_map(inside).unwrap_or(text).to_owned()
 }
 
 /// Calls the visitor for each row, as [`super::Table::visit`] says; the time is the first of `positions`.

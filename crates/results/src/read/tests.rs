@@ -100,6 +100,17 @@ fn layouts_of_other_programs_are_read() {
         let unit = table.columns()[place].unit.as_deref();
         assert_eq!(unit, (name == "units.csv").then_some("m"), "{name}");
     }
+    for (cell, unit) in [
+        ("J/(kg.K)", "J/(kg.K)"),
+        ("[J/(kg.K)]", "J/(kg.K)"),
+        ("(J/(kg.K))", "J/(kg.K)"),
+        ("(m/s)/(rad/s)", "(m/s)/(rad/s)"),
+        ("( m )", "m"),
+    ] {
+        let text = format!("time,x\ns,{cell}\n0,1\n");
+        let table = written(folder.path(), "brackets.csv", &text);
+        assert_eq!(table.columns()[1].unit.as_deref(), Some(unit), "{cell}");
+    }
     for (name, sign) in
         [("little.csv", u16::to_le_bytes as fn(u16) -> [u8; 2]), ("big.csv", u16::to_be_bytes)]
     {
