@@ -84,7 +84,9 @@ pub(crate) fn study(error: &study::Error) -> Exception {
         E::Fmu(source) => Exception::new(FMU, fmu_kind(source), sentence),
         E::Isolated(_) => Exception::new(FMU, "Isolated", sentence),
         E::Library(_) => Exception::new(FMU, "Library", sentence),
+        E::Compile(_) => Exception::new(FMU, "Compile", sentence),
         E::Results(_) => Exception::new(RESULTS, "Results", sentence),
+        E::Outputs(_) => Exception::new(CONFIGURATION, "Outputs", sentence),
         E::File { action, path, .. } => Exception::new(CONFIGURATION, "File", sentence)
             .text("action", *action)
             .text("path", path.display().to_string()),
@@ -152,6 +154,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             let exception = named("Size", to).text("size", to_size).text("element", &**element);
             exception.text("source", from).text("source_size", from_size)
         }
+        E::Terminals { from, to, .. } => named("Terminals", to).text("source", from),
         E::Resized { name } => named("Resized", name),
         E::Value { name, value, expected } => {
             named("Value", name).text("value", value).text("expected", expected)
@@ -174,6 +177,13 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         }
         E::Call { slave, time, source } => {
             with_call(failed("Call").text("fmu", slave).number("time", *time), source)
+        }
+        E::Unreadable { name, time, source } => {
+            let exception = failed("Unreadable").text("fmu", name).text("name", name);
+            with_call(exception.number("time", *time), source)
+        }
+        E::Unsettled { names, time, .. } => {
+            failed("Unsettled").text("names", names).number("time", *time)
         }
         E::NotFinite { name, value, time } => {
             failed("NotFinite").text("name", name).number("value", *value).number("time", *time)

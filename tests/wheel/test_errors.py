@@ -69,6 +69,24 @@ def test_an_error_in_a_file_has_its_line_and_column(tmp_path):
     assert (caught.value.path, caught.value.line, caught.value.column) == (str(file), 4, 8)
 
 
+def test_terminals_that_do_not_match_are_a_configuration_error(packed):
+    system = af.System().add("node", packed("examples/can-node"))
+    system.add("plant", af.fmus()["FrictionPendulum"]).connect("node.CanChannel", "plant.x_p")
+    with pytest.raises(af.ConfigurationError, match="plant.x_p is no terminal") as caught:
+        system.run(stop_time=0.1)
+    error = caught.value
+    assert (error.kind, error.name, error.source) == ("Terminals", "plant.x_p", "node.CanChannel")
+
+
+def test_results_in_a_file_that_the_run_reads_are_a_configuration_error(paper, tmp_path):
+    file = tmp_path / "signal.csv"
+    file.write_text("time,plant.d\n0,0\n", encoding="utf-8")
+    paper.scenario["table"] = [{"csv": str(file)}]
+    with pytest.raises(af.ConfigurationError, match="signal.csv") as caught:
+        paper.run(file=file)
+    assert caught.value.kind == "Outputs" and file.read_text(encoding="utf-8") == "time,plant.d\n0,0\n"
+
+
 def test_a_missing_fmu_is_an_fmu_error(tmp_path):
     for call in (af.simulate, af.read_model_description, af.check):
         with pytest.raises(af.FmuError, match="missing.fmu"):
