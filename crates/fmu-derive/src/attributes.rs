@@ -150,6 +150,12 @@ impl Attributes {
     }
 }
 
+/// The name of a field or an item without `r#`.
+pub(crate) fn plain(ident: &Ident) -> String {
+    let name = ident.to_string();
+    name.strip_prefix("r#").unwrap_or(&name).to_owned()
+}
+
 /// Parses the name of a field, an identifier or a text.
 fn field_name(input: ParseStream<'_>) -> Result<Ident> {
     if input.peek(LitStr) {
@@ -185,7 +191,7 @@ fn items(meta: &ParseNestedMeta<'_>, span: Span) -> Result<Items> {
             content.parse()?
         } else {
             let item: Ident = content.parse()?;
-            LitStr::new(&item.to_string(), item.span())
+            LitStr::new(&plain(&item), item.span())
         };
         content.parse::<Token![=]>()?;
         values.push((item, content.parse()?));

@@ -6,7 +6,7 @@ use syn::{
     TypeArray,
 };
 
-use crate::attributes::{Attributes, Role};
+use crate::attributes::{Attributes, Role, plain};
 
 /// The base type of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,12 +98,6 @@ pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
         attributes,
         is_state: false,
     })))
-}
-
-/// The name of a field without `r#`.
-fn plain(ident: &Ident) -> String {
-    let name = ident.to_string();
-    name.strip_prefix("r#").unwrap_or(&name).to_owned()
 }
 
 /// The last name in the path of a type: `Log` of `fmu::Log`; `None` if the type is no path.

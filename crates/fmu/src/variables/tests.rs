@@ -33,7 +33,7 @@ struct Everything {
     #[fmu(parameter, unit = "kg", quantity = "Mass", min = 1e-3, start = 1)]
     mass: f64,
     /// Operating mode
-    #[fmu(input, enumeration("Mode", off = 0, "on and off" = 1), start = 1)]
+    #[fmu(input, enumeration("Mode", off = 0, "on and off" = 1, r#static = 2), start = 1)]
     mode: i32,
     #[fmu(output, depends())]
     count: i32,
@@ -116,6 +116,7 @@ fn roles_types_and_attributes_are_described() {
     assert_eq!((real("mass").min, real("mass").max), (Some(1e-3), None));
     assert!(matches!(&find("mode").kind, Kind::Enumeration(kind) if kind.start == Some(1)));
     assert_eq!(description.types[0].items[1], ("on and off".to_owned(), 1));
+    assert_eq!(description.types[0].items[2], ("static".to_owned(), 2));
     assert_eq!(find("count").description, None);
     assert_eq!(find("enabled").kind, Kind::Boolean(Some(true)));
     assert_eq!(find("label").kind, Kind::String(Some("pump".to_owned())));
