@@ -52,9 +52,10 @@ impl DisturbedPlant {
         check::shape("C", &self.c, (p, n))?;
         check::shape("D_u", &self.d_u, (p, m))?;
         check::shape("D_f", &self.d_f, (p, q))?;
-        if disturbances > 0 || self.d_d.ncols() > 0 {
-            check::shape("B_d", &self.b_d, (n, disturbances))?;
-            check::shape("D_d", &self.d_d, (p, disturbances))?;
+        for (name, matrix, rows) in [("B_d", &self.b_d, n), ("D_d", &self.d_d, p)] {
+            if matrix.shape() != (rows, 0) || disturbances > 0 {
+                check::shape(name, matrix, (rows, disturbances))?;
+            }
         }
         self.domain.check()
     }

@@ -243,8 +243,11 @@ fn bad_requirements_and_patterns_are_refused_and_a_plant_without_disturbances_is
     let noise = Some(vec![1.0, 2.0]);
     let refused = design(&plant, &[true; 3], &Requirements { noise, ..good.clone() });
     assert!(matches!(refused, Err(Error::Shape { matrix: "noise", .. })));
-    plant.b_d = DMatrix::zeros(8, 0);
     plant.d_d = DMatrix::zeros(4, 0);
+    plant.b_d = DMatrix::zeros(0, 0);
+    let expected = Error::Shape { matrix: "B_d", expected: (8, 0), actual: (0, 0) };
+    assert_eq!(plant.check(), Err(expected));
+    plant.b_d = DMatrix::zeros(8, 0);
     let residual = design(&plant, &[true, false, false], &good).unwrap();
     let [known, faults] = responses(&plant, &residual, 1.3);
     assert!(known.norm() < 1e-9 * faults.norm());
