@@ -85,11 +85,15 @@ pub struct Controller {",
     pub outside: bool,"
             }
         };
+        let inputs = match controller.schedule_inputs() {
+            [] => "A measurement or reference",
+            _ => "A measurement, a reference or the scheduling variable",
+        };
         let held = if controller.checks_measurements() {
-            "A measurement or reference was NaN or infinite, or a measurement outside of its range; its last other
-    /// value was used."
+            ", or a measurement
+    /// outside of its range; its last other value was used."
         } else {
-            "A measurement or reference was NaN or infinite; its last finite value was used."
+            "; its last finite value was used."
         };
         let lost = if controller.limits_holds() {
             "
@@ -103,7 +107,7 @@ pub struct Controller {",
 /// What was unusual in a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {{
-    /// {held}
+    /// {inputs} was NaN or infinite{held}
     pub held: bool,
     /// A command is at a limit.
     pub at_limit: bool,
