@@ -192,14 +192,23 @@ fn scenario(
     let driven: Vec<Port> = prepared.scenario.drives.iter().map(Drive::port).collect();
     let free = system.free_inputs().into_iter().filter(|port| !driven.contains(port));
     let free: Vec<String> = free.map(|port| system.name(port)).collect();
+    // A column of an existing variable is no misspelt input: the variable is an output, connected or driven elsewhere.
+    let entries = loaded.config.scenario.table.iter();
+    let elements = entries.filter_map(|entry| Some(entry.get_ref().element.as_ref()?.get_ref()));
+    let elements: Vec<&String> = elements.collect();
+    let exists = |column: &str| {
+        let in_element = |element: &&String| system.port(&format!("{element}.{column}")).is_ok();
+        system.port(column).is_ok() || elements.iter().any(in_element)
+    };
     for (file, column) in &prepared.unused {
         let file = file.display();
         let variable =
             |name: &str| name.split_once('.').map_or("", |(_, variable)| variable).to_owned();
-        let meant = free.iter().find(|name| {
+        let is_meant = |name: &&String| {
             let names = [name.as_str(), &variable(name)];
             slip(names.into_iter(), column).is_some()
-        });
+        };
+        let meant = if exists(column) { None } else { free.iter().find(is_meant) };
         match meant {
             Some(input) => tracing::warn!(
                 "{file}: the column {column:?} names no input and is not used; {input}, of a similar name, has no \

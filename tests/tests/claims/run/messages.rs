@@ -131,3 +131,19 @@ fn a_column_that_is_an_input_but_for_a_letter_is_named() {
     let warning = warnings("U");
     assert!(warning.contains("\"U\"") && warning.contains("a.u"), "{warning}");
 }
+
+#[test]
+fn a_column_of_an_input_that_another_entry_drives_is_not_called_misspelt() {
+    let bench = Bench::new();
+    let fmu = CFmu::well_behaved().write(bench.folder.path(), "a");
+    let system = format!(
+        "[fmus]\na = {fmu:?}\n[[scenario.set]]\nvariable = \"a.i_in\"\nat = 0\nvalue = 1\n\
+         [[scenario.table]]\ncsv = \"in.csv\"\nelement = \"a\"\n"
+    );
+    let system = bench.write("system.toml", &system);
+    // The name differs by one letter from b_in, which is free.
+    bench.write("in.csv", "time,u,i_in\n0,1,2\n");
+    let output = bench.run(&[&system, "--stop-time", "0.5", "--step", "0.5"]);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(!said(&output).contains("warning"), "{}", said(&output));
+}
