@@ -64,8 +64,9 @@ impl Table {
     }
 
     /// Returns the columns in the order of the file, including the time; of MAT files, those that vary come first.
-    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also those with 64 bits.
-    /// Columns of CSV have no unit, unless the second line of the file states units.
+    /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also those with 64 bits;
+    /// its decimals and timestamps, which are in s, have the type Real. Columns of CSV have no unit, unless the second
+    /// line of the file states units.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns

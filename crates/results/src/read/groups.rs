@@ -3,11 +3,12 @@
 use std::fs::File;
 use std::path::Path;
 
-use ::parquet::basic::{ConvertedType, Type as Physical};
+use ::parquet::basic::{ConvertedType, LogicalType, Type as Physical};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::DataType;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
+use ::parquet::schema::types::ColumnDescriptor;
 
 use super::{Clock, Column, ResultsError, Visitor, unreadable};
 use crate::ColumnKind;
@@ -35,6 +36,7 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
             }
             let kind = match column.physical_type() {
                 Physical::DOUBLE | Physical::FLOAT => ColumnKind::Real,
+                Physical::INT32 | Physical::INT64 if divisor(column) > 1.0 => ColumnKind::Real,
                 Physical::INT32 | Physical::INT64 => ColumnKind::Integer,
                 Physical::BOOLEAN => ColumnKind::Boolean,
                 _ => ColumnKind::String,
@@ -43,6 +45,21 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
             Ok(Column { unit: units.remove(&name), name, kind, clocked })
         })
         .collect()
+}
+
+/// Returns the number by which the integers of a column are divided: for decimals a power of ten, for times and
+/// timestamps the number of their units in 1 s, otherwise 1.
+fn divisor(column: &ColumnDescriptor) -> f64 {
+    let is_time =
+        |logical: &LogicalType| matches!(logical, LogicalType::Time(_) | LogicalType::Timestamp(_));
+    match column.converted_type() {
+        ConvertedType::DECIMAL => 10_f64.powi(column.type_scale()),
+        ConvertedType::TIME_MILLIS | ConvertedType::TIMESTAMP_MILLIS => 1e3,
+        ConvertedType::TIME_MICROS | ConvertedType::TIMESTAMP_MICROS => 1e6,
+        // Nanoseconds have no converted type.
+        ConvertedType::NONE if column.logical_type_ref().is_some_and(is_time) => 1e9,
+        _ => 1.0,
+    }
 }
 
 pub(super) fn visit(
@@ -114,13 +131,14 @@ fn visit_group(
         .iter()
         .map(|position| group.get_column_reader(*position))
         .collect::<Result<Vec<_>, _>>()?;
-    let is_unsigned: Vec<bool> = positions
+    let (is_unsigned, divisors): (Vec<bool>, Vec<f64>) = positions
         .iter()
         .map(|position| {
-            let kind = group.metadata().column(*position).column_descr().converted_type();
-            matches!(kind, ConvertedType::UINT_32 | ConvertedType::UINT_64)
+            let column = group.metadata().column(*position).column_descr();
+            let kind = column.converted_type();
+            (matches!(kind, ConvertedType::UINT_32 | ConvertedType::UINT_64), divisor(column))
         })
-        .collect();
+        .unzip();
     let mut cells = vec![Vec::with_capacity(ROWS); positions.len()];
     let mut row = vec![0.0; positions.len()];
     loop {
@@ -135,8 +153,8 @@ fn visit_group(
             return Ok(());
         }
         for place in 0..rows {
-            for (value, cells) in row.iter_mut().zip(&cells) {
-                *value = cells[place];
+            for ((value, cells), divisor) in row.iter_mut().zip(&cells).zip(&divisors) {
+                *value = cells[place] / divisor;
             }
             visitor(row[0], &row[1..]);
         }

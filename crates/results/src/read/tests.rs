@@ -1,7 +1,7 @@
 use std::fs;
 use std::sync::Arc;
 
-use ::parquet::data_type::{DoubleType, Int64Type};
+use ::parquet::data_type::{DoubleType, Int32Type, Int64Type};
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::SerializedFileWriter;
 use ::parquet::schema::parser::parse_message_type;
@@ -283,4 +283,32 @@ fn nulls_long_integers_and_a_time_of_another_name_are_read() {
     table.visit(&[1, 2], &mut |time, row| rows.push((time, row[0], row[1]))).unwrap();
     assert_eq!((rows[0], rows[2]), ((0.0, 5.0, 1.0), (2.0, 6.0, 3.0)));
     assert!(rows[1].1.is_nan() && (rows[1].2 - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn timestamps_are_read_in_seconds_and_decimals_with_their_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let schema = "message m { required int64 time (TIMESTAMP(MICROS,true)); \
+                  required int64 t_n (TIMESTAMP(NANOS,false)); required int32 x (DECIMAL(9,2)); }";
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let file = fs::File::create(&path).unwrap();
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(file, schema, properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    for values in [[1_700_000_000_250_000_i64, 1_700_000_000_500_000], [250_000_000, 500_000_000]] {
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&values, None, None).unwrap();
+        column.close().unwrap();
+    }
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int32Type>().write_batch(&[150, -25], None, None).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    let table = Table::open(&path).unwrap();
+    assert!(table.columns().iter().all(|column| column.kind == ColumnKind::Real));
+    let mut rows = Vec::new();
+    table.visit(&[1, 2], &mut |time, row| rows.push([time, row[0], row[1]])).unwrap();
+    assert_eq!(rows, [[1_700_000_000.25, 0.25, 1.5], [1_700_000_000.5, 0.5, -0.25]]);
 }
