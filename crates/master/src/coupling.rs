@@ -56,12 +56,14 @@ pub(crate) struct Iterated {
     /// Whether a step whose iteration fails is made once without iteration.
     falls_back: bool,
     pub(crate) fallbacks: Fallbacks,
+    /// Start in s of the communication step in which the iteration failed last; NaN if there is none.
+    failed_at: f64,
 }
 
-/// Count of the steps whose iteration failed and that were made once without iteration.
+/// Count of the communication steps in which the iteration failed, so that they were made once without iteration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fallbacks {
-    /// Number of such steps.
+    /// Number of such steps; one that step control or an event repeats counts once.
     pub count: u64,
     /// Reason and time of the first failure; empty if there is none.
     pub first: String,
@@ -106,6 +108,7 @@ impl Iterated {
             directional: unable.is_none(),
             falls_back: algorithm.fallback,
             fallbacks: Fallbacks::default(),
+            failed_at: f64::NAN,
         })
     }
 
@@ -114,7 +117,11 @@ impl Iterated {
     fn step(&mut self, engine: &mut Engine, time: f64, size: f64) -> Result<Swept, SystemError> {
         match self.solve(engine, time, size) {
             Err(error) if self.falls_back && is_recoverable(&error) => {
-                self.fallbacks.add(&error);
+                let start = engine.grid.time;
+                if start.total_cmp(&self.failed_at).is_ne() {
+                    self.failed_at = start;
+                    self.fallbacks.add(&error);
+                }
                 engine.restore(&self.start)?;
                 engine.sweep(time, size)
             }

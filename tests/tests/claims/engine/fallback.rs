@@ -24,7 +24,8 @@ impl Direct {
     /// A slave whose direct dependency appears only after the initialization.
     fn boxed(function: fn(f64) -> f64) -> Box<Self> {
         let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Direct" guid="direct">
-            <CoSimulation modelIdentifier="D" canGetAndSetFMUstate="true"/><ModelVariables>
+            <CoSimulation modelIdentifier="D" canGetAndSetFMUstate="true"
+            canHandleVariableCommunicationStepSize="true"/><ModelVariables>
             <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/>
             </ScalarVariable><ScalarVariable name="y" valueReference="1" causality="output"><Real/>
             </ScalarVariable></ModelVariables><ModelStructure>
@@ -114,6 +115,21 @@ fn a_loop_without_solution_falls_back_to_single_steps_and_counts_them() {
         assert!(fallbacks.first.contains("t = 0 s"), "{}", fallbacks.first);
         assert_eq!(once.fallbacks(), None);
     }
+}
+
+/// A whole step and two halves end with different signs for every step size.
+#[test]
+fn a_step_that_the_step_control_repeats_counts_as_one_fallback() {
+    let algorithm = Algorithm {
+        coupling: Coupling::Newton,
+        control: StepControl::Doubling,
+        fallback: true,
+        ..Algorithm::new(STEP)
+    };
+    let mut simulation = started(&algorithm);
+    let error = simulation.step().unwrap_err();
+    assert!(matches!(error, SystemError::Stuck { .. }), "{error}");
+    assert_eq!(simulation.fallbacks().unwrap().count, 1);
 }
 
 /// The loop u = -1 - 3 u has the solution -0.25. The iteration starts at 0, the limit: a larger value, as a difference
