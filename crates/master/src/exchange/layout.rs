@@ -205,8 +205,9 @@ impl Layout {
         }
     }
 
-    /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on an input
-    /// that follows it, also through further slaves. An output without stated dependencies counts as smooth.
+    /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on a Real input
+    /// that follows it, also through further slaves. An output without stated dependencies counts as smooth, as does
+    /// one that depends on discrete outputs through inputs of other types only, such as a Boolean.
     fn find_jumping(&mut self, system: &System) {
         let outputs = || self.output_ports.iter().zip(&self.discrete);
         let discrete = outputs().filter(|(_, is_discrete)| **is_discrete);
