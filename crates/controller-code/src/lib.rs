@@ -94,7 +94,7 @@ pub struct Request<'a> {
     pub identity: &'a str,
     /// The verdict on the design: one word.
     pub verdict: &'static str,
-    /// The delay of all commands at which the loop becomes unstable, in s, if it is known.
+    /// The delay of all commands at which the loop becomes unstable, in s, if it is known; infinite if none does.
     pub delay_margin: Option<f64>,
     /// The language.
     pub language: Language,

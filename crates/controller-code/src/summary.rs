@@ -138,10 +138,17 @@ fn timing(request: &Request<'_>, controller: &Controller, vocabulary: &Vocabular
                     that they contain those of the sample before.";
         all.push(text.to_owned());
     }
-    all.extend(request.delay_margin.map(|margin| {
-        format!("The loop is stable with a further delay of all commands below {margin:.3e} s.")
-    }));
+    all.extend(request.delay_margin.map(delay));
     all
+}
+
+/// States the delay margin, in s.
+fn delay(margin: f64) -> String {
+    if margin.is_finite() {
+        format!("The loop is stable with a further delay of all commands below {margin:.3e} s.")
+    } else {
+        "The loop is stable with any further delay of all commands.".to_owned()
+    }
 }
 
 fn modes(controller: &Controller) -> Vec<String> {
@@ -361,4 +368,15 @@ fn precision(request: &Request<'_>, vocabulary: &Vocabulary) -> [String; 1] {
              of the FMU of the same design."
         ),
     }]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_that_bears_every_delay_has_no_number() {
+        assert!(delay(0.0125).ends_with("below 1.250e-2 s."));
+        assert!(delay(f64::INFINITY).ends_with("any further delay of all commands."));
+    }
 }
