@@ -117,8 +117,10 @@ fn response<'a>(id: &str, response: &'a StepResponse, plots: &mut Plots<'a>) -> 
     };
     let caption = format!("Peaks and settling after a change of {}", response.fault);
     let mut entries = vec![(line_sample("mark"), "settled, within 2 %".to_owned())];
-    let has_unit_of_change =
-        |curve: &Curve| response.parts.len() == 1 && curve.unit == response.unit;
+    // Signals whose units are not stated may have different ones.
+    let has_unit_of_change = |curve: &Curve| {
+        response.parts.len() == 1 && response.unit.is_some() && curve.unit == response.unit
+    };
     if response.curves.iter().any(has_unit_of_change) {
         entries.push((line_sample("size"), "size of the change, in the same unit".to_owned()));
     }

@@ -9,7 +9,7 @@ use resvg::usvg::roxmltree::{Document, Node};
 
 use design_report::Report;
 use design_report::family::{FamilyReport, MemberMargins, MemberReport};
-use design_report::robustness::{Level, ToleranceResult};
+use design_report::robustness::{Level, Number, ToleranceResult};
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 
@@ -396,6 +396,19 @@ fn a_hold_without_a_limit_makes_no_loop_unstable() {
         ["stable up to a sample time of", "up to 1000 sample times"].map(|part| text.contains(part))
     };
     assert_eq!([hold(0.5), hold(f64::INFINITY)], [[true, false], [false, true]]);
+}
+
+#[test]
+fn signals_without_units_are_not_in_the_unit_of_a_change() {
+    let mut report = hostile();
+    let part = Number { name: "f1".to_owned(), unit: None, value: 0.375 };
+    report.steps[0].parts = vec![part];
+    let has_mark = |report: &Report| page(report).contains("size of the change, in the same unit");
+    assert!(report.steps[0].curves.iter().any(|curve| curve.unit.is_none()));
+    assert!(!has_mark(&report));
+    let step = &mut report.steps[0];
+    step.unit.clone_from(&step.curves[0].unit);
+    assert!(has_mark(&report));
 }
 
 #[test]
