@@ -80,13 +80,16 @@ def test_a_bandwidth_beyond_a_zero_in_the_right_half_plane_is_a_warning_with_gam
     assert warning and float(warning[1]) > 1.2, done.stdout
 
 
-# (1 - s) / (s^2 + s), twice; (s - 26) / (s^2 + 14 s - 120), as a forward-swept wing has it; two integrators.
+# (1 - s) / (s^2 + s), twice; (s - 26) / (s^2 + 14 s - 120), as a forward-swept wing has it; two integrators; the wing
+# with a fault of its sensor only, so that no estimate acts as an integral, and `bandwidth` is in no weight.
 LIMITED = {
     "zero": ([[0, 1], [0, -1]], [[0], [1]], [[1, -1]], {"bandwidth": 1.0, "peak": 4.0}),
     "low peak": ([[0, 1], [0, -1]], [[0], [1]], [[1, -1]], {"bandwidth": 0.25, "peak": 1.1}),
     "roll-off": ([[0, 1], [120, -14]], [[0], [1]], [[-26, 1]], {"bandwidth": 9.0, "roll_off": 30.0}),
     "effort": ([[0, 1], [0, 0]], [[0], [1]], [[1, 0]], {"bandwidth": 1.0, "effort": 0.5}),
+    "flat": ([[0, 1], [120, -14]], [[0], [1]], [[-26, 1]], {"bandwidth": 40.0, "roll_off": 300.0}),
 }
+FAULTS = {"flat": 'filter = 200.0\nfaults = [{ name = "s", sensor = "y1" }]'}
 
 
 @pytest.mark.parametrize("name", LIMITED)
@@ -95,7 +98,8 @@ def test_the_entry_that_the_warning_names_lowers_gamma(aso_ftc, tmp_path, name):
 
     def printed(shape):
         rows = "".join(f"{key} = {value}\n" for key, value in shape.items())
-        text = f'A = {a}\nB = {b}\nC = {c}\nactuator_faults = "all"\n[loop]\n{rows}'
+        faults = FAULTS.get(name, 'actuator_faults = "all"')
+        text = f"A = {a}\nB = {b}\nC = {c}\n{faults}\n[loop]\n{rows}"
         (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
         return aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force").stdout
 

@@ -132,7 +132,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             feedback: unique(feedback, method.clone()),
             observer: unique(observer, method),
             warning: (peak.gamma > 1.0).then(|| {
-                let help = self.help(terms[peak.term].transfer, peak.frequency);
+                let help = self.help(&terms[peak.term], peak.frequency);
                 format!("{summary}; expected at most 1: {help} helps")
             }),
         })
@@ -158,11 +158,13 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     }
 
     /// Returns the entry of the plant file that relaxes the term which limits gamma at a frequency in rad/s.
-    fn help(&self, transfer: Transfer, frequency: f64) -> &'static str {
-        match transfer {
+    fn help(&self, term: &Term, frequency: f64) -> &'static str {
+        match term.transfer {
+            Transfer::Effort => "a higher `effort`",
+            // No other entry is in a constant weight.
+            _ if term.weight.as_constant().is_some() => "a higher `peak`",
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
             Transfer::Complementary(_) if frequency > self.shape.roll_off => "a higher `roll_off`",
-            Transfer::Effort => "a higher `effort`",
             Transfer::Tracking if frequency < self.shape.set_point => "a lower `set_point`",
             Transfer::Sensitivity(_) | Transfer::Complementary(_) | Transfer::Tracking => {
                 "a higher `peak`"
