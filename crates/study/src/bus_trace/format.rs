@@ -142,7 +142,8 @@ fn asc(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Resul
                 "{time:11.6} CANFD {channel} Rx {identifier:X}{suffix} {switch} {state} {code:x} {length}"
             )?;
             digits(file, data, " ")?;
-            writeln!(file, " 0 0 {:x} 0 0 0 0 0", 0x1000 | u32::from(switch) << 13)
+            let flags = 0x1000 | u32::from(switch) << 13 | u32::from(state) << 14;
+            writeln!(file, " 0 0 {flags:x} 0 0 0 0 0")
         }
     }
 }
@@ -219,4 +220,29 @@ fn option(content: &mut Vec<u8>, code: u16, value: &[u8]) {
 /// Fills up to a multiple of four bytes.
 fn pad(content: &mut Vec<u8>) {
     content.resize(content.len().next_multiple_of(4), 0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_can_fd_in_asc_has_the_flags_that_python_can_writes() {
+        let flags = |bit_rate_switch, error_state| {
+            let kind = FrameKind::Flexible { bit_rate_switch, error_state };
+            let frame = Frame { identifier: 0x1a, extended: true, kind, data: vec![7; 12] };
+            let mut line = Vec::new();
+            asc(&mut line, 0.5, 0, &frame).unwrap();
+            let line = String::from_utf8(line).unwrap();
+            let fields: Vec<&str> = line.split_whitespace().collect();
+            assert_eq!(fields[..5], ["0.500000", "CANFD", "1", "Rx", "1Ax"]);
+            assert_eq!(fields[7..9], ["9", "12"]);
+            // After 12 bytes, the duration and the length of the message.
+            [fields[5], fields[6], fields[23]].map(str::to_owned)
+        };
+        assert_eq!(flags(false, false), ["0", "0", "1000"]);
+        assert_eq!(flags(true, false), ["1", "0", "3000"]);
+        assert_eq!(flags(false, true), ["0", "1", "5000"]);
+        assert_eq!(flags(true, true), ["1", "1", "7000"]);
+    }
 }
