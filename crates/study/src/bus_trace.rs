@@ -49,9 +49,9 @@ impl BusTrace {
     /// Starts a trace for the file at `path`, which [`BusTrace::create`] creates; the extension `.asc`, `.log` or
     /// `.pcapng` selects the format. During the run, the trace gets the frames of all CAN buses of `system`: the frames
     /// that an FMU which simulates the bus passes on or, without such an FMU, the frames that the nodes send. Returns
-    /// an error if the file has another extension, or if there is no CAN bus.
-    pub(crate) fn start(path: &Path, system: &mut System) -> Result<Self, Error> {
-        let format = Format::of(path)?;
+    /// an error if the file has another extension, or if there is no CAN bus. `from`: the start of the run in s.
+    pub(crate) fn start(path: &Path, system: &mut System, from: f64) -> Result<Self, Error> {
+        let format = Format::of(path, from)?;
         let senders = senders(system);
         if senders.is_empty() {
             return Err(Error::Invalid(format!(

@@ -137,7 +137,8 @@ impl PreparedRun {
     ) -> Result<Run, Error> {
         let Self { config, mut system, plan, ports, scenario, tables, opened } = self;
         let trace = config.results.bus_trace.as_deref();
-        let trace = trace.map(|path| BusTrace::start(path, &mut system)).transpose()?;
+        let from = plan.experiment.start_time;
+        let trace = trace.map(|path| BusTrace::start(path, &mut system, from)).transpose()?;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {

@@ -26,16 +26,20 @@ const FLEXIBLE: u8 = 4;
 pub(super) enum Format {
     Candump,
     Asc,
-    Pcapng,
+    /// Times count from `origin`, a whole number of seconds, because the format has no times below 0.
+    Pcapng {
+        origin: f64,
+    },
 }
 
 impl Format {
-    /// Returns the format for the extension of a file; an error if it is not `log`, `asc` or `pcapng`.
-    pub(super) fn of(path: &Path) -> Result<Self, Error> {
+    /// Returns the format for the extension of a file; an error if it is not `log`, `asc` or `pcapng`. `start`: the
+    /// start of the run in s.
+    pub(super) fn of(path: &Path, start: f64) -> Result<Self, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("log") => Ok(Self::Candump),
             Some("asc") => Ok(Self::Asc),
-            Some("pcapng") => Ok(Self::Pcapng),
+            Some("pcapng") => Ok(Self::Pcapng { origin: start.floor().min(0.0) }),
             _ => Err(Error::Invalid(format!(
                 "{}: a bus trace is written as .log (candump), .asc or .pcapng",
                 path.display()
@@ -51,7 +55,7 @@ impl Format {
             Self::Asc => file.write_all(
                 b"date Thu Jan 1 12:00:00.000 am 1970\nbase hex timestamps absolute\nno internal events logged\n",
             ),
-            Self::Pcapng => {
+            Self::Pcapng { origin } => {
                 // Section header: byte order, version 1.0, unknown length.
                 let mut section = 0x1a2b_3c4d_u32.to_le_bytes().to_vec();
                 section.extend([1, 0, 0, 0]);
@@ -63,6 +67,11 @@ impl Format {
                     option(&mut interface, 2, name(bus).as_bytes());
                     // if_tsresol: 10^-9 s.
                     option(&mut interface, 9, &[9]);
+                    if origin < 0.0 {
+                        // if_tsoffset, in s.
+                        #[expect(clippy::cast_possible_truncation, reason = "a whole number")]
+                        option(&mut interface, 14, &(origin as i64).to_le_bytes());
+                    }
                     option(&mut interface, 0, &[]);
                     block(file, 1, &interface)?;
                 }
@@ -82,7 +91,7 @@ impl Format {
         match (self, operation) {
             (Self::Candump, Operation::Transmit(frame)) => candump(file, time, bus, frame),
             (Self::Asc, Operation::Transmit(frame)) => asc(file, time, bus, frame),
-            (Self::Pcapng, Operation::Transmit(frame)) => {
+            (Self::Pcapng { origin }, Operation::Transmit(frame)) => {
                 let mut identifier = frame.identifier | if frame.extended { EXTENDED } else { 0 };
                 let mut flags = flags(frame.kind);
                 match frame.kind {
@@ -90,7 +99,7 @@ impl Format {
                     FrameKind::Flexible { .. } => flags |= FLEXIBLE,
                     FrameKind::Data => {}
                 }
-                packet(file, time, bus, [identifier, u32::from(flags)], &frame.data)
+                packet(file, time - origin, bus, [identifier, u32::from(flags)], &frame.data)
             }
             (Self::Candump, Operation::BusError { .. }) => {
                 let (name, error) = (name(bus), ERROR | PROTOCOL);
@@ -99,8 +108,8 @@ impl Format {
             (Self::Asc, Operation::BusError { .. }) => {
                 writeln!(file, "{time:11.6} {}  ErrorFrame", bus + 1)
             }
-            (Self::Pcapng, Operation::BusError { .. }) => {
-                packet(file, time, bus, [ERROR | PROTOCOL, 0], &[0; 8])
+            (Self::Pcapng { origin }, Operation::BusError { .. }) => {
+                packet(file, time - origin, bus, [ERROR | PROTOCOL, 0], &[0; 8])
             }
             // Other operations, such as a confirmation, are not frames on the bus.
             _ => Ok(()),
@@ -225,6 +234,21 @@ fn pad(content: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pcapng_counts_times_from_a_whole_second_before_a_negative_start() {
+        let format = Format::of(Path::new("a.pcapng"), -1.5).unwrap();
+        let (identifier, extended, kind, data) = (1, false, FrameKind::Data, vec![1]);
+        let frame = Operation::Transmit(Frame { identifier, extended, kind, data });
+        let mut bytes = Vec::new();
+        format.write_start(&mut bytes, 1).unwrap();
+        assert_eq!(bytes.len(), 28 + 52, "section and interface");
+        // if_tsoffset is option 14 with 8 bytes: -2 s.
+        assert_eq!(bytes[60..72], [14, 0, 8, 0, 254, 255, 255, 255, 255, 255, 255, 255]);
+        format.write_operation(&mut bytes, -1.25, 0, &frame).unwrap();
+        let time = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        assert_eq!([time(80 + 12), time(80 + 16)], [0, 750_000_000]);
+    }
 
     #[test]
     fn a_line_of_can_fd_in_asc_has_the_flags_that_python_can_writes() {
