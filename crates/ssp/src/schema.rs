@@ -116,12 +116,31 @@ fn content(name: &str) -> Option<(Names, &'static [&'static str])> {
                 suppressUnitConversion
             },
         ),
+        "ParameterValues" => (&[&["ParameterSet"], &COMMON], &[]),
+        // An element of a system structure, or the root of a file.
+        "ParameterMapping" => (
+            &[&["ParameterMapping", "MappingEntry"], &COMMON],
+            &names! {
+                type source sourceBase
+                version author fileversion copyright license generationTool generationDateAndTime
+            },
+        ),
+        "SignalDictionary" => (
+            &[&["SignalDictionary", "DictionaryEntry", "Enumerations", "Units"], &COMMON],
+            &names! {
+                name type source sourceBase
+                version author fileversion copyright license generationTool generationDateAndTime
+            },
+        ),
         "MappingEntry" => {
             (&[&TRANSFORMATIONS, &COMMON], &["source", "target", "suppressUnitConversion"])
         }
         "ParameterSet" => (&[&["Parameters", "Enumerations", "Units"], &COMMON], &TOP),
         "Parameter" | "DictionaryEntry" => (&[&TYPES, &["Dimension"], &COMMON], &["name"]),
+        "Real" | "Float64" | "Float32" => (&[&COMMON], &["unit", "value"]),
+        "LinearTransformation" => (&[&COMMON], &["factor", "offset"]),
         "Unit" => (&[&["BaseUnit"], &COMMON], &["name"]),
+        "BaseUnit" => (&[&COMMON], &names! { kg m s A K mol cd rad factor offset }),
         "Enumeration" => (&[&["Item"], &["Value"], &COMMON], &["name", "value"]),
         "DefaultExperiment" => (&[&COMMON], &["startTime", "stopTime"]),
         "Parameters" => (&[&["Parameter"]], &[]),

@@ -230,6 +230,29 @@ fn elements_and_attributes_that_the_standard_does_not_have_are_named() {
 }
 
 #[test]
+fn unknown_attributes_in_the_files_of_parameters_are_named() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let value = r#"<ssv:Parameter name="k"><ssv:Real value="1" units="mm"/></ssv:Parameter>"#;
+    bench.file("p.ssv", ssv(value));
+    bench.file(
+        "m.ssm",
+        r#"<ssm:ParameterMapping version="1.0" xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+<ssm:MappingEntry source="k" target="p" suppressUnits="true"><ssc:LinearTransformation scale="2"/></ssm:MappingEntry></ssm:ParameterMapping>"#,
+    );
+    let bindings = r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"><ssd:ParameterMapping source="m.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>"#;
+    let opened = bench.open(&root(&component("a", "a.fmu", "", bindings), ""), "").unwrap();
+    let warnings = opened.warnings.join("\n");
+    for expected in [
+        "<Real> has the attribute \"units\", which is skipped",
+        "<MappingEntry> has the attribute \"suppressUnits\", which is skipped",
+        "<LinearTransformation> has the attribute \"scale\", which is skipped",
+    ] {
+        assert!(warnings.contains(expected), "{warnings}");
+    }
+}
+
+#[test]
 fn two_values_of_one_parameter_are_named_and_the_last_one_counts() {
     let bench = Bench::new();
     fmus(&bench);
