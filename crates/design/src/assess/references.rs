@@ -37,7 +37,9 @@ pub(crate) fn reached(steps: &[ReferenceStep]) -> Option<Check> {
 /// Returns a warning if the commands of a step that the plant file states are beyond their limits.
 pub(crate) fn beyond_limits(step: &ReferenceStep) -> Option<String> {
     let [low, high] = step.largest_step;
-    if !step.stated || (low..=high).contains(&step.size) {
+    // A step of the size that the message states, with five digits, is within the limits.
+    let margin = 1e-4 * step.size.abs();
+    if !step.stated || (low - margin..=high + margin).contains(&step.size) {
         return None;
     }
     let beyond = |one: &&CommandPeak| {
@@ -291,6 +293,18 @@ mod tests {
         };
         let warning = beyond_limits(&step).unwrap();
         assert!(warning.contains("steps from -1.25e-5 m to 1.25e-5 m stay"), "{warning}");
+    }
+
+    #[test]
+    fn a_step_of_the_size_that_the_warning_states_is_within_the_limits() {
+        let step = |size| {
+            let largest_step = [-0.395_175_2, 0.395_175_2];
+            ReferenceStep { size, stated: true, largest_step, ..ReferenceStep::default() }
+        };
+        let warning = beyond_limits(&step(0.5)).unwrap();
+        assert!(warning.contains("steps from -0.39518 to 0.39518 stay"), "{warning}");
+        assert_eq!(beyond_limits(&step(0.39518)), None);
+        assert!(beyond_limits(&step(-0.3953)).is_some());
     }
 
     #[test]
