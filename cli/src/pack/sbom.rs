@@ -3,7 +3,7 @@
 //! It has neither a time nor a serial number, so that the same sources give the same bytes.
 
 use anyhow::{Context, bail};
-use cargo_metadata::Package as Crate;
+use cargo_metadata::{Package as Crate, Source};
 use cyclonedx_bom::external_models::normalized_string::NormalizedString;
 use cyclonedx_bom::external_models::uri::Purl;
 use cyclonedx_bom::models::bom::{Bom, SpecVersion};
@@ -69,7 +69,8 @@ fn reference(package: &Crate) -> String {
 fn component(package: &Crate, kind: Classification) -> anyhow::Result<Component> {
     let (name, version) = (package.name.as_str(), package.version.to_string());
     let mut component = Component::new(kind, name, &version, Some(reference(package)));
-    if package.source.is_some() {
+    // Without a qualifier, the type `cargo` means a crate of crates.io.
+    if package.source.as_ref().is_some_and(Source::is_crates_io) {
         component.purl = Some(Purl::new("cargo", name, &version)?);
     }
     component.licenses = package.license.as_deref().map(licenses).transpose()?;
@@ -97,4 +98,25 @@ fn standard_library(release: Option<&String>) -> Component {
     let licenses = SpdxExpression::new("MIT OR Apache-2.0");
     component.licenses = Some(Licenses(vec![LicenseChoice::Expression(licenses)]));
     component
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_crates_of_the_registry_have_its_package_url() {
+        let has_url = |source: Option<&str>| {
+            let package = serde_json::json!({
+                "name": "fmu", "version": "0.1.0", "id": "fmu", "source": source,
+                "dependencies": [], "targets": [], "features": {}, "manifest_path": "Cargo.toml",
+            });
+            let package: Crate = serde_json::from_value(package).unwrap();
+            component(&package, Classification::Library).unwrap().purl.is_some()
+        };
+        assert!(has_url(Some("registry+https://github.com/rust-lang/crates.io-index")));
+        assert!(!has_url(Some("git+https://example.org/fmu#0123456789abcdef")));
+        assert!(!has_url(Some("registry+https://example.org/index")));
+        assert!(!has_url(None));
+    }
 }
