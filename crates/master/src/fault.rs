@@ -150,11 +150,21 @@ impl FaultChain {
     ///
     /// Returns [`FaultError`] if a delay is negative, or if it spans more than 250 000 steps of `step` s.
     pub fn new(faults: Vec<(Window, Fault)>, step: f64) -> Result<Self, FaultError> {
-        let stages = faults
-            .into_iter()
-            .map(|(window, fault)| Stage::new(window, fault, step))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { stages, range: None })
+        let mut chain = Self::default();
+        for (window, fault) in faults {
+            chain.push(window, fault, step)?;
+        }
+        Ok(chain)
+    }
+
+    /// Adds a fault, which acts on the result of the others; `step` as for [`FaultChain::new`].
+    ///
+    /// # Errors
+    ///
+    /// Returns [`FaultError`] if the fault is a delay that is negative or spans more than 250 000 steps of `step` s.
+    pub fn push(&mut self, window: Window, fault: Fault, step: f64) -> Result<(), FaultError> {
+        self.stages.push(Stage::new(window, fault, step)?);
+        Ok(())
     }
 
     /// Limits the results of [`FaultChain::apply_integer`] to the range of the input.

@@ -20,46 +20,34 @@ const OF_BOOLEANS: &str = "stuck, dropout, delay or inversion";
 const OF_ENUMERATIONS: &str = "stuck, dropout or delay";
 const OF_REALS: &str = "any kind but inversion";
 
-/// The faults of one input, with the first entry and its path.
-struct InputFaults<'a> {
-    port: Port,
-    entry: &'a Spanned<FaultEntry>,
-    path: String,
-    faults: Vec<(Window, Fault)>,
-}
-
 impl<'a> Resolver<'a> {
     /// Resolves `[[scenario.fault]]`. Adds the faults of driven variables to their drives and
     /// returns the others.
     pub(super) fn faults(
         &mut self,
-        entries: &'a [Spanned<FaultEntry>],
+        entries: &[Spanned<FaultEntry>],
     ) -> Result<Vec<(Port, FaultChain)>, ScenarioError> {
-        let mut inputs: Vec<InputFaults<'a>> = Vec::new();
+        let mut inputs: Vec<(Port, FaultChain)> = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
             let path = format!("scenario.fault[{}]", index + 1);
             let stated = &entry.get_ref().connection;
             let target = self.faulty_input(stated.get_ref()).map_err(at(stated, &path))?;
             let port = target.port;
-            let position =
-                inputs.iter().position(|input| input.port == port).unwrap_or_else(|| {
-                    inputs.push(InputFaults {
-                        port,
-                        entry,
-                        path: path.clone(),
-                        faults: Vec::new(),
-                    });
-                    inputs.len() - 1
-                });
-            let index = inputs[position].faults.len() as u64;
+            let position = inputs.iter().position(|(input, _)| *input == port);
+            let position = position.unwrap_or_else(|| {
+                inputs.push((port, FaultChain::default()));
+                inputs.len() - 1
+            });
+            let chain = &mut inputs[position].1;
+            let index = chain.len() as u64;
             let converter = EntryConverter { target, start: self.setup.start, index };
-            let fault = converter.fault(entry.get_ref()).map_err(at(entry, &path))?;
-            inputs[position].faults.push(fault);
+            let fault = converter.fault(entry.get_ref());
+            let (window, fault) = fault.map_err(at(entry, &path))?;
+            let added = chain.push(window, fault, self.setup.step);
+            added.map_err(|error| at(entry, &path)(error.into()))?;
         }
         let mut chains = Vec::new();
-        for InputFaults { port, entry, path, faults } in inputs {
-            let chain = FaultChain::new(faults, self.setup.step)
-                .map_err(|error| at(entry, &path)(error.into()))?;
+        for (port, chain) in inputs {
             match self.drives.iter_mut().find(|(drive, _)| drive.port() == port) {
                 Some((drive, _)) => drive.set_faults(chain),
                 None => chains.push((port, chain)),

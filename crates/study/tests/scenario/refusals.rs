@@ -279,6 +279,10 @@ fn an_error_points_at_its_place_in_the_file() {
     let text = "[[scenario.fault]]\nconnection = \"ctrl.force\"\nnoise = {}\n";
     let (_, place) = refused(text, Path::new("."));
     assert!(place.contains("[[scenario.fault]]"), "{place:?}");
+    let text = "[[scenario.fault]]\nconnection = \"ctrl.force\"\nbias = { value = 1 }\n\n\
+                [[scenario.fault]]\nconnection = \"ctrl.force\"\ndelay = { seconds = 1e9 }\n";
+    let (message, _) = refused(text, Path::new("."));
+    assert!(message.starts_with("scenario.fault[2]: a delay of"), "{message}");
 }
 
 #[test]
