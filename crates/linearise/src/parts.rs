@@ -99,15 +99,11 @@ impl<'a> Parts<'a> {
 
     /// Returns all continuous states, in the order of `Derivatives`.
     pub(super) fn states(&self, request: &Linearise) -> Result<Vec<State>, LineariseError> {
-        let variables = &self.description.variables;
-        let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
         let mut states = Vec::new();
         for unknown in &self.description.structure.derivatives {
-            let derivative = at(unknown.index);
-            let state = derivative.and_then(|variable| match &variable.kind {
-                Kind::Real(real) => at(real.derivative?),
-                _ => None,
-            });
+            let derivative = self.description.at(unknown.index);
+            let state = derivative
+                .and_then(|variable| self.description.at(variable.kind.as_real()?.derivative?));
             let (Some(derivative), Some(state)) = (derivative, state) else {
                 let index = unknown.index;
                 let text = format!("the variable {index} is not the derivative of a state");
@@ -228,4 +224,30 @@ fn settings(
         })
     };
     request.at.iter().map(setting).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_description::{ModelStructure, Unknown};
+
+    /// FMI 3.0 allows continuous states of the type Float32.
+    #[test]
+    fn a_state_of_the_type_float32_is_refused_for_its_type() {
+        let variable = |name: &str, derivative| ScalarVariable {
+            name: name.to_owned(),
+            kind: Kind::Float32(RealType { derivative, ..RealType::default() }),
+            ..ScalarVariable::default()
+        };
+        let derivatives = vec![Unknown { index: 2, ..Unknown::default() }];
+        let description = ModelDescription {
+            variables: vec![variable("x", None), variable("der(x)", Some(1))],
+            structure: ModelStructure { derivatives, ..ModelStructure::default() },
+            ..ModelDescription::default()
+        };
+        let request = Linearise::default();
+        let parts = Parts::of(&description, &request).unwrap();
+        let refused = parts.states(&request).unwrap_err();
+        assert_eq!(refused.to_string(), "x is a variable of type Float32, expected a Real");
+    }
 }
