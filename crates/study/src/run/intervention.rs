@@ -47,8 +47,8 @@ impl Run {
         let time = self.simulation.time();
         let from = self.simulation.next_change().ok_or_else(|| {
             Error::Invalid(format!(
-                "t = {} s: the run ends before a change can take effect, at the second \
-                 communication point from now or before",
+                "t = {} s: the run ends before a change can take effect: the first communication \
+                 point after all steps so far is not before its stop time",
                 seconds(time)
             ))
         })?;
