@@ -38,6 +38,7 @@ fn a_delay_starts_when_the_run_has_kept_all_values_that_it_needs() {
 fn what_cannot_be_repeated_and_what_is_no_entry_is_one_sentence() {
     let cases = [
         ("", "found no entry, expected [[set]] or [[fault]]"),
+        ("set = []", "found no entry, expected [[set]] or [[fault]]"),
         ("[[signal]]\nvariable = \"a.b\"", "found \"signal\", expected [[set]] or [[fault]]"),
         ("[[set]]\nvariable = \"a.b\"", "missing field `value`"),
         ("[[set]]\nvariable = \"a.b\"\nvalue = 1\nat = \"x\"", "invalid type"),
