@@ -82,7 +82,8 @@ impl DetectionDesign {
         ]
     }
 
-    /// Describes the first entry with a wrong shape or length, without its counterpart, or that excludes another one.
+    /// Describes the first contradiction: a list or matrix of a wrong size, or an entry that is missing or must not be
+    /// stated.
     pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
         let lists = [("faults", self.faults.len()), ("tests", self.tests.len())];
         if let Some((name, _)) = lists.iter().find(|(_, count)| *count == 0) {
@@ -98,12 +99,12 @@ impl DetectionDesign {
         }
         let stated = self.sample_time.is_some();
         if stated == design.sample_time.is_some() {
-            let (actual, expected) =
-                if stated { ("is stated", "none") } else { ("is missing", "one") };
-            return Some(format!(
-                "detection.sample_time {actual}; expected {expected}, as a continuous controller, and no \
-                 sampled one, has its own"
-            ));
+            let reason = if stated {
+                "is stated, expected none: a sampled controller tests in each sample"
+            } else {
+                "is missing, expected the time in s between two tests of a continuous controller"
+            };
+            return Some(format!("detection.sample_time {reason}"));
         }
         let rows = self.c.rows;
         let assigned: usize = self.tests.iter().map(|test| test.residuals).sum();
