@@ -295,8 +295,8 @@ impl Exchange {
         self.check_finite(system, position, time)
     }
 
-    /// Checks that every connected Real output of the slave is finite; warns once about a
-    /// derivative that is not.
+    /// Checks that every connected Real output of the slave is finite; warns once for each output whose
+    /// derivative is not.
     #[inline]
     pub(crate) fn check_finite(
         &mut self,
