@@ -194,7 +194,8 @@ fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize)
     Ok((all, nominal))
 }
 
-/// `first`, then the entries that a variant of `model` may have; with `operating` also those of an operating point.
+/// `first`, then the entries that a variant of `model` may have. Those of the operating point of matrices only with
+/// `operating`; an FMU always has one.
 fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'static str> {
     let mut keys = first.to_vec();
     match model {

@@ -225,7 +225,7 @@ impl Config {
         for file in signals.chain(tables) {
             let mut path = PathBuf::from(file.get_ref());
             change(&mut path);
-            // TOML holds Unicode only, so the conversion loses nothing.
+            // Lossy only below a folder whose name is not Unicode, which TOML cannot hold.
             *file.get_mut() = path.to_string_lossy().into_owned();
         }
     }
