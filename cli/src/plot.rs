@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::ensure;
 use results::{Column, ColumnKind, Selection, Table};
 
-use figure::{Figure, Ink, Panel, Series, rasterise};
+use figure::{Figure, Ink, Panel, Series, rasterise, stairs};
 
 use crate::outputs;
 
@@ -94,13 +94,6 @@ fn curves(
 /// Whether a variable is constant between two samples.
 fn stepwise(column: &Column) -> bool {
     matches!(column.kind, ColumnKind::Integer | ColumnKind::Boolean)
-}
-
-/// Converts samples to a staircase: each value is constant until the time of the next one, the last one is a point.
-fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let ends = time.iter().skip(1).chain(time.last());
-    let steps = time.iter().zip(ends).zip(values);
-    steps.flat_map(|((start, end), value)| [(*start, *value), (*end, *value)]).unzip()
 }
 
 /// Groups curves by unit into panels with at most as many curves as there are colours.

@@ -92,6 +92,14 @@ pub struct Series<'a> {
     pub broad: bool,
 }
 
+/// Converts samples to a staircase: each value is constant until the time of the next one, the last one is a point.
+#[must_use]
+pub fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let ends = time.iter().skip(1).chain(time.last());
+    let steps = time.iter().zip(ends).zip(values);
+    steps.flat_map(|((start, end), value)| [(*start, *value), (*end, *value)]).unzip()
+}
+
 /// Line colours that colour-blind readers can distinguish (Okabe and Ito, 2008).
 #[derive(Debug, Clone, Copy)]
 #[expect(missing_docs, reason = "the names of the colours")]
