@@ -93,7 +93,7 @@ fn curves(
 
 /// Whether a variable is constant between two samples.
 fn stepwise(column: &Column) -> bool {
-    matches!(column.kind, ColumnKind::Integer | ColumnKind::Boolean)
+    !matches!(column.kind, ColumnKind::Real)
 }
 
 /// Groups curves by unit into panels with at most as many curves as there are colours.

@@ -128,6 +128,9 @@ fn a_switch_is_drawn_as_stairs() {
     let (time, values) = stairs(&[0.0, 1.0, 3.0], &[0.0, 1.0, 0.0]);
     assert_eq!(time, [0.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
     assert_eq!(values, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
+    for kind in [ColumnKind::Integer, ColumnKind::Long, ColumnKind::Boolean] {
+        assert!(stepwise(&column("ctrl.count", kind, None)), "{kind:?}");
+    }
     let folder = tempfile::tempdir().unwrap();
     let results = written(folder.path(), "run.parquet", 11);
     let curve = curves(&svg(&results, &["ctrl.on"])).remove(0);
