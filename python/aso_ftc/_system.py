@@ -381,7 +381,7 @@ class System:
             isolate: run each FMU in a process of its own (Linux).
             call_time_limit: limit of each call of an isolated FMU, in s of wall-clock time.
             memory_limit: limit of the memory of an isolated FMU, in bytes or as ``"2GiB"``.
-            time_limit: limit of the steps of the run, in s of wall-clock time, checked between steps.
+            time_limit: limit of the run from loading to the last step, in s of wall-clock time, checked between steps.
             cancel: ends the run from another thread.
             progress: ``True`` for a bar on a terminal, or a function of the fraction done, 0 to 1.
             file: also write the results to this ``.csv`` or ``.parquet`` file.

@@ -131,7 +131,10 @@ impl Study {
         let run = result?.map_err(|error| with_cause(py, error::study(&error), &raised))?;
         let EndedRun { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = run;
         let (recorded, binaries) = recorded;
-        if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
+        // A limit or a request that is noticed after the last step has not ended the run.
+        if matches!(ended, RunEnd::AtStop | RunEnd::ByFmu(_))
+            && !matches!(watch.stop, Some(Stop::Raised(_)))
+        {
             watch.finish(py);
         }
         let shown = fmu_description::number::seconds(time);

@@ -145,6 +145,22 @@ def test_another_thread_cancels_a_run(paper):
     assert cancel.cancelled
 
 
+@pytest.mark.parametrize("option", ["cancel", "time_limit"])
+def test_a_run_that_is_complete_was_neither_cancelled_nor_ended_by_its_time_limit(option):
+    cancel = af.Cancel()
+
+    class Slow:
+        outputs = ("y",)
+
+        def step(self, t, dt, inputs):
+            time.sleep(1.2)
+            cancel.cancel()
+
+    options = {"cancel": cancel} if option == "cancel" else {"time_limit": 1.0}
+    results = af.System().add("slow", Slow()).run(stop_time=0.1, step=0.1, **options)
+    assert (results.end, results.end_time) == ("stop time", 0.1)
+
+
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_a_run_within_a_tenth_of_a_second(paper):
     sent = []
