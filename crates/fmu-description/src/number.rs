@@ -1,5 +1,7 @@
 //! Numbers in messages, rounded to the digits that mean something.
 
+use std::fmt;
+
 /// Significant digits of a time; the rounding errors of a sum of steps are smaller.
 const TIME: usize = 12;
 
@@ -8,32 +10,36 @@ const TIME: usize = 12;
 /// both `digits` and 6. NaN and infinity are `NaN` and `inf`.
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
+    let mut text = String::new();
+    // A text takes everything.
+    let _ = write_rounded(&mut text, value, digits);
+    text
+}
+
+/// Writes [`rounded`] without heap allocation.
+fn write_rounded(out: &mut impl fmt::Write, value: f64, digits: usize) -> fmt::Result {
     if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
+        return write!(out, "{value}");
     }
     // With integers, because formatting with a precision and parsing need tables that are large in WebAssembly.
     let (mut mantissa, exponent) = scaled(value.abs(), digits);
     while mantissa > 9 && mantissa.is_multiple_of(10) {
         mantissa /= 10;
     }
-    let text = mantissa.to_string();
     let sign = if value < 0.0 { "-" } else { "" };
     let longest = i32::try_from(digits.max(6)).unwrap_or(i32::MAX);
-    if !(-4..longest).contains(&exponent) {
-        let (first, rest) = text.split_at(1);
-        let point = if rest.is_empty() { "" } else { "." };
-        return format!("{sign}{first}{point}{rest}e{exponent}");
+    let has_exponent = !(-4..longest).contains(&exponent);
+    // The number of digits after the decimal point; below 0, of zeros before it.
+    let decimals = mantissa.ilog10().cast_signed() - if has_exponent { 0 } else { exponent };
+    let unit = 10_u64.pow(decimals.unsigned_abs());
+    if decimals > 0 {
+        let width = decimals.unsigned_abs() as usize;
+        let (whole, rest) = (mantissa / unit, mantissa % unit);
+        write!(out, "{sign}{whole}.{rest:0width$}")?;
+    } else {
+        write!(out, "{sign}{}", mantissa * unit)?;
     }
-    if exponent < 0 {
-        let zeros = usize::try_from(-exponent - 1).unwrap_or(0);
-        return format!("{sign}0.{}{text}", "0".repeat(zeros));
-    }
-    let whole = usize::try_from(exponent).unwrap_or(0) + 1;
-    if text.len() <= whole {
-        return format!("{sign}{text:0<whole$}");
-    }
-    let (whole, rest) = text.split_at(whole);
-    format!("{sign}{whole}.{rest}")
+    if has_exponent { write!(out, "e{exponent}") } else { Ok(()) }
 }
 
 /// Returns the first `digits` (at least 1, at most 15) significant digits of a positive number, rounded, as an
@@ -63,6 +69,15 @@ fn scaled(value: f64, digits: usize) -> (u64, i32) {
 #[must_use]
 pub fn seconds(time: f64) -> String {
     rounded(time, TIME)
+}
+
+/// Writes [`seconds`] without heap allocation, for signal handlers.
+///
+/// # Errors
+///
+/// [`fmt::Error`] if `out` refuses a part.
+pub fn write_seconds(out: &mut impl fmt::Write, time: f64) -> fmt::Result {
+    write_rounded(out, time, TIME)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
-use fmu_description::number::seconds;
+use fmu_description::number::write_seconds;
 
 pub(crate) use limit::Limit;
 pub use place::Name;
@@ -110,7 +110,9 @@ impl fmt::Display for Call {
         formatter.write_str(&self.instance)?;
         // Loading and unloading a library have no time.
         if ![LOADING, UNLOADING].contains(&self.function) {
-            write!(formatter, " at t = {} s", seconds(self.time))?;
+            formatter.write_str(" at t = ")?;
+            write_seconds(formatter, self.time)?;
+            formatter.write_str(" s")?;
         }
         write!(formatter, ": {}", self.function)
     }

@@ -376,3 +376,26 @@ fn on_end_of_process() -> io::Result<()> {
     // SAFETY: a function without arguments.
     check(unsafe { libc::atexit(ended) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crash::Place;
+
+    /// The crashed thread may hold the lock of the allocator.
+    #[test]
+    fn the_line_about_a_crash_needs_no_heap() {
+        let instance = Place::new("tank");
+        instance.set_time(0.1 + 0.2);
+        instance.enter(&"fmi2DoStep");
+        let (address, cause) = (last_of_this_thread(), Cause::Signal(libc::SIGSEGV));
+        let mut line = Line::new();
+        let counted = allocation_counter::measure(|| {
+            write_ending(&mut line, place::calls(address), cause).unwrap();
+        });
+        let text = str::from_utf8(&line.bytes[..line.length]).unwrap();
+        let expected = "tank at t = 0.3 s: fmi2DoStep crashed with signal 11 (SIGSEGV: ";
+        assert!(text.starts_with(expected), "{text}");
+        assert_eq!(counted.count_total, 0);
+    }
+}
