@@ -50,8 +50,9 @@ pub(super) fn fold<'a>(
         }
         known.insert(key, groups.len());
         let others = match part {
-            _ if named => "variables",
+            // Words of their findings, such as "a", may be names of variables, too.
             Part::Archive | Part::Binaries => "files",
+            Part::Description | Part::Behaviour if named => "variables",
             Part::Description | Part::Behaviour => "places",
         };
         groups.push(FindingGroup { first: finding, more: 0, others });
@@ -119,6 +120,19 @@ mod tests {
             findings.add(Severity::Note, "binaries/a.so", format!("needs glibc {version}"), "", "");
         }
         assert_eq!(lines(&findings).len(), 2);
+    }
+
+    #[test]
+    fn files_are_files_also_if_a_word_of_the_finding_is_the_name_of_a_variable() {
+        let mut findings = Findings::about(Part::Archive);
+        for name in ["resources/con.txt", "resources/aux.txt"] {
+            findings.add(Severity::Warning, name, "a name that Windows does not allow", "", "");
+        }
+        let groups = fold(&findings.all, &HashSet::from(["a"]));
+        let lines: Vec<_> = groups.iter().map(ToString::to_string).collect();
+        let expected =
+            "warning: resources/con.txt: a name that Windows does not allow; and 1 more files";
+        assert_eq!(lines, [expected]);
     }
 
     #[test]
