@@ -41,10 +41,10 @@ impl fmt::Display for TrialResult {
             TrialResult::Yes { steps, step, start, tolerance, but } => {
                 write!(formatter, "yes, {steps} steps of {} s from t = {start} s", seconds(*step))?;
                 match tolerance {
-                    Some(tolerance) => write!(formatter, " with tolerance {tolerance:e}")?,
-                    None => write!(formatter, " without a tolerance")?,
+                    Some(tolerance) => write!(formatter, " with tolerance {tolerance:e} and")?,
+                    None => formatter.write_str(" without a tolerance, with")?,
                 }
-                formatter.write_str(" and its own start values")?;
+                formatter.write_str(" its own start values")?;
                 but.as_ref().map_or(Ok(()), |but| write!(formatter, "; {but}"))
             }
             TrialResult::No { reason } => write!(formatter, "no: {reason}"),

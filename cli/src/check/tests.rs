@@ -251,6 +251,9 @@ fn the_answer_states_the_trial_or_the_reason_of_its_failure() {
     let expected =
         "yes, 10 steps of 0.125 s from t = 0 s with tolerance 1e-5 and its own start values";
     assert_eq!(here.to_string(), expected);
+    let (steps, step, start, tolerance, but) = (10, 0.125, 0.0, None, None);
+    let without = TrialResult::Yes { steps, step, start, tolerance, but }.to_string();
+    assert!(without.ends_with(" without a tolerance, with its own start values"), "{without}");
     let (here, all) = tried(Fault::Step);
     assert_eq!(here.to_string(), "no: fmi2DoStep: returned fmi2Error at t = 0.625 s");
     let answer = Answer::new(here, &ModelDescription::default(), &all).to_string();
