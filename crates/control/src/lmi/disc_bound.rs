@@ -19,8 +19,9 @@ const BISECTIONS: usize = 30;
 /// in a disc of the left half plane, in continuous time.
 ///
 /// `disc`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay` <= 0;
-/// R = radius - center is the largest distance from 0. E B, q x q, must have an inverse; w enters y through
-/// the states only (D = 0). With T(s) = E (s I - A + L C)^-1 B, the first bound is
+/// R is their largest distance from 0: radius - center, for a center above 0 the root of radius^2 - center^2.
+/// E B, q x q, must have an inverse; w enters y through the states only (D = 0). With
+/// T(s) = E (s I - A + L C)^-1 B, the first bound is
 ///
 /// ```text
 /// gamma >= (|det E B| (n - q)^(n - q) q^q / n^n)^(1/q) / R
@@ -63,6 +64,7 @@ pub fn disc_norm_lower_bound(
     let Performance { disturbance: b, output: e, feedthrough, .. } = performance;
     let Disc { center, radius } = disc;
     let reach = radius - center;
+    let reach = if center > 0.0 { (reach * (radius + center)).sqrt() } else { reach };
     let reaches = reach > 0.0 && radius > 0.0 && reach.is_finite();
     check::that(reaches, "the radius", radius, "a disc that reaches the left half plane")?;
     let product = e * b;
@@ -239,11 +241,20 @@ mod tests {
         let fault = [0.0, 1.0];
         let performance = without_noise(matrix(2, 1, &fault), matrix(1, 2, &fault), 2);
         let c = DMatrix::identity(2, 2);
-        let disc = Disc { center: -3.0, radius: 2.0 };
-        let bound = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
-        assert!((bound / (0.25 / 5.0) - 1.0).abs() < 1e-5, "{bound}");
-        // With A - L C = diag(-5, -5) the norm is 1 / 5.
-        assert!(norm(matrix(2, 2, &[-5.0, 0.0, 0.0, -5.0]), &performance) > bound);
+        // The farthest points are -5, and near the imaginary axis 1 + 5 e^(i 1.77).
+        for (center, radius) in [(-3.0, 2.0), (1.0, 5.0)] {
+            let disc = Disc { center, radius };
+            let bound = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
+            let on_circle = (0..100_000_u32).map(|step| {
+                let angle = f64::from(step) * std::f64::consts::TAU / 1e5;
+                Complex::new(center, 0.0) + Complex::from_polar(radius, angle)
+            });
+            let left = on_circle.filter(|s| s.re <= 0.0);
+            let farthest = left.map(|s| s.norm()).fold(0.0, f64::max);
+            assert!((bound * farthest / 0.25 - 1.0).abs() < 1e-4, "{center}: {bound}");
+            // With A - L C = diag(-4, -4) the norm is 1 / 4.
+            assert!(norm(matrix(2, 2, &[-4.0, 0.0, 0.0, -4.0]), &performance) > bound);
+        }
     }
 
     #[test]
