@@ -57,10 +57,14 @@ fn line(package: &Crate) -> String {
 }
 
 /// Returns the files with licence texts: the one that the manifest states, and those of the first folder that has any,
-/// from that of the package upwards to its workspace.
+/// from that of the package upwards to its workspace. A package of a registry has its folder only: a folder above it,
+/// in which it is vendored, has the licences of other packages.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
-    for folder in package.manifest_path.as_std_path().ancestors().skip(1) {
+    let is_from_registry =
+        package.source.as_ref().is_some_and(|source| !source.repr.starts_with("git+"));
+    let levels = if is_from_registry { 1 } else { usize::MAX };
+    for folder in package.manifest_path.as_std_path().ancestors().skip(1).take(levels) {
         let manifest = folder.join("Cargo.toml");
         if !manifest.is_file() {
             continue;
@@ -90,4 +94,33 @@ fn license_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     Ok(licenses)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn a_vendored_package_has_no_licence_of_the_project_around_it() {
+        let project = tempfile::tempdir().unwrap();
+        let folder = project.path().join("vendor/small");
+        fs::create_dir_all(&folder).unwrap();
+        for (file, text) in [("Cargo.toml", "[workspace]"), ("LICENSE", "of the project")] {
+            fs::write(project.path().join(file), text).unwrap();
+        }
+        fs::write(folder.join("Cargo.toml"), "").unwrap();
+        let texts_of = |source: Value| {
+            let package = json!({
+                "name": "small", "version": "1.0.0", "id": "small", "source": source,
+                "dependencies": [], "targets": [], "features": {},
+                "manifest_path": folder.join("Cargo.toml"),
+            });
+            texts(&serde_json::from_value(package).unwrap()).unwrap()
+        };
+        let registry = "registry+https://github.com/rust-lang/crates.io-index";
+        assert!(texts_of(json!(registry)).is_empty());
+        assert_eq!(texts_of(Value::Null), [project.path().join("LICENSE")]);
+    }
 }
