@@ -86,7 +86,9 @@ impl Prediction<'_> {
     /// Returns the least factor of the size, from 0.001 on, that is detected within `time` s with probability 0.95;
     /// None if 1000 times the size is not.
     pub(super) fn least(&self, time: f64) -> Option<f64> {
-        let most = whole(time / self.period).min(2 * MOST_SAMPLES);
+        // A sample after this time does not count; the factor is for the rounding of the quotient.
+        let samples = (time / self.period * (1.0 + 1e-9)).floor();
+        let most = whole(samples).min(2 * MOST_SAMPLES);
         let detects =
             |factor: f64| self.kind.delay(self.means, factor, most).detected_within(most) >= POWER;
         if !detects(LARGEST) {
@@ -137,4 +139,22 @@ pub(super) fn best_window(
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 pub(super) fn whole(number: f64) -> usize {
     number.round().clamp(0.0, 2_147_483_648.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_fault_is_detected_in_the_samples_within_the_time() {
+        let kind = TestKind::Cusum(Cusum { drift: 0.5, threshold: 5.0 });
+        let means = DMatrix::from_element(1, 10, 1.0);
+        let least = |period, time| Prediction { kind: &kind, means: &means, period }.least(time);
+        // The third sample is at 1.2 s.
+        assert_eq!(least(0.4, 1.0), least(0.4, 0.8));
+        assert!(least(0.4, 1.2).unwrap() < least(0.4, 1.0).unwrap());
+        assert_eq!(least(0.4, 0.3), None);
+        // The quotient is 2.9999999999999996.
+        assert_eq!(least(0.1, 0.3), least(1.0, 3.0));
+    }
 }
