@@ -108,7 +108,7 @@ impl PythonSlave {
     }
 
     /// Returns position and value of each output in the answer of a call, none for `None`. A name that is no output is
-    /// an error.
+    /// an error, as is a number that is no integer for an output that starts with one.
     fn read_outputs(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
         if answer.is_none() {
             return Ok(Vec::new());
@@ -129,7 +129,15 @@ impl PythonSlave {
                 let what = format!("no output {name}, expected one of {}", known.join(", "));
                 return Err(PyValueError::new_err(what));
             };
-            outputs.push((position, value.extract()?));
+            let value: f64 = value.extract()?;
+            let is_integer = matches!(self.description.variables[position].kind, Kind::Integer(_));
+            if is_integer && value.fract() != 0.0 {
+                let what = format!(
+                    "the output {name} is {value}, expected an integer, as its start value is one"
+                );
+                return Err(PyValueError::new_err(what));
+            }
+            outputs.push((position, value));
         }
         Ok(outputs)
     }

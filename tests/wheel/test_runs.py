@@ -398,3 +398,12 @@ def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
 
     with pytest.raises(af.RunError, match="no output v, expected one of u, on, count"):
         loop(Unknown(1.0)).run()
+
+
+def test_an_output_that_starts_with_an_integer_is_not_cut():
+    class Half(Proportional):
+        def step(self, t, dt, inputs):
+            return {"count": 0.5}
+
+    with pytest.raises(af.RunError, match="the output count is 0.5, expected an integer, as its start value is one"):
+        loop(Half(1.0)).run()
