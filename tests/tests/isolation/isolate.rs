@@ -362,6 +362,18 @@ fn fmus_that_cannot_be_isolated_are_refused_with_the_reason() {
 }
 
 #[test]
+fn the_time_limit_of_calls_is_not_that_of_the_start_of_a_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("slow");
+    let text = format!("#!/bin/sh\nsleep 1\nexec '{}' \"$@\"\n", tests::command().display());
+    std::fs::write(&script, text).unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    std::fs::set_permissions(&script, mode).unwrap();
+    let slow = Options { executable: Some(script), ..limited(500) };
+    isolate::open(troubles(), "one", &slow).map(drop).unwrap();
+}
+
+#[test]
 fn a_worker_without_a_master_reports_it() {
     let output = tests::run(&[isolate::WORKER]);
     assert_eq!(output.status.code(), Some(2));

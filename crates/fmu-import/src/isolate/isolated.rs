@@ -301,12 +301,16 @@ impl Isolated {
         if let Some(failure) = self.process.ended() {
             return Err(failure);
         }
+        if !self.is_attached() {
+            // The first call starts when the process has become a worker.
+            *start = None;
+            let is_late = self.started.elapsed() > START_LIMIT;
+            let late = Failure::TimedOut(START_LIMIT.as_secs_f64());
+            return if is_late { Err(late) } else { Ok(()) };
+        }
         // The first check happens one slice after the start.
         let now = Instant::now();
         let start = *start.get_or_insert(now.checked_sub(self.slice).unwrap_or(now));
-        if !self.is_attached() && self.started.elapsed() > START_LIMIT {
-            return Err(Failure::TimedOut(START_LIMIT.as_secs_f64()));
-        }
         match self.time_limit {
             Some(limit) if now.duration_since(start) >= limit => {
                 Err(Failure::TimedOut(limit.as_secs_f64()))
