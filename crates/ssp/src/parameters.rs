@@ -68,7 +68,7 @@ struct Binder<'a> {
 
 impl Binder<'_> {
     fn bind(&mut self, node: usize, binding: &Binding) -> Result<(), SspError> {
-        let mut unmatched = Vec::new();
+        let (mut unmatched, mut missing) = (Vec::new(), Vec::new());
         let values = &binding.values;
         self.warn_repeated(values);
         let name = |parameter: &Parameter| format!("{}{}", binding.prefix, parameter.name);
@@ -87,14 +87,18 @@ impl Binder<'_> {
                         Some(parameter) => {
                             self.apply(node, binding, parameter, entry, &mut unmatched)?;
                         }
-                        None => unmatched.push(entry.source.clone()),
+                        None => missing.push(entry.source.clone()),
                     }
                 }
             }
         }
-        if !unmatched.is_empty() {
-            self.warn_unmatched(values, node, &unmatched);
-        }
+        let tree = self.tree;
+        let owner = match tree.nodes[node].path.as_str() {
+            "" => "the system",
+            path => path,
+        };
+        self.warn_unmatched(values, owner, &unmatched);
+        self.warn_unmatched(values, "it", &missing);
         Ok(())
     }
 
@@ -118,7 +122,8 @@ impl Binder<'_> {
         }
     }
 
-    fn warn_unmatched(&mut self, values: &ParameterSet, node: usize, names: &[String]) {
+    /// Warns about `names` that `owner`, an element or the parameter set itself ("it"), does not have.
+    fn warn_unmatched(&mut self, values: &ParameterSet, owner: &str, names: &[String]) {
         let (names, nameless): (Vec<&str>, Vec<&str>) =
             names.iter().map(String::as_str).partition(|name| !name.is_empty());
         let set = &values.name;
@@ -130,10 +135,6 @@ impl Binder<'_> {
         if names.is_empty() {
             return;
         }
-        let owner = match self.tree.nodes[node].path.as_str() {
-            "" => "the system".to_owned(),
-            path => path.to_owned(),
-        };
         let rest = names.len().saturating_sub(NAMED);
         let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
         let names = names[..names.len() - rest].join(", ");
