@@ -6,6 +6,7 @@ mod groups;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use fmu_description::number::seconds;
 use fmu_description::{Causality, ModelDescription, Position};
 
 use super::error::{SspError, semantic_error};
@@ -143,9 +144,10 @@ impl Loader {
         let step = multiple * base;
         if (ticks(step) - ticks(stated)).abs() >= 1.0 {
             self.files.warnings.push(format!(
-                "{at}: {} steps every {step} s, a multiple of the base step {base} s, instead of \
+                "{at}: {} steps every {} s, a multiple of the base step {base} s, instead of \
                  {stated} s",
-                simulator.name
+                simulator.name,
+                seconds(step)
             ));
         }
         self.steps.push((simulator.name.clone(), step));

@@ -69,6 +69,16 @@ fn simulators_initial_values_and_times_are_read_and_connections_run_from_outputs
     }
 }
 
+/// 3 * 0.1 is 0.30000000000000004.
+#[test]
+fn a_step_in_a_warning_has_no_rounding_error() {
+    let bench = bench();
+    let text = osp(&PAIR.replace("2.03e-3", "0.35"), "", "").replace("1e-3", "0.1");
+    let warnings = open(&bench.file("System.xml", text)).unwrap().warnings.join("\n");
+    let expected = "a steps every 0.3 s, a multiple of the base step 0.1 s, instead of 0.35 s";
+    assert!(warnings.contains(expected), "{warnings}");
+}
+
 /// libcosim counts nanoseconds, of which this base step is a quarter.
 #[test]
 fn a_step_is_a_multiple_also_of_a_base_step_below_a_nanosecond() {
