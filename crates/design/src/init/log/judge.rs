@@ -2,6 +2,7 @@
 
 use control::eigen::eigenvalues;
 use control::identification::Windows;
+use fmu_description::number::rounded;
 use nalgebra::DMatrix;
 
 use crate::init::log::estimate::Estimate;
@@ -106,7 +107,7 @@ pub(super) fn warnings(
                 .to_owned(),
         );
     }
-    warnings.extend(sampling(estimate, logs[0].period));
+    warnings.extend(sampling(&estimate.continuous.a, logs[0].period));
     warnings
 }
 
@@ -139,18 +140,19 @@ fn excitation(logs: &[Log], estimate: &Estimate) -> Option<String> {
     })
 }
 
-/// Returns a warning if the fastest mode is too fast or too slow for the samples.
-fn sampling(estimate: &Estimate, period: f64) -> Option<String> {
-    let values = eigenvalues(&estimate.continuous.a).ok()?;
+/// Returns a warning if the fastest mode of A is too fast or too slow for the samples.
+fn sampling(a: &DMatrix<f64>, period: f64) -> Option<String> {
+    let values = eigenvalues(a).ok()?;
     let fastest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let rate = rounded(fastest, 3);
     if fastest * period > FAST {
         return Some(format!(
-            "a mode of {fastest:.3} rad/s is as fast as the samples, every {period} s: log faster, or state a smaller --order"
+            "a mode of {rate} rad/s is as fast as the samples, every {period} s: log faster, or state a smaller --order"
         ));
     }
     (fastest * period < SLOW).then(|| {
         format!(
-            "the fastest mode, {fastest:.3} rad/s, is slow for samples every {period} s: the mean of some rows as one row \
+            "the fastest mode, {rate} rad/s, is slow for samples every {period} s: the mean of some rows as one row \
              would identify it more precisely"
         )
     })
@@ -174,5 +176,14 @@ mod tests {
         assert!(rest(&[log(150)]).is_some());
         assert_eq!(rest(&[log(151)]), None);
         assert_eq!(rest(&[log(150), log(199)]), None);
+    }
+
+    /// A room with a time constant of two hours, 1 / 7200 s.
+    #[test]
+    fn a_slow_mode_has_its_rate_in_the_warning() {
+        let room = DMatrix::from_element(1, 1, -1.0 / 7200.0);
+        let warning = sampling(&room, 60.0).unwrap();
+        assert!(warning.contains("mode, 0.000139 rad/s, is slow"), "{warning}");
+        assert_eq!(sampling(&room, 600.0), None);
     }
 }
