@@ -351,17 +351,12 @@ def test_the_singular_values_are_those_of_numpy(case):
         assert sigma == pytest.approx(np.array(values), rel=1e-5, abs=1e-9)
 
 
-def test_the_norms_are_those_of_numpy_and_scipy(case):
-    designed, matrices, _ = case
+def must_have_energy_norms(designed, matrices):
+    """Compares H2 and generalised H2 norm with scipy; returns all norms."""
     norms = {norm["name"]: norm["value"] for norm in designed.report["certificate"]["norms"]}
-    size = lambda w: np.linalg.norm(rate_response(designed, matrices, w), 2)
-    highest = 1e5 if matrices.period is None else np.pi / matrices.period
-    grid = np.geomspace(1e-6 * highest, highest, 2000)
-    at = grid[np.argmax([size(w) for w in grid])]
-    optimum = minimize_scalar(lambda w: -size(w), bounds=(0.9 * at, min(1.1 * at, highest)))
-    assert norms["H-infinity"] == pytest.approx(max(-optimum.fun, size(at)), rel=2e-3)
     rows = matrices.n + np.array(stated_faults(designed))
-    rate = -np.eye(matrices.n + matrices.q)[:, rows]
+    # A rate of T^-1/2 for one sample has unit energy, the integral of its square, and changes the fault by T^1/2.
+    rate = -np.eye(matrices.n + matrices.q)[:, rows] * np.sqrt(matrices.period or 1.0)
     if matrices.current:
         _, c_0, gain = matrices.augmented
         rate = rate - gain @ c_0 @ rate
@@ -370,6 +365,18 @@ def test_the_norms_are_those_of_numpy_and_scipy(case):
     assert norms["H2"] == pytest.approx(np.sqrt(np.trace(covariance)), rel=1e-6)
     largest = np.linalg.eigvalsh(covariance)[-1]
     assert norms["generalised H2"] == pytest.approx(np.sqrt(largest), rel=1e-6)
+    return norms
+
+
+def test_the_norms_are_those_of_numpy_and_scipy(case):
+    designed, matrices, _ = case
+    norms = must_have_energy_norms(designed, matrices)
+    size = lambda w: np.linalg.norm(rate_response(designed, matrices, w), 2)
+    highest = 1e5 if matrices.period is None else np.pi / matrices.period
+    grid = np.geomspace(1e-6 * highest, highest, 2000)
+    at = grid[np.argmax([size(w) for w in grid])]
+    optimum = minimize_scalar(lambda w: -size(w), bounds=(0.9 * at, min(1.1 * at, highest)))
+    assert norms["H-infinity"] == pytest.approx(max(-optimum.fun, size(at)), rel=2e-3)
 
 
 def test_theorem_1_is_that_of_scipy(case):
@@ -463,6 +470,7 @@ def test_the_bound_for_a_rate_in_seconds_holds_for_any_sample_time(aso_ftc, pyth
     sampled = f"sample_time = {period}\n{fault}"
     file = changed("examples/dc-servo/plant.toml", tmp_path, ('actuator_faults = "all"', sampled))
     designed = Designed(aso_ftc, file, tmp_path)
+    must_have_energy_norms(designed, Matrices(designed.design))
     settings = {"plant.friction": "false", "plant.r_u": rate}
     steps = ("--step", period, "--stop-time", 0.4)
     table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings, *steps)

@@ -268,10 +268,13 @@ impl<'a> Loops<'a> {
         };
         let (largest, method) = largest_gain(&rates)?;
         let energies = energy(&rates)?;
+        // The energy of a rate is an integral over time, that of a sequence the sum over the samples.
+        let root = self.designed.domain.step().sqrt();
+        let (peak, h2) = (energies.peak / root, energies.h2 / root);
         Ok(vec![
             norm("H-infinity", largest, method),
-            norm("generalised H2", energies.peak, "peak for a rate of unit energy (Lyapunov)"),
-            norm("H2", energies.h2, "covariance under white noise (Lyapunov)"),
+            norm("generalised H2", peak, "peak for a rate of unit energy (Lyapunov)"),
+            norm("H2", h2, "covariance under white noise (Lyapunov)"),
         ])
     }
 }
