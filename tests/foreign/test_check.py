@@ -167,7 +167,7 @@ def test_stored_entries_with_data_descriptors_are_an_error(check, tmp_path, file
     "changes, words, severity",
     [
         ({"readme.txt": "x"}, "expected nothing but", "error"),
-        ({"Resources/x": "x"}, "expected resources, in this case", "error"),
+        ({"Resources/x": "x"}, "expected resources, with these upper and lower case letters", "error"),
         ({"documentation/index.html": None}, "expected index.html", "warning"),
         ({"model.png": "GIF89a"}, "expected a PNG", "warning"),
         ({"resources/a": "1", "resources/A": "2"}, "in upper and lower case only", "warning"),

@@ -139,7 +139,7 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
         }
         let near = tops.iter().find(|entry| entry.eq_ignore_ascii_case(top));
         let what = match near {
-            Some(near) => format!("expected {near}, in this case"),
+            Some(near) => format!("expected {near}, with these upper and lower case letters"),
             None if top == "icons" => "expected terminalsAndIcons".to_owned(),
             None => format!("expected nothing but {} at the top", tops.join(", ")),
         };
