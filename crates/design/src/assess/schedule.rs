@@ -9,6 +9,7 @@ use crate::assess::family::{common, judge, member};
 use crate::assess::matrices::gains;
 use crate::budget::Budget;
 use crate::matrix::rows;
+use crate::report::number::rounded;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
 use crate::solve::designed::Designed;
@@ -136,7 +137,7 @@ pub(crate) fn judge_schedule(
         }
     }
     if report.worst_instability >= 0.0 {
-        let (variable, at) = (&report.variable, report.worst_at);
+        let (variable, at) = (&report.variable, rounded(report.worst_at));
         let text = format!("the interpolated loop is not stable with {variable} = {at}");
         verdict.add(Level::Red, text);
     }
