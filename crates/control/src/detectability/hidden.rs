@@ -85,11 +85,11 @@ pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Err
     for s in distinct_eigenvalues(&plant.a_f)? {
         let eigenvectors = eigenvectors(&plant.a_f, s)?;
         let channels = eigenvectors.ncols();
-        let (rank, null) = scaled_null_space(&rosenbrock_matrix(plant, s, &eigenvectors))?;
-        let states = null.rows(0, n).into_owned();
+        let (rank, null, lengths) = scaled_null_space(&rosenbrock_matrix(plant, s, &eigenvectors))?;
         let faults = &eigenvectors * null.rows(n, channels);
         let expected = n + channels;
-        for (fault, state) in reduced_basis(faults, states) {
+        for (fault, vector) in reduced_basis(faults, null) {
+            let state = without_rounding_errors(&vector, &lengths).rows(0, n).into_owned();
             hidden.push(HiddenFault { at: s, channels, rank, expected, fault, state });
         }
     }
@@ -136,12 +136,12 @@ fn rosenbrock_matrix(
     beside(&of_states, &of_faults.resize_vertically(n + p, Complex::ZERO))
 }
 
-/// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to
-/// length one, so that units do not decide the rank.
+/// The rank of M, a basis of its null space and the diagonal of D, decided for M with rows, then columns,
+/// scaled to length one, so that units do not decide the rank.
 ///
 /// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in the null
 /// space of M.
-fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
+fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix, Vec<f64>), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();
     for mut row in scaled.row_iter_mut() {
@@ -153,7 +153,16 @@ fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error>
         column.unscale_mut(*length);
     }
     let (rank, null) = null_space(&scaled)?;
-    Ok((rank, ComplexMatrix::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] / lengths[i])))
+    let (rows, cols) = null.shape();
+    Ok((rank, ComplexMatrix::from_fn(rows, cols, |i, j| null[(i, j)] / lengths[i]), lengths))
+}
+
+/// D^-1 z, `vector`, with zero for each entry that is negligible in z; `lengths`: the diagonal of D.
+fn without_rounding_errors(vector: &ComplexVector, lengths: &[f64]) -> ComplexVector {
+    let size = |at: usize| vector[at].norm() * lengths[at];
+    let zero = ENTRY_TOLERANCE * (0..vector.len()).map(size).fold(0.0, f64::max);
+    let entry = |at: usize, _: usize| if size(at) > zero { vector[at] } else { Complex::ZERO };
+    ComplexVector::from_fn(vector.len(), entry)
 }
 
 /// The rank of M and a basis of its null space; for a matrix with imaginary parts one vector of it.
@@ -168,13 +177,13 @@ fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     Ok((rank, ComplexMatrix::from_fn(cols, count, |i, _| vector[i])))
 }
 
-/// Pairs of fault and state that span the same space as the columns of `faults` and `states`, each
+/// Pairs of fault and vector that span the same space as the columns of `faults` and `vectors`, each
 /// fault with a row in which the others are zero (Gauss-Jordan elimination with pivots in `faults`).
 ///
 /// Columns without a fault, which are unobservable modes of (A, C), are left out.
 fn reduced_basis(
     mut faults: ComplexMatrix,
-    mut states: ComplexMatrix,
+    mut vectors: ComplexMatrix,
 ) -> Vec<(ComplexVector, ComplexVector)> {
     let zero = ENTRY_TOLERANCE * faults.norm();
     let mut basis: Vec<usize> = Vec::new();
@@ -184,18 +193,18 @@ fn reduced_basis(
         if pivot.norm() <= zero {
             continue;
         }
-        for m in [&mut faults, &mut states] {
+        for m in [&mut faults, &mut vectors] {
             m.column_mut(column).apply(|entry| *entry /= pivot);
         }
         for other in (0..faults.ncols()).filter(|&other| other != column) {
             let factor = faults[(row, other)];
-            for m in [&mut faults, &mut states] {
+            for m in [&mut faults, &mut vectors] {
                 let multiple = m.column(column) * factor;
                 m.column_mut(other).zip_apply(&multiple, |entry, part| *entry -= part);
             }
         }
         basis.push(column);
     }
-    let pair = |&at: &usize| (faults.column(at).into_owned(), states.column(at).into_owned());
+    let pair = |&at: &usize| (faults.column(at).into_owned(), vectors.column(at).into_owned());
     basis.iter().map(pair).collect()
 }

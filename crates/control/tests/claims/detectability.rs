@@ -63,6 +63,20 @@ fn hidden_combinations_are_named_by_their_faults() {
     assert_eq!(pair.at, Complex::new(0.0, 0.0));
 }
 
+/// Two faults act on the same states: their difference moves no state.
+#[test]
+fn two_faults_with_one_effect_hide_each_other_without_a_motion() {
+    let plant = FaultyPlant::with_constant_faults(
+        matrix(3, 3, &[0., 1., 0., -4.3, -0.5, 2.1, 0.3, 0.1, -1.7]),
+        matrix(3, 1, &[0., 1., 0.]),
+        matrix(2, 3, &[1., 0., 0., 0., 0.3, 1.]),
+        matrix(3, 2, &[0., 0., 1.3, 1.3, 0.7, 0.7]),
+    );
+    let actual = detectability(&plant, Domain::Continuous).unwrap();
+    let [pair] = actual.hidden.as_slice() else { panic!("{:?}", actual.hidden) };
+    assert_eq!((pair.faults(), pair.states()), (vec![0, 1], vec![]));
+}
+
 /// x1' = -x1 - 2 x2 + f, x2' = -x2 + f, y = x1: the transfer function from f to y is (s - 1) / (s +
 /// 1)^2. It blocks only a fault that grows as e^t.
 #[test]
