@@ -21,13 +21,8 @@ pub(super) fn noise(
     estimates: &StateSpace,
     limits: &RobustnessLimits,
 ) -> Result<(Matrix, Vec<Number>), Error> {
-    let of = |output: &StateSpace| {
-        let mut gains = noise_or_infinite(closed_loop.from_noise(output)?)?;
-        for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
-            column *= *noise;
-        }
-        Ok::<_, Error>(gains)
-    };
+    let of =
+        |output: &StateSpace| noise_or_infinite(closed_loop.from_noise(output)?, &limits.noise);
     let (commands, faults) = (of(closed_loop.controller())?, of(estimates)?);
     let linear = &designed.linear;
     let named = linear.actuators.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
@@ -46,15 +41,18 @@ pub(super) fn noise(
     Ok((matrix("noise", meaning, &values, &affected, &measurements), together))
 }
 
-/// Returns [`noise_gains`], infinite where a direct term passes white noise of continuous time.
-fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
+/// Returns [`noise_gains`], each column times the `noise` of its measurement; infinite where a direct term passes white
+/// noise of continuous time.
+fn noise_or_infinite(mut system: StateSpace, noise: &[f64]) -> Result<DMatrix<f64>, Error> {
     let direct = system.d.clone();
-    if system.domain != Domain::Continuous {
-        return noise_gains(&system);
+    let is_continuous = system.domain == Domain::Continuous;
+    if is_continuous {
+        system.d.fill(0.0);
     }
-    system.d.fill(0.0);
-    let passed = |gain: f64, direct: f64| if direct == 0.0 { gain } else { f64::INFINITY };
-    Ok(noise_gains(&system)?.zip_map(&direct, passed))
+    Ok(noise_gains(&system)?.map_with_location(|row, column, gain| {
+        let is_passed = is_continuous && direct[(row, column)] != 0.0 && noise[column] > 0.0;
+        if is_passed { f64::INFINITY } else { gain * noise[column] }
+    }))
 }
 
 /// Returns for each fault the largest amplification of a sinusoidal error of the measurements to its
@@ -76,4 +74,34 @@ pub(crate) fn noise_peaks(designed: &Solution, noise: &[f64]) -> Result<Vec<f64>
         Ok(largest_gain(&one)?.0)
     };
     (0..system.c.nrows()).map(peak).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x' = -x + w and x[k+1] = 0.5 x[k] + w[k], with the variances 1/2 and 4/3 of x under unit noise.
+    #[test]
+    fn a_direct_term_passes_no_noise_of_a_measurement_without_noise() {
+        let sampled = Domain::Sampled { period: 0.1 };
+        for (domain, a, noise, expected) in [
+            (Domain::Continuous, -1.0, [0.0, 2.0], [0.0, 2.0_f64.sqrt()]),
+            (Domain::Continuous, -1.0, [0.1, 0.0], [f64::INFINITY, 0.0]),
+            (sampled, 0.5, [0.0, 2.0], [0.0, 2.0 * (4.0_f64 / 3.0).sqrt()]),
+            (sampled, 0.5, [3.0, 0.0], [3.0 * (7.0_f64 / 3.0).sqrt(), 0.0]),
+        ] {
+            let system = StateSpace {
+                a: DMatrix::from_element(1, 1, a),
+                b: DMatrix::from_element(1, 2, 1.0),
+                c: DMatrix::from_element(1, 1, 1.0),
+                d: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
+                domain,
+            };
+            let values = noise_or_infinite(system, &noise).unwrap();
+            for (value, expected) in values.iter().zip(expected) {
+                let agrees = value.total_cmp(&expected).is_eq() || (value - expected).abs() < 1e-13;
+                assert!(agrees, "{domain:?} {noise:?}: {values}");
+            }
+        }
+    }
 }
