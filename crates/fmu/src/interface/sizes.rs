@@ -23,7 +23,7 @@ impl Sizes {
 
     /// Replaces the extents in a description of FMI 3.0 by references to the structural parameters. An error if an
     /// extent is not the value of its structural parameter, or if elements that state structural parameters do not form
-    /// arrays with one dimension for each of them.
+    /// arrays whose elements all state the same, one for each dimension.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         if self.by_element.is_empty() {
             return Ok(());
@@ -35,8 +35,14 @@ impl Sizes {
             let extents: Vec<u64> = variable.dimensions.iter().map(extent).collect();
             let first = element_name(&variable.name, &vec![1; extents.len()], 0);
             let Some(names) = self.by_element.get(&first) else { continue };
-            variable.dimensions = references(&variable.name, &extents, names, &parameters)?;
-            used += usize::try_from(extents.iter().product::<u64>()).unwrap_or(usize::MAX);
+            let lengths: Vec<usize> =
+                extents.iter().filter_map(|&extent| usize::try_from(extent).ok()).collect();
+            let count: usize = lengths.iter().product();
+            let mut elements = (0..count).map(|at| element_name(&variable.name, &lengths, at));
+            if elements.all(|element| self.by_element.get(&element) == Some(names)) {
+                variable.dimensions = references(&variable.name, &extents, names, &parameters)?;
+                used += count;
+            }
         }
         if used == self.by_element.len() {
             return Ok(());
@@ -189,5 +195,11 @@ mod tests {
     fn a_name_that_is_no_structural_parameter_is_refused() {
         let refusal = refusal::<Vector<1, true>>();
         assert!(refusal.contains("m is no structural parameter"), "{refusal}");
+    }
+
+    #[test]
+    fn elements_of_an_array_with_different_structural_parameters_are_refused() {
+        let refusal = refusal::<Vector<2, true>>();
+        assert!(refusal.contains("states the same structural parameters"), "{refusal}");
     }
 }
