@@ -4,7 +4,6 @@ use fmu_description::{Causality, Kind};
 use serde_spanned::Spanned;
 
 use super::convert::Conversion;
-use super::literal::fits_integer;
 use super::resolve::{Resolver, Target, at, finite, kinds, only, positive, require};
 use super::signals::{conversion, unfit};
 use super::{Delay, Dropout, FaultEntry, Literal, Noise, Reason, Saturation, ScenarioError};
@@ -156,11 +155,10 @@ impl EntryConverter<'_> {
         Err(unfit(what, &self.target, expected))
     }
 
-    /// Returns `number`; an error if the input is not of a floating-point type and `number` is not an integer
-    /// that it can have.
+    /// Returns `number`; an error if the input is not of a floating-point type and `number` is not whole. It may
+    /// be beyond the range of the input, to which the faulty value is limited.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
-        let fits = self.target.is_real()
-            || fits_integer(number, &self.target.variable.kind, self.target.description);
+        let fits = self.target.is_real() || number.fract() == 0.0;
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 

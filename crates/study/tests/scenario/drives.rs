@@ -225,6 +225,24 @@ fn integers_of_every_width_follow_a_file_within_their_range() {
     }
 }
 
+/// A bias need not be a value of the input, such as -1 for a `UInt32`.
+#[test]
+fn the_sum_with_a_bias_is_limited_to_the_range_of_an_integer() {
+    let (mut system, calls) = of_fmi_3();
+    let text = r#"
+        scenario.signal = [
+            { variable = "fmu.small", constant = 100 },
+            { variable = "fmu.large", constant = 5 },
+        ]
+        scenario.fault = [
+            { connection = "fmu.small", bias = { value = 200 } },
+            { connection = "fmu.large", bias = { value = -1 } },
+        ]"#;
+    let mut prepared = scenario(text).resolve(&system, &setup(here())).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.5).unwrap();
+    assert_eq!(take(&calls), ["integer [1, 2] [127, 4]"]);
+}
+
 /// 2^40 is a double, 2^53 + 1 is not.
 #[test]
 fn an_item_of_more_than_32_bits_is_set_by_its_name() {
