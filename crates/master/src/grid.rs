@@ -9,7 +9,7 @@ use crate::system::System;
 use fmu_description::number::seconds;
 use slave::Slave;
 
-/// A rest of the run that is less than this fraction of the step gets no step of its own.
+/// A rest of the run that is less than this fraction of the step gets no step of its own; nor does one of rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// The communication points of a run, and the one reached.
@@ -124,7 +124,8 @@ impl Grid {
             all.filter(|((_, slave), _)| is_rigid(slave.as_ref()))
         };
         let steps = (stop - self.start) / self.step;
-        let is_whole = (steps - steps.round()).abs() <= ROUNDING;
+        let is_whole =
+            (steps - steps.round()).abs() * self.step <= self.negligible(self.step, stop);
         let most = if is_whole { steps.round() } else { steps.floor() } as u64;
         // All of these slaves meet at the common multiples of their steps.
         let together = rigid().fold(1, |all, (_, &multiple)| least_common(all, multiple.into()));
@@ -143,11 +144,18 @@ impl Grid {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
+    /// Returns the time in s by which a grid point may differ from `time` although it is the same beside steps of
+    /// `size` s: grid points and stop times in seconds since 1970 are rounded to 2.4e-7 s.
+    #[inline]
+    fn negligible(&self, size: f64, time: f64) -> f64 {
+        (ROUNDING * size).max(2.0 * f64::EPSILON * self.start.abs().max(time.abs()))
+    }
+
     /// Returns `end`, or the stop time if it is earlier or so close that the rest of a step of
     /// `size` s would be rounding.
     fn limited(&self, end: f64, size: f64) -> f64 {
         match self.stop {
-            Some(stop) if end > stop - ROUNDING * size => stop,
+            Some(stop) if end > stop - self.negligible(size, stop) => stop,
             _ => end,
         }
     }
@@ -185,7 +193,7 @@ impl Grid {
         let (start, end) = self.points;
         let on_grid = self.time.total_cmp(&start).is_eq();
         match self.stop {
-            Some(stop) if end > stop - ROUNDING * self.step => {
+            Some(stop) if end > stop - self.negligible(self.step, stop) => {
                 let whole = on_grid && (self.time + self.step).total_cmp(&stop).is_eq();
                 (stop, if whole { self.step } else { size_between(self.time, stop) })
             }
@@ -221,7 +229,7 @@ impl Grid {
     /// without lying on the grid.
     pub(crate) fn resume(&mut self, time: f64, count: u64) {
         self.set_count(count);
-        if count > 0 && self.points.0 > time + ROUNDING * self.step {
+        if count > 0 && self.points.0 > time + self.negligible(self.step, time) {
             self.set_count(count - 1);
         }
         self.time = time;

@@ -1,5 +1,6 @@
 //! The last step of a run: an FMU may refuse a step that ends an ulp beyond its stop time.
 
+use fmu_description::Experiment;
 use master::algorithm::EventSource;
 use master::{Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, System};
 
@@ -135,4 +136,18 @@ fn equal_steps_of_a_slave_with_a_multiple_are_whole_multiples() {
     let (simulation, times, sizes) = equal_steps(0.25, &[1, 2], 1.25);
     assert_eq!((times.last(), sizes.len()), (Some(&1.25), 5));
     assert_eq!(simulation.early_end(), None);
+}
+
+/// In seconds since 1970 the stop time is rounded by 1e-7 s, a part of 1e-5 of the step.
+#[test]
+fn rounding_of_the_stop_time_takes_no_step_from_equal_steps() {
+    let (system, asked) = rigid(system([f64::sin; 2], whole));
+    let (start_time, stop) = (1.7e9, 1_700_000_000.1);
+    let experiment = Experiment { start_time, ..until(stop) };
+    let mut simulation = Simulation::new(system, &Algorithm::new(0.01), &experiment).unwrap();
+    assert_eq!(simulation.early_end(), None);
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    assert_eq!((simulation.time(), asked.lock().unwrap().len()), (stop, 10));
 }
