@@ -348,12 +348,14 @@ impl<M> Interface<M> {
         interface_type: InterfaceType,
     ) -> Result<(fmi3::Table, ModelDescription), Failure> {
         let indicators = self.event_indicators.unwrap_or_default();
-        let (table, mut converted) = fmi3::describe(description, indicators);
-        self.sizes.enter(&mut converted)?;
-        self.clocks.enter(&mut converted)?;
-        for variable in &mut converted.variables {
+        // Before elements become arrays: only those with equal attributes do.
+        let mut scalars = description.clone();
+        self.clocks.enter(&mut scalars)?;
+        for variable in &mut scalars.variables {
             variable.intermediate_update = self.interpolates(&variable.name);
         }
+        let (table, mut converted) = fmi3::describe(&scalars, indicators);
+        self.sizes.enter(&mut converted)?;
         let intermediate = converted.variables.iter().any(|variable| variable.intermediate_update);
         if let Some(co_simulation) = &mut converted.co_simulation {
             co_simulation.provides_intermediate_update = intermediate;

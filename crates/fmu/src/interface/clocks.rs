@@ -18,7 +18,7 @@ impl Clocks {
         !self.0.is_empty()
     }
 
-    /// Sets `clocks` of the variables of a description of FMI 3.0. An error for a name that is not the name of a clock.
+    /// Sets `clocks` of the variables of a description. An error for a name that is not the name of a clock.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         for (name, clocks) in &self.0 {
             let index = |clock: &String| {
@@ -45,10 +45,11 @@ impl Clocks {
 mod tests {
     use std::path::Path;
 
+    use fmu_description::Dimension;
     use serde::{Deserialize, Serialize};
 
     use super::*;
-    use crate::{About, Model, Variable, describe};
+    use crate::{About, Model, ModelExchange, Variable, describe, describe_3, problems};
 
     /// A gain with a clock, on which the output depends, and whose alias comes first.
     #[derive(Clone, Serialize, Deserialize)]
@@ -77,6 +78,56 @@ mod tests {
                 Variable::real("y", "", |gain: &mut Self| &mut gain.y).output(&["tick", "u"]),
             ]
         }
+    }
+
+    /// Two clocks, two inputs with derivatives, and two outputs of the second clock.
+    #[derive(Clone, Serialize, Deserialize)]
+    struct Vector {
+        ticks: [bool; 2],
+        u: [f64; 2],
+        slopes: [f64; 2],
+        y: [f64; 2],
+    }
+
+    impl Model for Vector {
+        const IDENTIFIER: &'static str = "Vector";
+
+        fn about(&self) -> About {
+            About::default()
+        }
+
+        fn new(_: &Path) -> Result<Self, Failure> {
+            Ok(Self { ticks: [false; 2], u: [0.0; 2], slopes: [0.0; 2], y: [0.0; 2] })
+        }
+
+        fn variables(&self) -> Vec<Variable<Self>> {
+            let clock = |k: usize| {
+                let name = format!("tick[{}]", k + 1);
+                Variable::triggered_clock(name, "", move |all: &mut Self| &mut all.ticks[k]).input()
+            };
+            let u = Variable::real_array("u", "", &[2], |all: &mut Self| &mut all.u[..]);
+            let u = u.enumerate().map(|(k, element)| {
+                element.input().derivative(move |all: &mut Self| &mut all.slopes[k])
+            });
+            let y = Variable::real_array("y", "", &[2], |all: &mut Self| &mut all.y[..]);
+            let y = y.map(|element| element.output(&[]).discrete().clocked_by(&["tick[2]"]));
+            (0..2).map(clock).chain(u).chain(y).collect()
+        }
+
+        fn model_exchange(&self) -> Option<ModelExchange> {
+            Some(ModelExchange::default())
+        }
+    }
+
+    #[test]
+    fn an_array_has_the_clocks_and_the_intermediate_update_of_its_elements() {
+        assert_eq!(problems::<Vector>(Path::new("")), Ok(vec![]));
+        let description = describe_3::<Vector>(Path::new("")).unwrap();
+        let (u, y) = (description.variable("u").unwrap(), description.variable("y").unwrap());
+        assert!(u.intermediate_update && u.dimensions == [Dimension::Fixed(2)], "{u:?}");
+        assert_eq!(y.dimensions, [Dimension::Fixed(2)]);
+        let clocks: Vec<_> = y.clocks.iter().map(|&clock| description.at(clock).unwrap()).collect();
+        assert_eq!(clocks, [description.variable("tick[2]").unwrap()]);
     }
 
     #[test]

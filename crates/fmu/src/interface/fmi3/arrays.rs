@@ -1,6 +1,6 @@
 //! Arrays: scalars of FMI 2.0 that are one array in FMI 3.0.
 
-use fmu_description::{Elements, Kind, RealType, ScalarVariable};
+use fmu_description::{Causality, Elements, Kind, RealType, ScalarVariable};
 
 /// Scalars that are an array, or one scalar.
 pub(super) struct Block {
@@ -15,10 +15,10 @@ pub(super) struct Block {
 /// Splits variables into arrays and scalars.
 ///
 /// Scalars are an array if they follow one another, are named `name[1,1]`, `name[1,2]` and so on (or
-/// `der(name[1,1])`), with every index in row-major order, and have the same attributes except the start value. Several
-/// strings or binaries stay scalars, and so do states and derivatives that are not arrays of the same extents. A
-/// variable that is an alias, or has one, stays a scalar as well, because FMI 3.0 has no alias of an element:
-/// `is_single` returns true for it.
+/// `der(name[1,1])`), with every index in row-major order, and have the same attributes except the start value. Strings,
+/// binaries, clocks and structural parameters stay scalars, and so do states and derivatives that are not arrays of the
+/// same extents. A variable that is an alias, or has one, stays a scalar as well, because FMI 3.0 has no alias of an
+/// element: `is_single` returns true for it.
 pub(super) fn blocks(
     variables: &[ScalarVariable],
     is_single: impl Fn(&ScalarVariable) -> bool,
@@ -137,7 +137,7 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
             let alike = RealType { start: two.start, derivative: two.derivative, ..one.clone() };
             alike == *two && shifted == two.derivative && one.start.is_some() == two.start.is_some()
         }
-        (Kind::String(_) | Kind::Binary(_), _) => false,
+        (Kind::String(_) | Kind::Binary(_) | Kind::Clock(_), _) => false,
         (one, two) => {
             without_start(one) == without_start(two) && one.has_start() == two.has_start()
         }
@@ -148,7 +148,7 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
         kind: other.kind.clone(),
         ..first.clone()
     };
-    kind && alike == *other
+    kind && first.causality != Causality::StructuralParameter && alike == *other
 }
 
 /// Returns the start values of the elements; `None` for elements without start values, texts and binaries.
@@ -176,7 +176,7 @@ pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
 
 #[cfg(test)]
 mod tests {
-    use fmu_description::IntegerType;
+    use fmu_description::{ClockType, IntegerType};
 
     use super::*;
 
@@ -230,6 +230,19 @@ mod tests {
         }
         assert_eq!(blocks(&modes, |_| false).len(), 1);
         assert_eq!(starts(&modes), Some(Elements::Integer(vec![2, 1])));
+    }
+
+    /// FMI 3.0.2, section 2.4.7.2 allows no arrays of them.
+    #[test]
+    fn clocks_and_structural_parameters_are_scalars() {
+        let (mut clocks, mut sizes) = (variables(&["tick[1]", "tick[2]"]), variables(&["n[1]"]));
+        for clock in &mut clocks {
+            clock.kind = Kind::Clock(ClockType::default());
+        }
+        sizes[0].causality = Causality::StructuralParameter;
+        for all in [clocks, sizes] {
+            assert!(blocks(&all, |_| false).iter().all(|block| block.extents.is_empty()));
+        }
     }
 
     #[test]

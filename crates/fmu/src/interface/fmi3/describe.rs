@@ -31,7 +31,7 @@ pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, Mod
     let mut builder = Builder::default();
     builder.add_variables(&old.variables);
     let structure = builder.structure(old);
-    builder.set_derivatives();
+    builder.set_indices();
     let mut table = builder.table(old);
     let mut variables = builder.variables;
     let event_indicators = add_indicators(&mut table, &mut variables, indicators);
@@ -198,9 +198,12 @@ impl Builder {
         self.places[old as usize - 1].0
     }
 
-    /// Replaces the old index of the state in each derivative by the new one.
-    fn set_derivatives(&mut self) {
+    /// Replaces the old indices of states in derivatives, and of clocks, by the new ones.
+    fn set_indices(&mut self) {
         for variable in &mut self.variables {
+            for clock in &mut variable.clocks {
+                *clock = self.places[*clock as usize - 1].0;
+            }
             if let Kind::Real(RealType { derivative: Some(state), .. }) = &mut variable.kind {
                 *state = self.places[*state as usize - 1].0;
             }
