@@ -475,7 +475,10 @@ impl Engine {
                 StepResult::Event { reached } => (reached, false),
             };
             if terminated {
-                *swept = Swept::Ended(Ending { slave, time: reached });
+                let is_first = !matches!(swept, Swept::Ended(first) if first.time <= reached);
+                if is_first {
+                    *swept = Swept::Ended(Ending { slave, time: reached });
+                }
                 return Ok(());
             }
             if reached <= start {

@@ -137,7 +137,7 @@ fn a_step_that_ends_early_while_a_crossing_is_located_is_the_step() {
 #[test]
 fn a_slave_that_requests_the_end_while_a_crossing_is_located_ends_the_run_of_all_there() {
     let (mut system, _) = system([f64::sin, crosses], |begin, end| early(begin, end, true));
-    add_clock(&mut system, "q");
+    add_clock(&mut system, "q", whole);
     let mut simulation = crossing_in_a_step(system);
     simulation.step().unwrap();
     assert_eq!((simulation.ended_by(), simulation.ended_at()), (Some("p"), Some(0.25)));

@@ -62,9 +62,9 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
 }
 
 /// Adds another puppet, which completes its steps and whose y is the time.
-pub(crate) fn add_clock(system: &mut System, name: &str) {
+pub(crate) fn add_clock(system: &mut System, name: &str, way: Way) {
     let description = system.slaves[0].1.description().clone();
-    let clock = Puppet::boxed(description, [|time| time; 2], whole, &Asked::default());
+    let clock = Puppet::boxed(description, [|time| time; 2], way, &Asked::default());
     system.add(name, clock).unwrap();
 }
 
