@@ -30,7 +30,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 66] = [
+const REFUSALS: [(&str, &str, &str); 67] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -253,6 +253,11 @@ const REFUSALS: [(&str, &str, &str); 66] = [
         "3:14: the controller FMU has a variable `K_x[9,9]`",
     ),
     ("C = ", "measurements = [\"der(f_hat)\"]\nC = ", "3:17: the controller FMU has a variable"),
+    (
+        "C = ",
+        "transfer_time = 1\nmeasurements = [\"der(u_t)\"]\nC = ",
+        "4:17: the controller FMU has a variable `der(u_t)`",
+    ),
     (
         "C = ",
         "measurements = [\"q[1]\"]\nactuators = [\"q[2]\"]\nC = ",

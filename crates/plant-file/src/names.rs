@@ -201,7 +201,7 @@ impl ControllerVariables {
     fn include(&self, name: &str) -> bool {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
-            let states = ["x_hat", "f_hat", "f_hat_i", "y_f", "x_i"];
+            let states = ["x_hat", "f_hat", "f_hat_i", "y_f", "x_i", "u_t"];
             let is_sampled = self.0.iter().any(|(variable, _)| *variable == "T_s");
             return !is_sampled && self.has(state, |variable| states.contains(&variable));
         }
