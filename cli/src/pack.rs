@@ -96,7 +96,7 @@ impl Versions {
     }
 }
 
-/// Builds and packs the crates stated or, without one, the models of the clone; prints the files written.
+/// Builds and packs the crates stated or, without one, the models of the clone; prints the FMUs and the SSP written.
 pub(crate) fn pack(options: &Options) -> anyhow::Result<()> {
     if options.sbom && !cfg!(feature = "sbom") {
         bail!(

@@ -114,7 +114,7 @@ pub struct Error(String);
 /// # Errors
 ///
 /// Returns an [`Error`] for a continuous design; for a detection with tests of both methods; for a time beyond 2^32
-/// samples; for a number beyond the range of the precision.
+/// samples; for a number beyond the range of the precision, or values of the scheduling variable that it makes equal.
 pub fn write(design: aso_controller::Design, request: &Request<'_>) -> Result<Code, Error> {
     let controller = Controller::of(design)?;
     controller.check_range(request.precision)?;
