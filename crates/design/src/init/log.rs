@@ -54,7 +54,7 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     let fits = fit::fits(&logs, &estimate.model).map_err(|error| invalid(error.to_string()))?;
     let tolerance = estimate.tolerance(&logs);
     let notes = notes(&logs, &estimate, &fits);
-    let warnings = judge::warnings(&logs, &estimate, &fits, tolerance.as_ref());
+    let warnings = judge::warnings(&logs, options.order, &estimate, &fits, tolerance.as_ref());
     let Log { inputs, outputs, .. } = &logs[0];
     let means = estimate.windows.means();
     let signals = |names: &[Signal], means: &[f64]| -> Vec<Signal> {

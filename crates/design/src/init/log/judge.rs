@@ -69,9 +69,10 @@ fn constant_signal<'a>(
     })
 }
 
-/// Returns warnings of what may make the plant useless.
+/// Returns warnings of what may make the plant useless; `order`: the order that the user states.
 pub(super) fn warnings(
     logs: &[Log],
+    order: Option<usize>,
     estimate: &Estimate,
     fits: &[Fit],
     tolerance: Result<&f64, &String>,
@@ -98,7 +99,7 @@ pub(super) fn warnings(
         Ok(_) => {}
         Err(reason) => warnings.push(format!("the uncertainty of the plant is unknown: {reason}")),
     }
-    warnings.extend(rest(logs));
+    warnings.extend(rest(logs, order));
     warnings.extend(excitation(logs, estimate));
     if estimate.continuous.d.amax() > 0.0 {
         warnings.push(
@@ -111,16 +112,22 @@ pub(super) fn warnings(
     warnings
 }
 
-/// Returns a warning if no command changes in the samples that choose the order and judge the estimate.
-fn rest(logs: &[Log]) -> Option<String> {
+/// Returns a warning if no command changes in the samples that choose the order, unless it is stated, and judge the
+/// estimate.
+fn rest(logs: &[Log], order: Option<usize>) -> Option<String> {
     let is_constant = |log: &Log| {
         let commands = log.record.inputs.columns_range(validation(log));
         commands.row_iter().all(|row| row.max() - row.min() <= CONSTANT * row.amax())
     };
+    let (purpose, advice) = match order {
+        None => ("chooses the order and judges", ", or --order,"),
+        Some(_) => ("judges", ""),
+    };
     logs.iter().all(is_constant).then(|| {
-        "no command changes in the last quarter of the log, which chooses the order and judges the estimate: a log with \
-         changes up to its end, or --order, is needed"
-            .to_owned()
+        format!(
+            "no command changes in the last quarter of the log, which {purpose} the estimate: a log with changes up to \
+             its end{advice} is needed"
+        )
     })
 }
 
@@ -173,9 +180,16 @@ mod tests {
             Log { period: 1.0, inputs: Vec::new(), outputs: Vec::new(), record }
         };
         // The last quarter starts with sample 150.
-        assert!(rest(&[log(150)]).is_some());
-        assert_eq!(rest(&[log(151)]), None);
-        assert_eq!(rest(&[log(150), log(199)]), None);
+        assert!(rest(&[log(150)], None).unwrap().ends_with(", or --order, is needed"));
+        assert_eq!(rest(&[log(151)], None), None);
+        assert_eq!(rest(&[log(150), log(199)], None), None);
+        // The advice that has been followed is not repeated.
+        let stated = rest(&[log(150)], Some(2)).unwrap();
+        assert!(
+            stated
+                .ends_with("which judges the estimate: a log with changes up to its end is needed"),
+            "{stated}"
+        );
     }
 
     /// A room with a time constant of two hours, 1 / 7200 s.
