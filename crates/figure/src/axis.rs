@@ -40,13 +40,18 @@ impl Axis {
     /// a range of almost no length is widened.
     #[must_use]
     pub fn exact(low: f64, high: f64, pixels: (f64, f64), ticks: u8) -> Self {
+        Self::longer_than(1e-12, (low, high), pixels, ticks)
+    }
+
+    /// As [`Self::exact`]; a range is widened up to this length relative to the magnitude of its ends.
+    fn longer_than(relative: f64, (low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
         } else {
             (0.0, 1.0)
         };
         let size = low.abs().max(high.abs());
-        let widening = if high - low > 1e-9 * size {
+        let widening = if high - low > relative * size {
             0.0
         } else if size > 0.0 {
             0.1 * size
@@ -64,7 +69,8 @@ impl Axis {
     }
 
     /// Creates a linear axis with a margin around `values`, whose magnitudes count as `cap` if they are larger. Ignores
-    /// NaN; without values, the axis is around 0 to 1.
+    /// NaN; without values, the axis is around 0 to 1. Values that differ by up to 1e-9 of their magnitude, as
+    /// constants with errors of rounding do, count as one.
     pub fn around(
         values: impl Iterator<Item = f64>,
         cap: Option<f64>,
@@ -77,7 +83,7 @@ impl Axis {
             let value = value.clamp(-cap, cap);
             (low.min(value), high.max(value))
         });
-        let tight = Self::exact(low, high, pixels, ticks);
+        let tight = Self::longer_than(1e-9, (low, high), pixels, ticks);
         let margin = 0.06 * (tight.high - tight.low);
         Self { low: tight.low - margin, high: tight.high + margin, ..tight }
     }
@@ -190,7 +196,7 @@ fn label(value: f64, step: f64, largest: f64) -> String {
     }
     let text = if largest >= 1e6 || step < 1e-4 {
         let digits = value.abs().log10().floor() - step.log10().floor();
-        let digits = (1_u8..12).find(|count| f64::from(*count) >= digits).unwrap_or(12);
+        let digits = (1_u8..15).find(|count| f64::from(*count) >= digits).unwrap_or(15);
         format!("{value:.*e}", usize::from(digits))
     } else {
         let decimals = (0_u8..6).find(|decimals| {
@@ -218,6 +224,7 @@ mod tests {
             (0.0, 0.0),
             (1e5, 1e5 + 1.0),
             (-1e7, -1e7 + 3.0),
+            (1.7e9, 1.7e9 + 0.01),
             (f64::NAN, 1.0),
         ] {
             let axis = Axis::exact(low, high, (0.0, 100.0), 5);
@@ -242,6 +249,14 @@ mod tests {
         };
         assert_eq!(labels(-0.2, 0.2), ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]);
         assert_eq!(labels(0.0, 100.0), ["0", "20", "40", "60", "80", "100"]);
+    }
+
+    #[test]
+    fn a_second_since_1970_fills_an_axis_of_times_but_not_one_around_values() {
+        let (start, end) = (1.7e9, 1.7e9 + 1.0);
+        assert_eq!(Axis::exact(start, end, (0.0, 1.0), 5).range(), (start, end));
+        let (low, high) = Axis::around([start, end].into_iter(), None, (0.0, 1.0), 5).range();
+        assert!(low < 1.6e9 && high > 1.8e9, "{low} {high}");
     }
 
     fn texts(axis: &Axis) -> Vec<String> {

@@ -220,7 +220,13 @@ impl Panel<'_> {
 
     fn horizontal(&self, left: f64) -> Axis {
         let (start, end) = self.x_range.unwrap_or_else(|| self.times());
-        Axis::exact(start, end, (left, WIDTH - RIGHT), 10)
+        let axis = |ticks| Axis::exact(start, end, (left, WIDTH - RIGHT), ticks);
+        // Long labels, such as those of seconds since 1970, leave room for fewer ticks.
+        let fits = |axis: &Axis| {
+            let labels: Vec<_> = axis.ticks().iter().map(|tick| label_span(axis, tick)).collect();
+            labels.windows(2).all(|pair| pair[0].0 + pair[0].1 < pair[1].0 - pair[1].1)
+        };
+        (4..=10).rev().map(axis).find(fits).unwrap_or_else(|| axis(3))
     }
 
     /// Returns the vertical axis for the values in the range of `horizontal` and for the limits; `pixels` are the
@@ -288,12 +294,11 @@ impl Panel<'_> {
 
     fn draw_grid(&self, canvas: &mut Canvas, horizontal: &Axis, vertical: &Axis) {
         let ((left, right), (bottom, top)) = (horizontal.pixels(), vertical.pixels());
-        for (at, label) in horizontal.ticks() {
-            let x = horizontal.place(at);
+        for tick in horizontal.ticks() {
+            let x = horizontal.place(tick.0);
             canvas.line((x, top), (x, bottom), GRID, "1", "none");
-            let inside = WIDTH - 0.5 * canvas::digits_width(&label, TEXT_SIZE);
-            let place = (x.min(inside), bottom + 20.0);
-            canvas.text(place, Anchor::Middle, TEXT_SIZE, TEXT, &label);
+            let place = (label_span(horizontal, &tick).0, bottom + 20.0);
+            canvas.text(place, Anchor::Middle, TEXT_SIZE, TEXT, &tick.1);
         }
         for (at, label) in vertical.ticks() {
             let y = vertical.place(at);
@@ -320,6 +325,13 @@ impl Panel<'_> {
             self.visible_marks(horizontal).map(|(_, label)| entry(TEXT, "1.5", MARK_DASH, label));
         curves.chain(limit).chain(marks).collect()
     }
+}
+
+/// Returns the centre of the label of a tick on the horizontal axis, moved so that it stays on the page, and half of
+/// its width.
+fn label_span(horizontal: &Axis, (at, label): &(f64, String)) -> (f64, f64) {
+    let half = 0.5 * canvas::digits_width(label, TEXT_SIZE);
+    (horizontal.place(*at).min(WIDTH - half), half)
 }
 
 fn with_ending(stem: &Path, ending: &str) -> PathBuf {

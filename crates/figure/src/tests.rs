@@ -99,6 +99,29 @@ fn long_numbers_along_the_axes_stay_on_the_page_beside_the_label_of_the_axis() {
 }
 
 #[test]
+fn labels_of_seconds_since_1970_do_not_overlap() {
+    for length in [0.01, 1.0, 100.0, 3600.0] {
+        let time = [1.7e9, 1.7e9 + length];
+        let svg = example(&time, &VALUES[..2]).svg().unwrap();
+        let document = Document::parse(&svg).unwrap();
+        let labels = document.descendants().filter(|node| node.has_tag_name("text"));
+        let ends = labels.filter_map(|node| {
+            let text = node.text().filter(|text| text.ends_with("e9"))?;
+            let letters = f64::from(u8::try_from(text.chars().count()).unwrap());
+            // Digits of the font are 0.636 em wide (DejaVu Sans).
+            let half = 0.5 * 0.636 * TEXT_SIZE * letters;
+            let x: f64 = node.attribute("x").unwrap().parse().unwrap();
+            Some((x - half, x + half))
+        });
+        let ends: Vec<_> = ends.collect();
+        // Both panels have the same labels.
+        let ends = &ends[..ends.len() / 2];
+        assert!(ends.len() >= 3, "{length} s: {ends:?}");
+        assert!(ends.windows(2).all(|pair| pair[0].1 <= pair[1].0), "{length} s: {ends:?}");
+    }
+}
+
+#[test]
 fn the_files_are_an_svg_and_a_png_of_2000_pixels_the_same_bytes_twice() {
     let folder = tempfile::tempdir().unwrap();
     let mut figure = example(&TIME, &VALUES);
