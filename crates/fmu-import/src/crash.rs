@@ -77,6 +77,8 @@ pub struct Call {
     pub function: &'static str,
     /// Time of the instance in s.
     pub time: f64,
+    /// The number of the call, which distinguishes it from others of the same function at the same time.
+    number: u64,
 }
 
 /// The cause of the end of the process.

@@ -106,6 +106,8 @@ pub(crate) struct Slot {
     is_used: AtomicBool,
     /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
+    /// Number of calls so far.
+    entered: AtomicU64,
     /// Bits of the time of the instance, in s.
     time: AtomicU64,
     /// Name of the instance; `length` is its number of bytes.
@@ -169,6 +171,7 @@ impl Slot {
         Self {
             is_used: AtomicBool::new(false),
             function: AtomicPtr::new(ptr::null_mut()),
+            entered: AtomicU64::new(0),
             time: AtomicU64::new(0),
             name: [const { AtomicU8::new(0) }; NAME_LENGTH],
             length: AtomicUsize::new(0),
@@ -178,6 +181,8 @@ impl Slot {
     /// Records that the calling thread is about to call `function` of the instance.
     #[inline]
     pub(crate) fn enter(&self, function: &'static &'static str) {
+        // One thread at a time calls an instance.
+        self.entered.store(self.entered.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         self.function.store(ptr::from_ref(function).cast_mut(), Ordering::Relaxed);
         LAST.set(ptr::from_ref(self).addr());
         if let Some(observer) = OBSERVER.get() {
@@ -220,7 +225,8 @@ impl Slot {
         let function = self.function.load(Ordering::Relaxed);
         // SAFETY: null, or the address of the static reference passed to `enter`.
         let function = *unsafe { function.as_ref() }?;
-        Some(Call { instance: self.name(), function, time: self.time() })
+        let number = self.entered.load(Ordering::Relaxed);
+        Some(Call { instance: self.name(), function, time: self.time(), number })
     }
 
     /// Returns whether `address` is the address of this slot.
@@ -285,6 +291,12 @@ mod tests {
         assert!(calls(1).any(|actual| actual == call));
         one.leave();
         assert!(calls(address).all(|call| &*call.instance != "one"));
+        // As in an iteration of a step: the same function at the same time, but another call.
+        one.enter(&"fmi2DoStep");
+        let again = calls(address).next().unwrap();
+        assert_eq!((again.function, again.time), (call.function, call.time));
+        assert_ne!(again, call);
+        one.leave();
         one.enter(&"fmi2GetReal");
         drop(one);
         assert!(calls(1).all(|call| &*call.instance != "one"));
