@@ -1,5 +1,6 @@
 //! Lists the inputs that keep their start values, with options that set or connect them.
 
+use fmu_description::Kind;
 use master::{Port, System};
 use study::PreparedRun;
 
@@ -9,11 +10,12 @@ const INPUTS: usize = 20;
 const OUTPUTS: usize = 3;
 
 /// Returns a heading, a line for each of the first [`INPUTS`] inputs without a connection, a setting and a signal, and
-/// the number of further ones; empty for a single FMU and if there are none.
+/// the number of further ones; empty for a single FMU and if there are none. Leaves out clocks, which have no value.
 pub(super) fn list(prepared: &PreparedRun) -> String {
     let system = &prepared.system;
     let mut open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
-    open.retain(|input| !prepared.sets(*input));
+    let is_clock = |port: Port| matches!(system.variable(port).kind, Kind::Clock(_));
+    open.retain(|input| !is_clock(*input) && !prepared.sets(*input));
     let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();
     if open.len() > INPUTS {
         lines.push(format!("  and {} more", open.len() - INPUTS));

@@ -1,6 +1,7 @@
 //! A user's first runs: FMUs by their files, the summary, the log of calls.
 
 use tests::c_fmu::CFmu;
+use tests::c_versions;
 
 use super::*;
 
@@ -60,6 +61,15 @@ fn an_input_with_a_setting_or_a_signal_is_not_said_to_keep_its_start_value() {
     {
         assert_eq!(list.contains(&format!("\n  {input}: ")), is_open, "{input}: {list}");
     }
+}
+
+#[test]
+fn a_clock_is_not_said_to_keep_its_start_value() {
+    let bench = Bench::new();
+    let fmu = c_versions::slave_3(bench.folder.path(), "plain", true).display().to_string();
+    let list = printed(&bench.run(&[&fmu, &fmu, "--stop-time", "0.1"]));
+    assert!(list.contains("\n  slave3.u: "), "{list}");
+    assert!(!list.contains(".tick:"), "{list}");
 }
 
 #[test]
