@@ -4,6 +4,8 @@ use fmu_description::Kind;
 use master::{Port, System};
 use study::PreparedRun;
 
+use super::quoted;
+
 /// Largest number of inputs that are listed.
 const INPUTS: usize = 20;
 /// Largest number of outputs that are proposed for an input.
@@ -31,9 +33,10 @@ fn line(system: &System, input: Port) -> String {
     let name = system.name(input);
     let outputs = system.candidates(input);
     if outputs.is_empty() {
-        return format!("  {name}: set it by --set {name}=VALUE");
+        return format!("  {name}: set it by --set {}", quoted(&format!("{name}=VALUE")));
     }
-    let option = |output: &Port| format!("--connect {}={name}", system.name(*output));
+    let connection = |output: &Port| quoted(&format!("{}={name}", system.name(*output)));
+    let option = |output: &Port| format!("--connect {}", connection(output));
     let options: Vec<_> = outputs.iter().take(OUTPUTS).map(option).collect();
     let more = outputs.len().saturating_sub(OUTPUTS);
     let more = if more > 0 { format!(" ({more} more outputs fit)") } else { String::new() };
