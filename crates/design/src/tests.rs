@@ -240,6 +240,12 @@ const REFUSALS: [(&str, &str, &str); 67] = [
         "actuators = [\"v\"]\nmeasurements = [\"v\"]\nC = ",
         "4:17: the actuator and the measurement `v` would be one variable",
     ),
+    (
+        "C = ",
+        "reference.track = \"y1\"\nschedule = { variable = \"r_y1\", \
+         points = [{ at = 0 }, { at = 1, B = [[0], [2]] }] }\nC = ",
+        "4:25: the scheduling variable `r_y1` is a reference; expected a measurement, or another name",
+    ),
     ("C = ", "measurements = [\"compensate\"]\nC = ", "3:17: the controller FMU has a variable"),
     ("C = ", "measurements = [\"f_hat\"]\nC = ", "3:17: the controller FMU has a variable `f_hat`"),
     (

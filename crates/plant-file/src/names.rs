@@ -65,9 +65,12 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<()> {
         );
         return Err(at_name(file, signal, message));
     }
-    if let Some(input) = schedule_input(file).filter(is_actuator) {
+    if let Some(input) = schedule_input(file)
+        && (is_actuator(&input) || is_among(references, input))
+    {
+        let kind = if is_actuator(&input) { "an actuator" } else { "a reference" };
         let message = format!(
-            "the scheduling variable `{}` is an actuator; expected a measurement, or another name",
+            "the scheduling variable `{}` is {kind}; expected a measurement, or another name",
             input.name
         );
         return Err(at_name(file, input, message));
