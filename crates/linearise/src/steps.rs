@@ -12,7 +12,7 @@ use super::result::{Differences, MethodResult, RawResult, relative_error};
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
 
-/// Minimum and maximum number of steps of a record.
+/// Minimum and maximum number of steps of a record; more than 255 states need a longer one.
 const MIN_STEPS: usize = 8;
 const MAX_STEPS: usize = 512;
 /// Relative error below which longer records are not tried.
@@ -81,10 +81,9 @@ pub(super) fn of_steps(
     let bench = Bench::new(fmu, parts, states, request, step)?;
     let mut benches: Vec<_> =
         MULTIPLES.iter().map(|multiple| bench.with_step(multiple * step)).collect();
-    let mut count = MIN_STEPS.max(2 * (states.len() + 1));
     let mut best: Option<RecordResult> = None;
     let mut refusal = None;
-    while count <= MAX_STEPS {
+    for count in lengths(states.len()) {
         match of_count(&mut benches, parts, states, count) {
             Ok(record) if best.as_ref().is_none_or(|known| record.relative < known.relative) => {
                 let is_accurate = record.relative < SUFFICIENT_ERROR;
@@ -99,9 +98,14 @@ pub(super) fn of_steps(
             }
             Ok(_) | Err(_) => {}
         }
-        count *= 2;
     }
     best.ok_or_else(|| refusal.unwrap_or_else(|| unreachable(None, parts, states)))
+}
+
+/// Returns the numbers of steps of the records that are tried for this number of states, at least one.
+fn lengths(states: usize) -> impl Iterator<Item = usize> {
+    let first = MIN_STEPS.max(2 * (states + 1));
+    std::iter::successors(Some(first), |count| Some(2 * count).filter(|next| *next <= MAX_STEPS))
 }
 
 /// Linearises by records of `count` steps; of `benches`, which differ in their step, the last has the shortest.
@@ -318,4 +322,16 @@ fn prediction_error(
         difference / sizes[k].max(least).max(f64::MIN_POSITIVE)
     });
     Ok(relative.fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lengths;
+
+    #[test]
+    fn records_have_two_steps_for_each_state_even_if_there_are_many() {
+        assert!(lengths(3).eq([8, 16, 32, 64, 128, 256, 512]));
+        assert!(lengths(255).eq([512]));
+        assert!(lengths(300).eq([602]));
+    }
 }
