@@ -23,8 +23,9 @@ impl TimeResponse {
     ///
     /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
     /// final value. In continuous time peaks between grid points are those of the cubic through both values and
-    /// slopes (error 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly. In
-    /// sampled time, and where the points do not follow every oscillation, both are at grid points.
+    /// slopes (error 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly
+    /// after the last point or peak outside of the band. In sampled time, and where the points do not follow every
+    /// oscillation, both are at grid points.
     ///
     /// # Panics
     ///
@@ -47,8 +48,12 @@ impl TimeResponse {
             }
         }
         let band = fraction * distance;
-        let outside = (0..self.time.len()).rev().find(|&k| (z[k] - final_value).abs() > band);
-        let settling_time = outside.map_or(0.0, |k| self.entry(output, k, band));
+        let is_outside = |(_, value): &(f64, f64)| (value - final_value).abs() > band;
+        let outside = (0..self.time.len()).rev().find_map(|k| {
+            let last = self.extremum(output, k).filter(is_outside);
+            Some((k, last.or(Some((self.time[k], z[k])).filter(is_outside))?))
+        });
+        let settling_time = outside.map_or(0.0, |(k, last)| self.entry(output, k, last, band));
         Transient { peak, peak_time, settling_time, final_value }
     }
 
@@ -70,16 +75,18 @@ impl TimeResponse {
         Some((self.time[k] + part * step, begin + rise * (end - begin) + curve))
     }
 
-    /// The time at which z enters the band for the last time, infinite if it does not; k is the last point outside.
-    fn entry(&self, output: usize, k: usize, band: f64) -> f64 {
+    /// The time at which z enters the band for the last time, infinite if it does not. `last`: time and value of the
+    /// last point or extremum outside, which is at point k or before the next one.
+    fn entry(&self, output: usize, k: usize, last: (f64, f64), band: f64) -> f64 {
         if k + 1 == self.time.len() {
             return f64::INFINITY;
         }
         if self.slope.ncols() == 0 {
             return self.time[k + 1];
         }
-        let distance = |k: usize| (self.output[(output, k)] - self.final_value[output]).abs();
-        let part = (distance(k) - band) / (distance(k) - distance(k + 1));
-        self.time[k] + part.min(1.0) * (self.time[k + 1] - self.time[k])
+        let distance = |value: f64| (value - self.final_value[output]).abs();
+        let (from, to) = (distance(last.1), distance(self.output[(output, k + 1)]));
+        let part = (from - band) / (from - to);
+        last.0 + part.min(1.0) * (self.time[k + 1] - last.0)
     }
 }

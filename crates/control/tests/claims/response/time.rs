@@ -40,6 +40,21 @@ fn a_lag_settles_after_the_logarithm_of_the_band() {
     assert!((actual.final_value - 2.0).abs() < 1e-15);
 }
 
+/// Peak k of 1 - e^(-zeta w t) (cos(d t) + zeta w / d sin(d t)), d = w (1 - zeta^2)^(1/2), is e^(-zeta w t) away from 1
+/// at t = k pi / d. It is the last one outside of a slightly narrower band, also if no point of the grid is outside.
+#[test]
+fn a_peak_between_points_counts_for_the_settling_time() {
+    let zeta = 0.1;
+    let trace = step_response(&oscillator(1.0, zeta), 0).unwrap();
+    let damped = f64::sqrt(1.0 - zeta * zeta);
+    for k in 1..=12 {
+        let time = f64::from(k) * std::f64::consts::PI / damped;
+        let band = (1.0 - 1e-4) * (-zeta * time).exp();
+        let late = trace.transient(0, band).settling_time - time;
+        assert!((0.0..0.1).contains(&late), "{k}: {late}");
+    }
+}
+
 /// The lag goes to 2, not to 3, and is never within 2 % of 3, the largest distance from it.
 #[test]
 fn a_response_outside_of_the_band_to_its_end_does_not_settle() {
