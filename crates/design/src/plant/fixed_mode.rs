@@ -5,16 +5,17 @@ use control::rank::Mode;
 use nalgebra::Complex;
 
 /// Returns `the eigenvalue -2 1/s, which x2 dominates`, with the eigenvalue in the plane in which the plant file states
-/// it: of the sampled loop if `sampled`, or if it is 0, which no rate gives; otherwise in 1/s. `name` returns the name
-/// of a state.
+/// it: of the sampled loop if `sampled`, or if it is 0 or negative, which no real rate gives; otherwise in 1/s. `name`
+/// returns the name of a state.
 pub(crate) fn described_in(
     mode: &Mode,
     domain: Domain,
     sampled: bool,
     name: impl Fn(usize) -> String,
 ) -> String {
+    let has_rate = mode.eigenvalue.re > 0.0 || mode.eigenvalue.im != 0.0;
     let (eigenvalue, unit) = match domain {
-        Domain::Sampled { period } if !sampled && mode.eigenvalue.norm() > 0.0 => {
+        Domain::Sampled { period } if !sampled && has_rate => {
             (mode.eigenvalue.ln() / period, " 1/s")
         }
         Domain::Sampled { .. } => (mode.eigenvalue, " of the sampled loop"),
@@ -48,6 +49,24 @@ fn digits(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use control::rank::uncontrollable_modes;
+    use nalgebra::DMatrix;
+
+    /// e^(-2 T) is the eigenvalue of a rate; for -0.5 the logarithm is half of a complex pair.
+    #[test]
+    fn only_an_eigenvalue_above_zero_is_a_rate() {
+        let domain = Domain::Sampled { period: 0.1 };
+        for (eigenvalue, expected) in [
+            ((-0.2_f64).exp(), "the eigenvalue -2 1/s, which x2 dominates"),
+            (-0.5, "the eigenvalue -0.5 of the sampled loop, which x2 dominates"),
+        ] {
+            let a = DMatrix::from_row_slice(2, 2, &[0.3, 0.0, 0.0, eigenvalue]);
+            let b = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+            let modes = uncontrollable_modes(&a, &b).unwrap();
+            let name = |at: usize| format!("x{}", at + 1);
+            assert_eq!(described_in(&modes[0], domain, false, name), expected);
+        }
+    }
 
     #[test]
     fn an_eigenvalue_has_six_digits() {
