@@ -214,7 +214,8 @@ impl Loader {
     }
 
     /// Connects two variables, or a variable and a signal, from output to input. An error sentence if an end does not
-    /// exist, both are outputs or both inputs, or the input of a linear transformation already has a source.
+    /// exist or is neither output nor input, both are outputs or both inputs, or the input of a linear transformation
+    /// already has a source.
     fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
         let (source, target) = match (self.is_source(first)?, self.is_source(second)?) {
             (true, false) => (first, second),
@@ -256,8 +257,14 @@ impl Loader {
         }
         let variable = self.description(&end.owner)?.variable(&end.name);
         let variable = variable.ok_or_else(|| format!("the FMU has no variable {end}"))?;
-        let causality = variable.causality;
-        Ok(matches!(causality, Causality::Output | Causality::CalculatedParameter))
+        match variable.causality {
+            Causality::Output | Causality::CalculatedParameter => Ok(true),
+            Causality::Local | Causality::Independent => {
+                let causality = variable.causality.as_str();
+                Err(format!("{end} is {causality}, expected an output or an input"))
+            }
+            _ => Ok(false),
+        }
     }
 
     fn signal_is_source(&self, end: &End) -> Result<bool, String> {

@@ -28,7 +28,10 @@ fn osp(simulators: &str, functions: &str, connections: &str) -> String {
 /// Two FMUs `a.fmu` (two outputs, one input) and `my b.fmu` (the other way round).
 fn bench() -> Bench {
     let bench = Bench::new();
-    bench.fmu("fmus/a.fmu", "y output Real\nn output Real\nv input Real\np parameter Real");
+    bench.fmu(
+        "fmus/a.fmu",
+        "y output Real\nn output Real\nv input Real\np parameter Real\nl local Real",
+    );
     bench.fmu("fmus/b.fmu", "y input Real\nn input Real\nv output Real\nk parameter Boolean");
     bench
 }
@@ -155,6 +158,11 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
     };
     for (functions, connections, expected) in [
         ("", variables("y", "none"), "line 9, column 14: the FMU has no variable b.none"),
+        (
+            "",
+            variables("l", "y"),
+            "line 9, column 14: a.l is local, expected an output or an input",
+        ),
         ("", variables("v", "y"), "line 9, column 14: a.v and b.y are both inputs"),
         ("", variables("y", "v"), "line 9, column 14: a.y and b.v are both outputs"),
         ("", on("s", "in[0]"), "line 9, column 14: no function \"s\""),
