@@ -56,7 +56,7 @@ impl Source<'_> {
         if !is_checked || !inputs.is_empty() {
             lines.push(format!(
                 "
-/// Keeps the values that are numbers; returns whether there is another one.
+/// Keeps the finite values; returns whether another one is NaN or infinite.
 fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
     let mut held = false;
     for (kept, value) in kept.iter_mut().zip(values) {{
