@@ -1,5 +1,6 @@
 //! Python objects as slaves.
 
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use fmu_description::abi::Status;
@@ -42,7 +43,8 @@ impl PythonSlave {
     /// # Errors
     ///
     /// `TypeError` if the object has no function `step`, an attribute is a text or a start value is no number;
-    /// `ValueError` if one is an array of several elements; an exception of the object.
+    /// `ValueError` if one is an array of several elements, or if two variables have one name; an exception of the
+    /// object.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;
@@ -52,12 +54,19 @@ impl PythonSlave {
         }
         let mut variables = Vec::new();
         let mut values = Vec::new();
+        let mut names = HashSet::new();
         for (attribute, causality) in [("inputs", Causality::Input), ("outputs", Causality::Output)]
         {
-            for (name, start) in declarations(object, attribute)? {
+            for (variable_name, start) in declarations(object, attribute)? {
+                if !names.insert(variable_name.clone()) {
+                    let what = format!(
+                        "{name}: two variables are called {variable_name}, expected different names"
+                    );
+                    return Err(PyValueError::new_err(what));
+                }
                 let reference = u32::try_from(variables.len()).unwrap_or(u32::MAX);
                 values.push(start.number());
-                variables.push(variable(name, reference, causality, start));
+                variables.push(variable(variable_name, reference, causality, start));
             }
         }
         let all = |causality| {

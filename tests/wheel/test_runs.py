@@ -331,6 +331,14 @@ def test_start_values_of_numpy_have_the_types_of_python():
     assert [results[f"law.{name}"].dtype.kind for name in Scalars.outputs] == ["f", "b", "i"]
 
 
+@pytest.mark.parametrize("outputs", [["u", "u"], {"u": 0.0, "y": 0.0}])
+def test_two_variables_of_a_python_object_with_one_name_are_refused(outputs):
+    law = Proportional(2.0)
+    law.outputs = outputs
+    with pytest.raises(ValueError, match="law: two variables are called [uy], expected different names"):
+        loop(law).run()
+
+
 def test_an_object_is_stopped_once_also_if_its_run_fails_or_is_not_closed():
     class Stopped(Proportional):
         stops, fails = 0, False
