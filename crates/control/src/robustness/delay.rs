@@ -18,6 +18,8 @@ const REFINED_SAMPLES: u32 = 20;
 const PARTS: u32 = 4;
 /// Instability of a tested delay that is no rounding error of modes close to z = 1.
 const CLEAR: f64 = 1e-6;
+/// The same, relative to the decay of the loop without a delay.
+const RELATIVE: f64 = 0.1;
 
 /// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
 /// at which the loop is on the limit of stability; infinite if there is none.
@@ -128,6 +130,8 @@ pub(super) fn refine(
         let dynamics = delayed(plant, controller, period, count, samples.fract())?;
         instability(&dynamics, controller.domain)
     };
+    // A mode that decays slowly without a delay, such as a resonance, grows slowly with one.
+    let clear = CLEAR.min(RELATIVE * value(0.0)?.abs());
     // The first unstable one of the tested delays.
     let mut unstable = f64::INFINITY;
     for part in (0..parts).map(|at| f64::from(at) * step) {
@@ -140,7 +144,7 @@ pub(super) fn refine(
             if delay >= unstable {
                 break;
             }
-            if delay > stable && value(delay)? > CLEAR {
+            if delay > stable && value(delay)? > clear {
                 unstable = delay;
             }
         }

@@ -357,6 +357,25 @@ fn a_loop_may_bear_every_whole_sample_of_delay_and_not_a_part_of_one() {
     assert!(grown(0.99 * delay) < 1e-3 && grown(1.01 * delay) > 1e3, "{delay}");
 }
 
+/// x'' = -2 zeta x' - x - k x(t - tau) decays at zeta - k sin(tau) / 2 for small zeta and k. The hold delays by half
+/// of a sample h, and lowers k by the factor sin(h / 2) / (h / 2). In a sample the mode grows by less than 5e-7.
+#[test]
+fn a_resonance_that_grows_slowly_limits_the_delay() {
+    let (zeta, k, period) = (1e-5, 3e-5, 0.1);
+    let plant = StateSpace {
+        a: matrix(2, 2, &[0.0, 1.0, -1.0, -2.0 * zeta]),
+        b: matrix(2, 1, &[0.0, 1.0]),
+        c: matrix(1, 2, &[1.0, 0.0]),
+        d: matrix(1, 1, &[0.0]),
+        domain: Domain::Continuous,
+    };
+    let controller = gain(&matrix(1, 1, &[-k]), Domain::Sampled { period });
+    let half: f64 = 0.5 * period;
+    let expected = (2.0 * zeta / (k * half.sin() / half)).asin() - half;
+    let delay = sampled_delay_margin(&plant, &controller).expect("a delay");
+    assert_near(delay, expected, 1e-4, "delay");
+}
+
 /// y[k+2] = -r y[k+1] - r^2 y[k] + u[k], whose mode turns by a third in each sample, with u[k] = -g y[k-j]. The
 /// frequencies with |L| = 1 ask for 2.37 and 2.97 samples, between which there is no whole one.
 #[test]
