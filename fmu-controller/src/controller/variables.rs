@@ -56,9 +56,16 @@ fn per_second(unit: Option<&String>) -> Option<String> {
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// The unit times a second: `m` gives `m.s`. `None` without a unit, or if FMI cannot write it.
+/// The unit times a second: `m` gives `m.s`, `m/s` gives `m`, `km/h` gives `s.km/h`. `None` without a unit, or if FMI
+/// cannot write it.
 fn times_second(unit: Option<&String>) -> Option<String> {
-    let integral = format!("{}.s", unit?);
+    let unit = unit?;
+    let integral = match unit.strip_suffix("/s") {
+        Some(unit) => unit.to_owned(),
+        // `km/h.s` is no unit: a single unit or parentheses follow a stroke.
+        None if unit.contains('/') => format!("s.{unit}"),
+        None => format!("{unit}.s"),
+    };
     Unit::parse(&integral).is_ok().then_some(integral)
 }
 
@@ -332,6 +339,22 @@ mod tests {
             assert_eq!(slope, rate);
             let [of, per] = [unit, &slope].map(|unit| Unit::parse(unit).unwrap().base.unwrap());
             assert_eq!(fmu::description::unit::BaseUnit { s: of.s - 1, ..of }, per);
+        }
+    }
+
+    #[test]
+    fn an_integral_has_the_unit_of_its_reference_times_a_second() {
+        for (unit, integral) in [
+            ("m", "m.s"),
+            ("rad/s", "rad"),
+            ("1/s", "1"),
+            ("km/h", "s.km/h"),
+            ("J/(kg.K)", "s.J/(kg.K)"),
+        ] {
+            let product = times_second(Some(&unit.to_owned())).unwrap();
+            assert_eq!(product, integral);
+            let [of, times] = [unit, &product].map(|unit| Unit::parse(unit).unwrap().base.unwrap());
+            assert_eq!(fmu::description::unit::BaseUnit { s: of.s + 1, ..of }, times);
         }
     }
 
