@@ -10,8 +10,8 @@ use control::faults::ExtendedPlant;
 use plant_file::signals::{joined, signal_names};
 use plant_file::{FAULTS, PlantFile};
 
-/// A column counts as a combination of others if they leave less than this of its length; rows and
-/// columns have length one.
+/// A column counts as a combination of others if they leave less than this of its length, one; the largest entries of
+/// the rows were one before.
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -128,7 +128,7 @@ struct Dependence {
 
 /// Returns all columns of M that are combinations of earlier ones.
 ///
-/// Method: rows, then columns are scaled to length one; Gram-Schmidt, each column twice.
+/// Method: rows are divided by their largest entries, then columns by their lengths; Gram-Schmidt, each column twice.
 fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
     let unit = |length: f64| if length > 0.0 { length } else { 1.0 };
     let mut scaled = m.clone();
