@@ -51,15 +51,15 @@ pub struct Column {
     pub clocked: bool,
 }
 
-/// The type of a column: a base type of FMI 2.0, or an integer of 64 bits; an Enumeration is an Integer.
+/// The type of a column: a base type of FMI 2.0, or an integer of 64 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ColumnKind {
     /// `fmi2Real`.
     Real,
-    /// `fmi2Integer`, and the integer types of FMI 3.0 that fit into 32 bits with a sign.
+    /// `fmi2Integer`, Enumerations, and the integer types of FMI 3.0 that fit into 32 bits with a sign.
     Integer,
-    /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`. Their values are among
-    /// [`Row::integers`].
+    /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`, and Enumerations with an item beyond 32 bits. Their
+    /// values are among [`Row::integers`].
     Long,
     /// `fmi2Boolean`.
     Boolean,

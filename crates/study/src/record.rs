@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, TryLockError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use fmu_description::{Causality, Kind};
+use fmu_description::{Causality, Kind, ModelDescription};
 use master::{Port, Readout, Simulation, SlowValues, System};
 use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink};
 
@@ -232,16 +232,27 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
 }
 
 fn column(system: &System, port: Port) -> Column {
-    let variable = system.variable(port);
-    let kind = match &variable.kind {
+    let kind = column_kind(&system.variable(port).kind, system.slaves[port.slave].1.description());
+    let clocked = system.is_absent_between_ticks(port);
+    Column { name: system.name(port), kind, unit: unit(system, port), clocked }
+}
+
+/// Returns the type of the column of a variable of this kind in an FMU with this `description`.
+fn column_kind(kind: &Kind, description: &ModelDescription) -> ColumnKind {
+    match kind {
         Kind::Boolean(_) | Kind::Clock(_) => ColumnKind::Boolean,
         Kind::String(_) | Kind::Binary(_) => ColumnKind::String,
         Kind::UInt32(_) | Kind::Int64(_) | Kind::UInt64(_) => ColumnKind::Long,
+        Kind::Enumeration(_) if has_long_item(kind, description) => ColumnKind::Long,
         other if other.as_real().is_some() => ColumnKind::Real,
         _ => ColumnKind::Integer,
-    };
-    let clocked = system.is_absent_between_ticks(port);
-    Column { name: system.name(port), kind, unit: unit(system, port), clocked }
+    }
+}
+
+/// Whether the type of an enumeration has an item beyond 32 bits, as in FMI 3.0.
+fn has_long_item(kind: &Kind, description: &ModelDescription) -> bool {
+    let declared = description.types.iter().find(|one| kind.declared_type() == Some(&*one.name));
+    declared.is_some_and(|one| one.items.iter().any(|(_, value)| i32::try_from(*value).is_err()))
 }
 
 /// Returns the unit of a variable, if it has one.
@@ -276,4 +287,30 @@ pub fn select(system: &System, record: &[String], exclude: &[String]) -> Result<
     let chosen = selection.choose(&names);
     let chosen = chosen.map_err(|error| Error::from(error).within("results"))?;
     Ok(chosen.into_iter().map(|position| ports[position]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_enumeration_with_an_item_beyond_32_bits_has_a_column_of_64_bits() {
+        let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+            <CoSimulation modelIdentifier="M"/>
+            <TypeDefinitions>
+            <EnumerationType name="Size"><Item name="small" value="1"/>
+            <Item name="huge" value="2147483648"/></EnumerationType>
+            <EnumerationType name="Gear"><Item name="first" value="2147483647"/></EnumerationType>
+            </TypeDefinitions>
+            <ModelVariables>
+            <Float64 name="time" valueReference="0" causality="independent"/>
+            <Enumeration name="size" valueReference="1" causality="input" declaredType="Size" start="1"/>
+            <Enumeration name="gear" valueReference="2" causality="input" declaredType="Gear"
+                start="2147483647"/>
+            </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let description = ModelDescription::parse(xml).unwrap();
+        let kinds = description.variables.iter().map(|one| column_kind(&one.kind, &description));
+        let expected = [ColumnKind::Real, ColumnKind::Long, ColumnKind::Integer];
+        assert_eq!(kinds.collect::<Vec<_>>(), expected);
+    }
 }
