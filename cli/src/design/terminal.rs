@@ -27,12 +27,11 @@ pub(crate) fn summarise(report: &Report) {
     println!("estimation law: {}", report.estimation.law);
     if let Some(robustness) = &report.robustness {
         println!("peak of S: {}", peaks(&robustness.points));
-        let delay = number(robustness.delay_margin);
-        let hold = number(robustness.longest_hold);
+        let [delay, hold] = [robustness.delay_margin, robustness.longest_hold].map(seconds);
         match (&report.plant.sample_time, &report.sampling) {
-            (Some(_), _) => println!("delay margin: {delay} s, in whole samples"),
-            (None, Some(_)) => println!("delay margin: {delay} s; longest sample time: {hold} s"),
-            (None, None) => println!("delay margin: {delay} s; longest hold: {hold} s"),
+            (Some(_), _) => println!("delay margin: {delay}, in whole samples"),
+            (None, Some(_)) => println!("delay margin: {delay}; longest sample time: {hold}"),
+            (None, None) => println!("delay margin: {delay}; longest hold: {hold}"),
         }
         if let Some(delays) = &robustness.delays {
             let [at_input, at_output] = delays.s_peaks.map(number);
@@ -259,16 +258,14 @@ fn print_detection(detection: &Detection) {
         number(detection.false_alarm_interval)
     );
     for fault in &detection.faults {
-        let seconds = |time: Option<f64>| {
-            time.map_or_else(|| "never for sure".to_owned(), |time| format!("{} s", number(time)))
-        };
+        let delay = |time: Option<f64>| time.map_or_else(|| "never for sure".to_owned(), seconds);
         let least = fault.least.map_or_else(|| "none".to_owned(), number);
         println!(
             "    {} of {}: mean delay {}, 90 % within {}; least detectable within {} s: {least}",
             fault.fault,
             number(fault.size),
-            seconds(fault.delay),
-            seconds(fault.delay_90),
+            delay(fault.delay),
+            delay(fault.delay_90),
             number(fault.within),
         );
     }
@@ -329,7 +326,11 @@ pub(crate) fn compare(comparison: &Comparison) {
                 law.law.clone(),
                 one.fault.clone(),
                 number(one.constant),
-                number(one.step_settling),
+                if one.step_settling.is_finite() {
+                    number(one.step_settling)
+                } else {
+                    "never".to_owned()
+                },
                 one.ramp.map_or("grows".to_owned(), number),
                 number(one.sine),
                 stated(one.noise),
@@ -377,11 +378,11 @@ fn print_reference(step: &ReferenceStep) {
     let unit = step.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
     let rise = step.rise_time.map_or("none".to_owned(), |time| format!("{} s", number(time)));
     println!(
-        "step of {} by {}{unit}: rise time {rise}, overshoot {} %, settled after {} s, steady-state error {} %",
+        "step of {} by {}{unit}: rise time {rise}, overshoot {} %, {}, steady-state error {} %",
         step.reference,
         number(step.size),
         number(100.0 * step.overshoot),
-        number(step.settling_time),
+        settled(step.settling_time),
         number(if step.steady_state_error.abs() < ROUNDING {
             0.0
         } else {
@@ -398,6 +399,15 @@ fn print_reference(step: &ReferenceStep) {
     if step.largest_step.iter().any(|limit| limit.is_finite()) {
         let [low, high] = step.largest_step.map(number);
         println!("    within the limits: steps from {low} to {high}{unit}");
+    }
+}
+
+/// Describes when a response stays within its band; `time` is infinite if it leaves the band to the end of its trace.
+fn settled(time: f64) -> String {
+    if time.is_finite() {
+        format!("settled after {} s", number(time))
+    } else {
+        "not settled at the end of the response".to_owned()
     }
 }
 
@@ -418,6 +428,11 @@ fn print_loop(feedback_loop: &Loop) {
     }
 }
 
+/// Formats a time; an infinite one has no unit.
+fn seconds(time: f64) -> String {
+    if time.is_finite() { format!("{} s", number(time)) } else { number(time) }
+}
+
 /// Formats a number with about five digits.
 fn number(value: f64) -> String {
     if value.is_infinite() {
@@ -436,5 +451,17 @@ fn number(value: f64) -> String {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
         format!("{value:.4e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_without_end_has_no_unit() {
+        let expected = ["settled after 0.25 s", "not settled at the end of the response"];
+        assert_eq!([0.25, f64::INFINITY].map(settled), expected);
+        assert_eq!([0.25, f64::INFINITY].map(seconds), ["0.25 s", "no limit"]);
     }
 }
