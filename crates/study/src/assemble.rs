@@ -131,16 +131,20 @@ fn apply_settings(
 /// Opens the system structure on which the configuration builds, and logs its warnings.
 fn open(path: &Path) -> Result<Opened, Error> {
     let opened = ssp::open(path)?;
-    let folder = path.parent().unwrap_or(path).to_string_lossy();
     for warning in &opened.warnings {
-        // A warning about a file in the unpacked system names the file.
-        if !folder.is_empty() && warning.starts_with(&*folder) {
+        if names_file(warning, path) {
             tracing::warn!("{warning}");
         } else {
             tracing::warn!("{}: {warning}", path.display());
         }
     }
     Ok(opened)
+}
+
+/// Whether a warning about the system structure at `path` starts with the path of a file in the same folder or below.
+fn names_file(warning: &str, path: &Path) -> bool {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.is_some_and(|folder| Path::new(warning).starts_with(folder))
 }
 
 fn element(name: &str, path: &Path) -> Element {
@@ -211,4 +215,18 @@ fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
         tracing::warn!("nothing is connected: no output has the name of an input of another FMU");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variable_of_an_element_with_the_name_of_the_folder_is_no_file() {
+        let system = Path::new("plant/system.ssp");
+        assert!(names_file("plant/system.ssp/resources/a.ssv: no content", system));
+        assert!(names_file("plant/system.ssp: no content", system));
+        assert!(!names_file("plant.u is connected, but is no connector", system));
+        assert!(!names_file("a.u is connected, but is no connector", Path::new("system.ssp")));
+    }
 }
