@@ -30,7 +30,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 67] = [
+const REFUSALS: [(&str, &str, &str); 68] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",

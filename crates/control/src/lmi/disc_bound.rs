@@ -250,7 +250,7 @@ mod tests {
                 Complex::new(center, 0.0) + Complex::from_polar(radius, angle)
             });
             let left = on_circle.filter(|s| s.re <= 0.0);
-            let farthest = left.map(|s| s.norm()).fold(0.0, f64::max);
+            let farthest = left.map(Complex::norm).fold(0.0, f64::max);
             assert!((bound * farthest / 0.25 - 1.0).abs() < 1e-4, "{center}: {bound}");
             // With A - L C = diag(-4, -4) the norm is 1 / 4.
             assert!(norm(matrix(2, 2, &[-4.0, 0.0, 0.0, -4.0]), &performance) > bound);
