@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Tolerance, relative to the interval, by which a communication point may precede an instant of the
-/// grid and still count as at the instant, because times are rounded.
+/// grid and still count as at the instant, because times are rounded. The rounding of the time itself is added.
 const TOLERANCE: f64 = 1e-9;
 
 /// The communication points to record.
@@ -50,7 +50,8 @@ impl Due {
                 due
             }
             Decimation::Every(interval) => {
-                let passed = (time - self.start) / interval + TOLERANCE;
+                let rounding = 4.0 * f64::EPSILON * time.abs();
+                let passed = (time - self.start + rounding) / interval + TOLERANCE;
                 let due = passed >= self.next;
                 if due {
                     self.next = passed.floor() + 1.0;
@@ -77,6 +78,16 @@ mod tests {
         assert_eq!(kept.len(), 10_001);
         for (k, time) in (0_u32..).zip(kept) {
             assert!((time - (1.5 + 0.1 * f64::from(k))).abs() < 1e-9, "{k}: {time}");
+        }
+    }
+
+    #[test]
+    fn the_grid_is_met_at_seconds_since_1970() {
+        for start in [1.7e9, -1.7e9] {
+            let point = |k: u32| start + f64::from(k) * 1e-3;
+            let times: Vec<f64> = (0..=20_000).map(point).collect();
+            let expected: Vec<f64> = (0..=2000).map(|row| point(10 * row)).collect();
+            assert_eq!(recorded(Decimation::Every(0.01), start, &times), expected);
         }
     }
 
