@@ -3,6 +3,7 @@
 
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
+use control::faults::FaultEntry;
 use control::lmi::{Outcome, Region, common_reachable_set};
 use control::losses::LossyLoop;
 use control::{Error, StateSpace};
@@ -310,7 +311,8 @@ impl Examination<'_> {
     }
 
     /// Returns what acts on the plant with a known size: the lost part of each command of the operating point, and each
-    /// fault with a stated bound, without losses of effectiveness; a sensor fault only if the plant has the filter.
+    /// fault with a stated bound, without losses of effectiveness; one that enters a measurement only if the plant has
+    /// the filter.
     fn disturbances(&self) -> Vec<Disturbance> {
         let Solution { linear, extended, whole, .. } = self.designed;
         let plant = &whole.plant;
@@ -320,12 +322,12 @@ impl Examination<'_> {
                 size: loss.up_to * loss.operating.abs(),
                 column: plant.b.column(loss.actuator).into_owned(),
             });
-        let faults = linear.faults.iter().zip(&extended.channels).filter_map(|(fault, channel)| {
-            // A sensor fault acts through the filter, which with integral action is part of the controller.
-            let additive = match fault.entry_point {
-                EntryPoint::Loss { .. } => false,
-                EntryPoint::Sensor(_) => plant.a.nrows() > linear.states.len(),
-                _ => true,
+        let models = linear.models.iter().zip(&extended.channels);
+        let faults = linear.faults.iter().zip(models).filter_map(|(fault, (model, channel))| {
+            // On a measurement it acts through the filter, which with integral action is part of the controller.
+            let additive = match model.entry {
+                FaultEntry::LossOfEffectiveness(_) => false,
+                _ => !model.entry.is_measured() || plant.a.nrows() > linear.states.len(),
             };
             Some(Disturbance {
                 name: fault.name.clone(),
@@ -342,4 +344,44 @@ struct Disturbance {
     size: f64,
     /// How it acts on the states of the plant.
     column: DVector<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::TimeLimits;
+    use crate::solve::designed::design;
+    use crate::tests::read;
+
+    /// The fault `bias` is one of u2, which enters y2 by D. With integrals the filter is a part of the controller, in
+    /// which no column of the plant has the effect on y2.
+    #[test]
+    fn a_fault_of_an_actuator_that_enters_a_measurement_has_no_bound_beside_integrals() {
+        let names = |integral: bool| {
+            let (eigenvalues, reference) = if integral {
+                ("[-1, -1.2, -1.5]", "reference.track = [\"y1\"]")
+            } else {
+                ("[-1, -1.5]", "")
+            };
+            let text = format!(
+                "A = [[-1, 0.5], [0, -2]]\nB = [[1, 0], [0, 1]]\nC = [[1, 0], [0, 1]]\n\
+                 D = [[0, 0], [0, 0.5]]\nfilter = 20\nfeedback.eigenvalues = {eigenvalues}\n\
+                 observer.eigenvalues = [-3, -4, -5, -6, -20, -22]\n{reference}\n\
+                 [[faults]]\nname = \"loss\"\nloss_of = \"u1\"\nleast_command = 0.5\nup_to = 0.3\n\
+                 [[faults]]\nname = \"bias\"\nactuator = \"u2\"\nbound = 0.1\n"
+            );
+            let disturbances = read(&text, |file| {
+                let designed = design(file).unwrap().nominal;
+                let DesignLoop { plant, controller } = &designed.whole;
+                let lossy = LossyLoop::new(plant, controller, &[0]).unwrap();
+                let (stated, budget) = (stated(&designed), TimeLimits::default().of_certificates());
+                let examination =
+                    Examination { designed: &designed, stated: &stated, lossy, budget: &budget };
+                examination.disturbances()
+            });
+            disturbances.unwrap().into_iter().map(|one| one.name).collect::<Vec<_>>()
+        };
+        assert!(names(true).is_empty());
+        assert_eq!(names(false), ["bias"]);
+    }
 }
