@@ -18,7 +18,8 @@ use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
 use plant_file::requirements::Requirement;
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
-/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.
+/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves; for `sampled_eigenvalues`
+/// relative to 1, if the mode is within the unit circle.
 const SAME: f64 = 1e-4;
 
 /// Computes K of u = K x.
@@ -151,8 +152,12 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
         let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
         let near = |one: &Complex<f64>| (one - stated).norm();
         let nearest = (0..rest.len()).min_by(|&i, &j| near(&rest[i]).total_cmp(&near(&rest[j])));
+        let scale = match required {
+            Requirement::SampledEigenvalues(_) => stated.norm().max(1.0),
+            _ => stated.norm(),
+        };
         // No p has e^(p T) = 0.
-        let largest = if stated.is_finite() { SAME * stated.norm() } else { 0.0 };
+        let largest = if stated.is_finite() { SAME * scale } else { 0.0 };
         match nearest.filter(|&at| near(&rest[at]) <= largest) {
             Some(at) => drop(rest.swap_remove(at)),
             None => return Err(Refusal::Fixed(mode.clone())),
@@ -229,5 +234,21 @@ mod tests {
             panic!("the eigenvalue 0 of the sampled loop is requested");
         };
         assert_eq!(assignment.movable, [Complex::new(0.9, 0.0)]);
+    }
+
+    /// A has the eigenvalue 0.3 with the eigenvector (1, 1, 1), which is B, and twice 0, which is computed with a
+    /// rounding error.
+    #[test]
+    fn a_fixed_mode_at_zero_up_to_rounding_takes_a_requested_sampled_eigenvalue_of_zero() {
+        let (a, b) = (DMatrix::from_element(3, 3, 0.1), DMatrix::from_element(3, 1, 1.0));
+        let fixed = uncontrollable_modes(&a, &b).unwrap();
+        assert_eq!(fixed.len(), 2);
+        let real = |values: [f64; 3]| values.map(|value| Complex::new(value, 0.0)).to_vec();
+        let movable = |values| {
+            let required = Requirement::SampledEigenvalues(real(values));
+            movable(&required, &fixed, Domain::Sampled { period: 0.1 }).ok()
+        };
+        assert_eq!(movable([0.0, 0.2, 0.0]).unwrap().movable, [Complex::new(0.2, 0.0)]);
+        assert!(movable([0.0, 0.2, 0.01]).is_none());
     }
 }
