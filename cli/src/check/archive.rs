@@ -147,8 +147,7 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
             near.map_or("", |_| "Importers do not find it where upper and lower case differ.");
         findings.add(Error, top, what, why, SECTION);
     }
-    let has = |folder: &str| names.iter().any(|name| name.starts_with(folder));
-    if !has("binaries/") && !has("sources/") {
+    if !has_file(names, "binaries/") && !has_file(names, "sources/") {
         let what = "expected binaries or sources, found neither";
         findings.add(Error, "the archive", what, "Nobody can run it.", SECTION);
     }
@@ -262,5 +261,17 @@ mod tests {
         for name in ["con1", "com", "com0", "com10", "lpt", "compute.c", ".git"] {
             assert!(!breaks_windows(name), "{name}");
         }
+    }
+
+    #[test]
+    fn an_empty_folder_counts_as_no_binaries() {
+        let count = |names: &[&str]| {
+            let names: Vec<_> = names.iter().map(|name| (*name).to_owned()).collect();
+            let mut findings = Findings::about(Part::Archive);
+            top_level(&names, Version::V2, &mut findings);
+            findings.all.len()
+        };
+        assert_eq!(count(&["modelDescription.xml", "binaries/", "binaries/linux64/"]), 1);
+        assert_eq!(count(&["modelDescription.xml", "binaries/", "binaries/linux64/m.so"]), 0);
     }
 }
