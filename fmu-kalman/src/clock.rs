@@ -34,7 +34,8 @@ impl Clock {
     /// The instant of the next sample in s, at most `end`; `None` if it is not due until `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.start + self.next * self.period;
-        (next <= end + TOLERANCE * self.period).then_some(next.min(end))
+        let tolerance = TOLERANCE * self.period + 8.0 * f64::EPSILON * end.abs();
+        (next <= end + tolerance).then_some(next.min(end))
     }
 
     /// The instant of the last sample in s.

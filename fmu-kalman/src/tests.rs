@@ -23,6 +23,20 @@ fn a_sample_is_due_at_each_multiple_of_the_period_within_rounding() {
     }
 }
 
+/// Seconds since 1970 are rounded by up to 0.12 us.
+#[test]
+fn a_sample_is_due_at_the_end_of_its_step_in_seconds_since_1970() {
+    let (start, period) = (1.7e9, 1e-3);
+    let mut clock = Clock::new(period);
+    clock.start(start);
+    for k in 0..1000_u32 {
+        let end = (start + f64::from(k) * period) + period;
+        assert!(clock.next_until(end).is_some(), "{k}");
+        clock.tick();
+        assert_eq!(clock.next_until(end), None, "{k}");
+    }
+}
+
 #[test]
 fn a_step_of_several_periods_has_several_samples() {
     let mut clock = Clock::new(2.0);
