@@ -162,15 +162,16 @@ impl Detector {
         let Some(period) = detection.sample_time else { return Ok(()) };
         let start = stretch.start + stretch.offset;
         let (mut at, end) = (0.0, stretch.size);
+        let tolerance = TOLERANCE * period + 8.0 * f64::EPSILON * start.abs();
         self.work.before.clear();
         self.work.before.extend(stretch.z.iter().chain(&self.state));
         loop {
             let instant = self.start + (self.samples + 1.0) * period;
             let rounded = ((instant - start) / (RESOLUTION * period)).round();
             let due = rounded * RESOLUTION * period;
-            let sampled = due <= end + TOLERANCE * period;
+            let sampled = due <= end + tolerance;
             // A sample at the end, up to rounding, leaves the size of the part as it is.
-            let to = if due < end - TOLERANCE * period { due } else { end };
+            let to = if due < end - tolerance { due } else { end };
             if to > at {
                 self.propagate(design, detection, stretch, at, to - at)?;
                 at = to;

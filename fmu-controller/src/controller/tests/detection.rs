@@ -141,6 +141,26 @@ fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_s
     }
 }
 
+/// Seconds since 1970 are rounded by up to 0.12 us, more than 1e-6 of the sample time. A run from zero is the oracle.
+#[test]
+fn a_continuous_controller_has_the_residual_of_each_step_at_its_end_in_seconds_since_1970() {
+    let text = continuous("").replace("t_on = 0.35", "t_on = 0.0");
+    let mut runs = [0.0, 1.7e9].map(|start_time| {
+        let mut controller = with_design(&text).unwrap();
+        controller.initialize(&Experiment { start_time, ..Experiment::default() }).unwrap();
+        (start_time, controller)
+    });
+    for k in 0..40 {
+        let elapsed = f64::from(k) * T;
+        let [expected, actual] = runs.each_mut().map(|(start_time, controller)| {
+            let start = *start_time + elapsed;
+            step(controller, start, T, &[0.4 + 0.5 * elapsed], &[0.5]);
+            controller.detector_mut().residuals[0]
+        });
+        assert!((actual - expected).abs() < 1e-4, "{k}: {actual} {expected}");
+    }
+}
+
 #[test]
 fn a_sampled_controller_tests_in_each_sample_with_the_command_of_that_sample() {
     let mut controller = ready(with_design(&sampled()).unwrap());
