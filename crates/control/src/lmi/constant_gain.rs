@@ -34,7 +34,7 @@ pub struct ConstantGain {
 ///
 /// `family`: stable systems `G_i` with r outputs and m inputs each; `target`: M, s x m; `fixed`:
 /// entries (row, column, value) of Q that are given, counted from 0; `width`: relative distance of
-/// the worst error from its lower bound at which the iteration ends, at least 1e-5.
+/// the worst error from its lower bound at which the iteration ends; below 1e-5 it counts as 1e-5.
 ///
 /// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator
 /// for all systems of the family: its error is the response to commands and disturbances together
@@ -70,6 +70,10 @@ pub fn constant_gain(
     if let Some(&(row, column, _)) = fixed.iter().find(|entry| entry.0 >= s || entry.1 >= r) {
         let (expected, actual) = ((s, r), (row + 1, column + 1));
         return Err(Error::Shape { matrix: "fixed", expected, actual });
+    }
+    if let Some(at) = fixed.iter().position(|entry| !entry.2.is_finite()) {
+        let (row, value) = (at + 1, fixed[at].2);
+        return Err(Error::NotFinite { matrix: "fixed", row, col: 3, value });
     }
     let width = width.max(1e-5);
     let at_ends = |system| [0.0, f64::INFINITY].map(|frequency| response(system, frequency));
@@ -147,4 +151,18 @@ fn minimum(
     }
     let (bound, unknowns) = problem.minimum()?;
     Some((bound, gain.evaluate(&unknowns)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_given_entry_that_is_not_a_number_is_refused_by_its_place() {
+        let one = DMatrix::from_element(1, 1, 1.0);
+        let (a, b, c, d) = (-&one, one.clone(), one.clone(), one.clone());
+        let family = [StateSpace { a, b, c, d, domain: Domain::Continuous }];
+        let refused = constant_gain(&family, &one, &[(0, 0, f64::NAN)], 1e-3);
+        assert!(matches!(refused, Err(Error::NotFinite { matrix: "fixed", row: 1, col: 3, .. })));
+    }
 }
