@@ -121,7 +121,7 @@ impl<'a> Graph<'a> {
                 outputs.len() - 1
             });
             connections[node].push(number);
-            inputs[connection.to.slave].push((connection.to.variable, node));
+            inputs[connection.to.slave].push((system.holder(connection.to).variable, node));
         }
         let rows = Rows::of(system);
         let mut edges = Vec::new();
@@ -130,9 +130,7 @@ impl<'a> Graph<'a> {
             match rows[output.slave].initial_dependencies(output.variable) {
                 None => edges.extend(inputs.iter().map(|&(_, source)| (source, node))),
                 Some(list) => {
-                    let needed = inputs
-                        .iter()
-                        .filter(|(input, _)| list.iter().any(|&index| index as usize == input + 1));
+                    let needed = inputs.iter().filter(|(input, _)| list.contains(input));
                     edges.extend(needed.map(|&(_, source)| (source, node)));
                 }
             }

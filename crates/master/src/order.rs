@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use fmu_description::Unknown;
 
 use crate::signal_type::SignalType;
-use crate::system::{Connection, System};
+use crate::system::{Connection, Port, System};
 use solve::components;
 
 /// An order of the slaves, with their algebraic loops.
@@ -31,7 +31,7 @@ pub fn by_direct_dependencies(system: &System) -> Order {
         .filter(|connection| !is_clocked(system, connection))
         .filter(|connection| {
             let inputs = feedthrough[connection.to.slave].as_ref();
-            inputs.is_none_or(|inputs| inputs.contains(&connection.to.variable))
+            inputs.is_none_or(|inputs| inputs.contains(&system.holder(connection.to).variable))
         })
         .map(|connection| (connection.from.slave, connection.to.slave))
         .collect();
@@ -54,12 +54,11 @@ fn feedthrough_inputs(system: &System) -> Vec<Option<HashSet<usize>>> {
     for connection in system.connections.iter().filter(|connection| !is_clocked(system, connection))
     {
         let from = connection.from;
-        let Some(unknown) = rows[from.slave].output(from.variable) else { continue };
-        match (&unknown.dependencies, &mut feedthrough[from.slave]) {
+        let rows = &rows[from.slave];
+        let Some(unknown) = rows.entry(&[&rows.outputs], from.variable) else { continue };
+        match (rows.dependencies(unknown), &mut feedthrough[from.slave]) {
             (None, inputs) => *inputs = None,
-            (Some(list), Some(inputs)) => {
-                inputs.extend(list.iter().map(|&index| index as usize - 1));
-            }
+            (Some(list), Some(inputs)) => inputs.extend(list),
             (Some(_), None) => {}
         }
     }
@@ -72,6 +71,8 @@ fn by_index(unknowns: &[Unknown]) -> HashMap<u32, &Unknown> {
 
 /// The entries of `ModelStructure` of one model, by the index of their variable.
 pub(crate) struct Rows<'a> {
+    system: &'a System,
+    slave: usize,
     initial: HashMap<u32, &'a Unknown>,
     outputs: HashMap<u32, &'a Unknown>,
 }
@@ -79,30 +80,45 @@ pub(crate) struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Returns the entries of each slave.
     pub(crate) fn of(system: &'a System) -> Vec<Self> {
-        let structures = system.slaves.iter().map(|(_, slave)| &slave.description().structure);
-        let rows = structures.map(|structure| Self {
-            initial: by_index(&structure.initial_unknowns),
-            outputs: by_index(&structure.outputs),
+        let slaves = system.slaves.iter().enumerate();
+        let rows = slaves.map(|(slave, (_, instance))| {
+            let structure = &instance.description().structure;
+            let initial = by_index(&structure.initial_unknowns);
+            Self { system, slave, initial, outputs: by_index(&structure.outputs) }
         });
         rows.collect()
     }
 
-    /// Returns the entry of the output at position `output`; `None` if it is no output.
-    fn output(&self, output: usize) -> Option<&'a Unknown> {
-        self.outputs.get(&u32::try_from(output + 1).ok()?).copied()
+    /// Returns the entry of the output at position `output` in the first of `lists` that has one. In FMI 3.0 an alias
+    /// has no entry, but that of [`System::holder`]. `None` if it is no output.
+    fn entry(&self, lists: &[&HashMap<u32, &'a Unknown>], output: usize) -> Option<&'a Unknown> {
+        let entry = |position: usize| {
+            let index = u32::try_from(position + 1).ok()?;
+            lists.iter().find_map(|list| list.get(&index).copied())
+        };
+        entry(output).or_else(|| entry(self.holder(output)))
     }
 
-    /// Returns the variables (1-based indices) on which the output at position `output` depends
-    /// directly; `None`: possibly all, or it is no output.
-    pub(crate) fn direct_dependencies(&self, output: usize) -> Option<&'a [u32]> {
-        self.output(output)?.dependencies.as_deref()
+    fn holder(&self, variable: usize) -> usize {
+        self.system.holder(Port { slave: self.slave, variable }).variable
     }
 
-    /// Returns the variables (1-based indices) on which the output at position `output` depends in
-    /// initialization mode; `None`: possibly all, or it is no output.
-    pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {
-        let index = u32::try_from(output + 1).ok()?;
-        let initial = self.initial.get(&index).copied();
-        initial.or_else(|| self.output(output))?.dependencies.as_deref()
+    /// Returns the positions of the variables on which `unknown` depends, as [`System::holder`] returns them; `None`:
+    /// possibly all.
+    fn dependencies(&self, unknown: &Unknown) -> Option<HashSet<usize>> {
+        let list = unknown.dependencies.as_ref()?;
+        Some(list.iter().map(|&index| self.holder(index as usize - 1)).collect())
+    }
+
+    /// Returns the positions of the variables on which the output at position `output` depends directly, as
+    /// [`System::holder`] returns them; `None`: possibly all, or it is no output.
+    pub(crate) fn direct_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
+        self.dependencies(self.entry(&[&self.outputs], output)?)
+    }
+
+    /// Returns the positions of the variables on which the output at position `output` depends in initialization mode,
+    /// as [`System::holder`] returns them; `None`: possibly all, or it is no output.
+    pub(crate) fn initial_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
+        self.dependencies(self.entry(&[&self.initial, &self.outputs], output)?)
     }
 }

@@ -216,13 +216,11 @@ impl Layout {
         loop {
             let from_jumping =
                 system.connections.iter().filter(|connection| jumping.contains(&connection.from));
-            let inputs: HashSet<Port> = from_jumping.map(|connection| connection.to).collect();
+            let inputs: HashSet<Port> =
+                from_jumping.map(|connection| system.holder(connection.to)).collect();
             let is_dependent = |port: &&Port| {
                 let dependencies = rows[port.slave].direct_dependencies(port.variable);
-                let jumps = |index: &u32| {
-                    let position = (*index as usize).checked_sub(1);
-                    position.is_some_and(|variable| inputs.contains(&Port { variable, ..**port }))
-                };
+                let jumps = |&variable: &usize| inputs.contains(&Port { variable, ..**port });
                 !jumping.contains(port) && dependencies.is_some_and(|all| all.iter().any(jumps))
             };
             let dependent: Vec<Port> =
