@@ -78,11 +78,12 @@ pub(crate) fn is_rigid(slave: &dyn Slave) -> bool {
 ///
 /// Returns [`SystemError::Time`] if they are not.
 pub fn check_stop_time(start: f64, stop: f64) -> Result<(), SystemError> {
-    if !start.is_finite() {
-        let (what, rule) = ("the start time", "a finite number".to_owned());
-        return Err(SystemError::Time { what, value: start, rule });
+    for (what, value) in [("the start time", start), ("the stop time", stop)] {
+        if !value.is_finite() {
+            return Err(SystemError::Time { what, value, rule: "a finite number".to_owned() });
+        }
     }
-    if stop > start && stop.is_finite() {
+    if stop > start {
         return Ok(());
     }
     let rule = format!("more than the start time, {start} s");
@@ -101,7 +102,8 @@ impl Grid {
         stop: Option<f64>,
     ) -> Result<(Self, Option<EarlyEnd>), SystemError> {
         if !(step > 0.0 && step.is_finite()) {
-            let (what, rule) = ("the communication step", "more than 0".to_owned());
+            let (what, rule) =
+                ("the communication step", "a finite number, more than 0".to_owned());
             return Err(SystemError::Time { what, value: step, rule });
         }
         // Without a stop time, the run may end at any time.

@@ -94,7 +94,8 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
 fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
     match request.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
-            Err(Error::Invalid(format!("the communication step is {step} s, expected more than 0")))
+            let rule = "expected a finite number, more than 0";
+            Err(Error::Invalid(format!("the communication step is {step} s, {rule}")))
         }
         _ => Ok(()),
     }

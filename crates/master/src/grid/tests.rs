@@ -89,13 +89,18 @@ fn a_run_in_seconds_since_1970_has_no_step_of_rounding_at_its_end() {
 }
 
 #[test]
-fn a_start_time_that_is_no_finite_number_is_refused() {
-    for (start, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
+fn a_start_or_stop_time_that_is_no_finite_number_is_refused() {
+    let message = |start, stop| {
+        let grid = Grid::new(&System::default(), 0.1, &[], start, stop);
+        grid.err().unwrap().to_string()
+    };
+    for (time, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
         for stop in [None, Some(1.0)] {
-            let grid = Grid::new(&System::default(), 0.1, &[], start, stop);
-            let message = grid.err().unwrap().to_string();
-            assert_eq!(message, format!("the start time is {text} s, expected a finite number"));
+            let expected = format!("the start time is {text} s, expected a finite number");
+            assert_eq!(message(time, stop), expected);
         }
+        let expected = format!("the stop time is {text} s, expected a finite number");
+        assert_eq!(message(0.0, Some(time)), expected);
     }
 }
 
