@@ -300,20 +300,26 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
 }
 
 /// Starts of the names, in lower case, of libraries that belong to the operating system, with white space between them.
-const SYSTEM: &str = "libc.so libm.so libpthread.so libdl.so librt.so libutil.so libgcc_s.so ld-linux \
-    linux-vdso libstdc++.so /usr/lib/ /system/ kernel32 kernelbase ntdll user32 advapi32 \
+const SYSTEM: &str = "libc.so libm.so libmvec.so libpthread.so libdl.so librt.so libutil.so \
+    libresolv.so libgcc_s.so ld-linux linux-vdso libstdc++.so \
+    /usr/lib/ /system/ kernel32 kernelbase ntdll user32 advapi32 \
     ws2_32 ole32 oleaut32 shell32 shlwapi gdi32 comdlg32 comctl32 msvcrt.dll bcrypt crypt32 \
     userenv dbghelp psapi version.dll winmm rpcrt4 secur32 iphlpapi setupapi imm32 powrprof \
     netapi32 mpr.dll wsock32 api-ms-win- ext-ms-win- ucrtbase opengl32 normaliz cfgmgr32 \
     wintrust dhcpcsvc wininet winhttp winspool wldap32 wtsapi32 urlmon dnsapi ncrypt gdiplus \
     pdh.dll";
 
+/// Whether a library whose name in lower case is `lower` belongs to the operating system.
+fn is_of_system(lower: &str) -> bool {
+    SYSTEM.split_ascii_whitespace().any(|prefix| lower.starts_with(prefix))
+}
+
 fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut Findings) {
     let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
     for library in file.import_libraries().into_iter().flatten().flatten() {
         let name = String::from_utf8_lossy(library.name()).into_owned();
         let lower = name.to_ascii_lowercase();
-        if SYSTEM.split_ascii_whitespace().any(|prefix| lower.starts_with(prefix)) {
+        if is_of_system(&lower) {
             continue;
         }
         let last = name.rsplit('/').next().unwrap_or(&name);
@@ -353,6 +359,15 @@ fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The files of glibc 2.36; GCC links libmvec with -Ofast.
+    #[test]
+    fn the_libraries_of_glibc_belong_to_the_system() {
+        for name in ["libc.so.6", "libm.so.6", "libmvec.so.1", "libresolv.so.2", "librt.so.1"] {
+            assert!(is_of_system(name), "{name}");
+        }
+        assert!(!is_of_system("libmumps.so.5"));
+    }
 
     /// FMI 3.0.2, section 2.5.1.4.1: four architectures and three systems.
     #[test]
