@@ -66,7 +66,8 @@ fn list(element: Node<'_>, name: &'static str, references: &References) -> Resul
             continue;
         };
         let dependencies = dependencies(row, references);
-        let kinds = kinds(row, dependencies.as_deref());
+        let is_invalid = dependencies.is_none() && row.attribute("dependencies").is_some();
+        let kinds = if is_invalid { None } else { kinds(row, dependencies.as_deref()) };
         rows.push(Unknown { index, dependencies, kinds });
     }
     Ok(rows)

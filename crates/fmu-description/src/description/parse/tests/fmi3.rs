@@ -376,6 +376,17 @@ fn defects_with_a_clear_meaning_are_warnings_that_name_them() {
 }
 
 #[test]
+fn invalid_dependencies_with_kinds_are_one_warning() {
+    let (description, warnings) = read(
+        r#"<Float64 name="y" valueReference="1" causality="output"/>"#,
+        r#"<Output valueReference="1" dependencies="9" dependenciesKind="dependent"/>"#,
+    );
+    let [warning] = &warnings[..] else { panic!("{warnings:#?}") };
+    assert!(warning.contains("<Output>, attribute dependencies: expected the value"), "{warning}");
+    assert_eq!(description.structure.outputs, [Unknown { index: 2, ..Unknown::default() }]);
+}
+
+#[test]
 fn content_that_would_mislead_a_simulation_is_refused() {
     for (variables, structure, expected) in [
         (r#"<Float64 name="x"/>"#, "", "attribute valueReference: expected a value"),
