@@ -32,7 +32,7 @@ pub(super) fn family(report: &Report, family: &FamilyReport) -> Markup {
                     @if report.sampling.is_some() { " from one sample to the next" }
                     "."
                 }
-                (square("family-P", ["P", LYAPUNOV], &loop_names(report), &certificate.p))
+                (lyapunov(report, "family-P", "P", &certificate.p))
             }
             Err(reason) => p {
                 strong { "Stability while the plant moves between the members is not proven: " }
@@ -81,7 +81,7 @@ pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
                      the first and the last point, so that the interpolated loop is stable however \
                      fast the variable changes."
                 }
-                (square("schedule-P", ["P", LYAPUNOV], &loop_names(report), &certificate.p))
+                (lyapunov(report, "schedule-P", "P", &certificate.p))
             }
             (Err(reason), Ok(bounded)) => {
                 p {
@@ -90,10 +90,9 @@ pub(super) fn schedule(report: &Report, schedule: &ScheduleReport) -> Markup {
                      stable while the variable changes by at most " (number(bounded.rate)) " "
                     (unit) " per s."
                 }
-                @let names = loop_names(report);
                 @for (index, (point, p)) in schedule.points.iter().zip(&bounded.p).enumerate() {
                     @let id = format!("schedule-P-{}", index + 1);
-                    (square(&id, [&format!("P at {}", point.at), LYAPUNOV], &names, p))
+                    (lyapunov(report, &id, &format!("P at {}", point.at), p))
                 }
             }
             (Err(any), Err(bounded)) => p {
@@ -187,6 +186,11 @@ fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
     }
 }
 
+/// Shows P of plant and controller together.
+fn lyapunov(report: &Report, id: &str, name: &str, p: &[Vec<f64>]) -> Markup {
+    square(id, [name, LYAPUNOV], &loop_names(report, p), p)
+}
+
 fn state_names(report: &Report) -> Vec<String> {
     report.plant.states.iter().map(|signal| signal.name.clone()).collect()
 }
@@ -198,20 +202,53 @@ fn integral_names(report: &Report) -> Vec<String> {
     names.map(|name| format!("integral of {name}")).collect()
 }
 
-/// The names of the states of plant and controller together: those of the plant, filtered measurements, estimates,
-/// integrals.
-fn loop_names(report: &Report) -> Vec<String> {
-    let mut names = state_names(report);
-    let Some(k_x) = report.gains.iter().find(|gain| gain.name == "K_x") else { return names };
+/// The names of the states of plant and controller together, of which `p` is a matrix: those of the plant, filtered
+/// measurements, estimates, integrals.
+fn loop_names(report: &Report, p: &[Vec<f64>]) -> Vec<String> {
+    let states = &report.plant.states;
+    let Some(k_x) = report.gains.iter().find(|gain| gain.name == "K_x") else {
+        return state_names(report);
+    };
+    let mut controller = Vec::new();
     let measurements = report.plant.measurements.iter();
-    if k_x.columns.len() > names.len() {
-        names.extend(measurements.map(|signal| format!("filter of {}", signal.name)));
+    if k_x.columns.len() > states.len() {
+        controller.extend(measurements.map(|signal| format!("filter of {}", signal.name)));
     }
-    names.extend(k_x.columns.iter().map(|name| format!("estimate of {name}")));
+    controller.extend(k_x.columns.iter().map(|name| format!("estimate of {name}")));
     let faults = report.gains.iter().find(|gain| gain.name == "L_f");
-    names.extend(
+    controller.extend(
         faults.iter().flat_map(|gain| &gain.rows).map(|name| format!("estimate of {name}")),
     );
-    names.extend(integral_names(report));
+    controller.extend(integral_names(report));
+    let mut names = judged_names(report, p.len().saturating_sub(controller.len()));
+    names.extend(controller);
+    names
+}
+
+/// The names of the `count` states of the plant in the judged loop, in which a delay has more states than in the
+/// observer.
+fn judged_names(report: &Report, count: usize) -> Vec<String> {
+    let mut names = state_names(report);
+    if names.len() == count {
+        return names;
+    }
+    let (actuators, measurements) = (&report.plant.actuators, &report.plant.measurements);
+    let commands = actuators.iter().map(|signal| &signal.name);
+    let commands = commands.map(|name| (name, format!("delayed {name}")));
+    let measured = measurements.iter().map(|signal| &signal.name);
+    let measured = measured.map(|name| (name, format!("delay of {name}, 1")));
+    // Each delayed signal, and the first state of its delay.
+    let mut delays: Vec<_> = commands.chain(measured).collect();
+    delays.retain(|(_, first)| names.contains(first));
+    let Some(start) = names.iter().position(|name| delays.iter().any(|(_, first)| first == name))
+    else {
+        return names;
+    };
+    names.truncate(start);
+    let order = count.saturating_sub(start) / delays.len();
+    for (name, first) in delays {
+        names.push(first);
+        names.extend((2..=order).map(|at| format!("delay of {name}, {at}")));
+    }
     names
 }

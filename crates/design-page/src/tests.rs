@@ -7,9 +7,9 @@ mod plots;
 
 use resvg::usvg::roxmltree::{Document, Node};
 
-use design_report::Report;
-use design_report::family::{FamilyReport, MemberMargins, MemberReport};
+use design_report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
 use design_report::robustness::{Level, Number, ToleranceResult};
+use design_report::{Matrix, Report, Signal};
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 
@@ -355,6 +355,29 @@ fn a_member_whose_entries_are_exact_has_no_limit_of_its_tolerances() {
     };
     assert!(!shown(0).contains("tolerances"), "{}", shown(0));
     assert!(shown(3).contains("not up to 16"), "{}", shown(3));
+}
+
+/// The loop is judged with three states for each delay, of which the observer has two.
+#[test]
+fn the_lyapunov_matrix_of_a_family_names_all_states_of_delays() {
+    let mut report = bare();
+    let states = ["x1", "delayed u1", "delay of u1, 2", "delay of y1, 1", "delay of y1, 2"];
+    let signal = |name: &str| Signal { name: name.to_owned(), ..bare().plant.states.remove(0) };
+    report.plant.states = states.map(signal).into();
+    report.gains.push(Matrix {
+        name: "K_x".to_owned(),
+        meaning: String::new(),
+        rows: vec!["u1".to_owned()],
+        columns: states.map(str::to_owned).into(),
+        values: vec![vec![0.0; 5]],
+    });
+    let member = MemberReport { name: "nominal".to_owned(), instability: -1.0, margins: None };
+    let whole = Ok(CommonCertificate { p: vec![vec![0.0; 12]; 12], margin: 1.0 });
+    report.family = Some(FamilyReport { members: vec![member], feedback: None, whole });
+    let shown = table(&report, "P, Lyapunov matrix (12 × 12)");
+    let names = "x1delayed u1delay of u1, 2delay of u1, 3delay of y1, 1delay of y1, 2delay of y1, 3\
+                 estimate of x1estimate of delayed u1";
+    assert!(shown.contains(names), "{shown}");
 }
 
 /// The only fault of this report has neither a mean delay nor a least size.
