@@ -35,8 +35,11 @@ pub(super) fn provide(fmu: &str) -> Result<(), String> {
     if is_visible() {
         return Err("the Python in the process lacks it".to_owned());
     }
-    let mut why = None;
-    for library in loaded().into_iter().chain(installed()?) {
+    let (installed, mut why) = match installed() {
+        Ok(libraries) => (libraries, None),
+        Err(reason) => (Vec::new(), Some(reason)),
+    };
+    for library in loaded().into_iter().chain(installed) {
         match preload(library.as_os_str()) {
             Ok(()) => {
                 tracing::warn!(
