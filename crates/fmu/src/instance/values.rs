@@ -54,17 +54,25 @@ fn check_settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> 
     )))
 }
 
+/// Returns the failure for a value beyond the range of the variable `name`. A limit that the variable does not have is
+/// the smallest or largest finite number in the range, and not in the message.
+pub(super) fn out_of_range(name: &str, (min, max): (f64, f64), value: f64) -> Failure {
+    let expected = match (min > f64::MIN, max < f64::MAX) {
+        (true, true) if value.is_finite() => format!("{min} to {max}"),
+        (true, false) if value.is_finite() => format!("at least {min}"),
+        (false, true) if value.is_finite() => format!("at most {max}"),
+        _ => "a finite number".to_owned(),
+    };
+    Failure::Discard(format!("{name} = {value}, expected {expected}"))
+}
+
 /// Checks that `value` is in the variable's range, which excludes infinity.
 fn check_real<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     let (min, max) = slot.range;
     if min <= value && value <= max {
         return Ok(());
     }
-    let name = &slot.name;
-    if !value.is_finite() {
-        return Err(Failure::Discard(format!("{name} = {value}, expected a finite number")));
-    }
-    Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")))
+    Err(out_of_range(&slot.name, slot.range, value))
 }
 
 /// Checks that `value` is in the range of the Integer or an item of the Enumeration.
@@ -72,7 +80,7 @@ pub(super) fn check_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Fa
     let (min, max) = slot.range;
     let name = &slot.name;
     if f64::from(value) < min || f64::from(value) > max {
-        return Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")));
+        return Err(out_of_range(name, slot.range, value.into()));
     }
     if !slot.items.is_empty() && !slot.items.contains(&value) {
         let items = &slot.items;
@@ -310,4 +318,24 @@ fn derivative_field<M>(slot: &Slot<M, f64>, order: i32) -> Option<&crate::variab
 
 fn time_is_independent() -> Failure {
     Failure::Error("time is the independent variable, neither input nor output".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest number of double precision has 309 digits.
+    #[test]
+    fn a_message_on_a_range_has_only_the_limits_of_the_variable() {
+        let (nan, inf) = (f64::NAN, f64::INFINITY);
+        for (range, value, expected) in [
+            ((0.0, 10.0), 11.0, "m = 11, expected 0 to 10"),
+            ((0.001, f64::MAX), -1.0, "m = -1, expected at least 0.001"),
+            ((f64::MIN, 5.0), 6.0, "m = 6, expected at most 5"),
+            ((0.001, f64::MAX), inf, "m = inf, expected a finite number"),
+            ((f64::MIN, f64::MAX), nan, "m = NaN, expected a finite number"),
+        ] {
+            assert_eq!(out_of_range("m", range, value).to_string(), expected);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 //! [`INT64`].
 
 use super::super::Instance;
-use super::super::values::check_integer;
+use super::super::values::{check_integer, out_of_range};
 use crate::interface::fmi3::{INDICATOR, INT64};
 use crate::interface::{Native, Slot};
 use crate::model::{Failure, Model};
@@ -28,8 +28,7 @@ fn accept_number<M, T: Native>(slot: &Slot<M, T>, value: &T) -> Result<(), Failu
     let (min, max) = slot.range;
     match value.number() {
         Some(number) if number.is_nan() || number < min || number > max => {
-            let name = &slot.name;
-            Err(Failure::Discard(format!("{name} = {number}, expected {min} to {max}")))
+            Err(out_of_range(&slot.name, slot.range, number))
         }
         _ => Ok(()),
     }
