@@ -96,7 +96,7 @@ fn of_type(name: &str) -> Option<Shape> {
         "Float32Type" | "Float64Type" => branch(REAL, ANNOTATED),
         "BooleanType" | "StringType" => branch(&[], ANNOTATED),
         "BinaryType" => branch(&["mimeType", "maxSize"], ANNOTATED),
-        "EnumerationType" => Shape { unordered: 1, ..branch(INTEGER, &["Annotations", "Item"]) },
+        "EnumerationType" => branch(INTEGER, &["Annotations", "Item"]),
         "ClockType" => branch(CLOCK, ANNOTATED),
         other if TYPES.contains(&other) => branch(INTEGER, ANNOTATED),
         _ => return None,

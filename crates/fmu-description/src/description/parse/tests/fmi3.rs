@@ -308,6 +308,20 @@ fn a_float32_is_relative_by_its_declared_type_and_so_is_its_alias() {
     assert_eq!(relative, [false, true, true, false]);
 }
 
+/// `fmi3Type.xsd` extends a base with the annotations by the items.
+#[test]
+fn annotations_of_an_enumeration_precede_its_items() {
+    let (item, annotations) = (r#"<Item name="a" value="1"/>"#, "<Annotations/>");
+    for (content, count) in [([annotations, item], 0), ([item, annotations], 1)] {
+        let content = content.concat();
+        let types = format!(r#"<EnumerationType name="E">{content}</EnumerationType>"#);
+        let (_, warnings) = ModelDescription::read(around(&types, "", "")).expect("readable");
+        let texts: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+        let late = texts.iter().filter(|text| text.contains("found it after Item")).count();
+        assert_eq!(late, count, "{texts:?}");
+    }
+}
+
 #[test]
 fn defects_with_a_clear_meaning_are_warnings_that_name_them() {
     for (variables, structure, expected) in [
