@@ -11,7 +11,18 @@ use crate::c_versions::fmu_3;
 /// If it cannot be built or written.
 #[must_use]
 pub fn write(folder: &Path) -> PathBuf {
-    fmu_3(folder, "scheduled3.c", DESCRIPTION, &[])
+    write_with(folder, "", "")
+}
+
+/// Like [`write`], with `to` in place of `from` in the model description.
+///
+/// # Panics
+///
+/// Same as [`write`]; if the description has no `from`.
+#[must_use]
+pub fn write_with(folder: &Path, from: &str, to: &str) -> PathBuf {
+    assert!(DESCRIPTION.contains(from), "{from}");
+    fmu_3(folder, "scheduled3.c", &DESCRIPTION.replacen(from, to, 1), &[])
 }
 
 const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>

@@ -76,6 +76,23 @@ fn check_names_the_functions_that_the_library_lacks() {
     assert_eq!(output.status.code(), Some(1));
 }
 
+/// The FMU is not asked for an interval that its description states.
+#[test]
+fn an_error_of_a_stated_interval_names_the_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let (from, to) = (r#"intervalDecimal="0.5""#, r#"intervalDecimal="0""#);
+    let fmu = scheduled::write_with(folder.path(), from, to).display().to_string();
+    for more in [&[][..], &["--isolate"]] {
+        let run = ["run", "--fmu", &fmu, "--stop-time", "1", "--step", "0.5", "--out"];
+        let out = folder.path().display().to_string();
+        let output = tests::run(&[&run[..], &[out.as_str()], more].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        let expected =
+            "modelDescription.xml gives the clock with the value reference 1 the interval 0 s";
+        assert!(!output.status.success() && message.contains(expected), "{message}");
+    }
+}
+
 #[test]
 fn a_negative_interval_of_a_clock_is_a_warning() {
     let folder = tempfile::tempdir().unwrap();

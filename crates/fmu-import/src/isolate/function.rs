@@ -5,11 +5,12 @@ use crate::library::function_names;
 use fmu_description::Version;
 
 /// Names in errors of a worker that are neither C functions nor in the table of [`Function`].
-const OTHERS: [&str; 4] = [
+const OTHERS: [&str; 5] = [
     crate::crash::UNLOADING,
     "the integration of the model-exchange FMU",
     "numberOfContinuousStates",
     "numberOfEventIndicators",
+    "modelDescription.xml",
 ];
 
 /// Returns the static name of a function of any version; `None` if no error of a worker names it.

@@ -176,8 +176,9 @@ impl Clocks {
         clocks
     }
 
-    /// Determines the first ticks, in Initialization Mode: asks the FMU for intervals and shifts that its description
-    /// does not state. An interval that is not positive or a negative shift of a periodic clock is an error.
+    /// Determines the first ticks, in Initialization Mode: asks the FMU for intervals that its description does not
+    /// state, and for the shifts of these clocks unless it states them. An interval that is not positive or a negative
+    /// shift of a periodic clock is an error.
     pub(super) fn start(&mut self, component: &mut Component, start: f64) -> Result<(), CallError> {
         for clock in &mut self.timed {
             let (attributes, stated) = (&clock.attributes, clock.stated_interval());
@@ -207,7 +208,8 @@ impl Clocks {
                      shift {shift} s, expected a positive interval and a shift of at least 0",
                     clock.reference
                 );
-                return Err(refused("fmi3GetIntervalDecimal", what));
+                let source = stated.map_or("fmi3GetIntervalDecimal", |_| "modelDescription.xml");
+                return Err(refused(source, what));
             }
             let counted = attributes
                 .interval_counter
