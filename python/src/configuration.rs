@@ -52,7 +52,11 @@ pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Co
     parse(&text, &folder.join(NAME)).map_err(|place| {
         let shown = place.shown().trim();
         let before = text.lines().take(place.line().saturating_sub(1));
-        let table = match before.filter(|line| line.starts_with('[')).last() {
+        // A row of a list that has a line of its own has a comma.
+        let is_header = |line: &&str| {
+            line.starts_with('[') && line.split('#').next().is_some_and(|code| !code.contains(','))
+        };
+        let table = match before.filter(is_header).last() {
             Some(table) if !shown.starts_with('[') => format!(" {table}"),
             _ => String::new(),
         };

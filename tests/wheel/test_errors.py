@@ -69,6 +69,12 @@ def test_an_error_in_a_file_has_its_line_and_column(tmp_path):
     assert (caught.value.path, caught.value.line, caught.value.column) == (str(file), 4, 8)
 
 
+def test_an_error_in_a_text_names_its_table_not_a_row_of_a_list():
+    text = '[algorithm]  # how, and how fast\npower-bonds = [\n["a.p", "b.p"],\n]\nstep = "fast"\n'
+    with pytest.raises(af.ConfigurationError, match=r', in \[algorithm\]  # how, and how fast: step = "fast"$'):
+        af.System(text)
+
+
 def test_terminals_that_do_not_match_are_a_configuration_error(packed):
     system = af.System().add("node", packed("examples/can-node"))
     system.add("plant", af.fmus()["FrictionPendulum"]).connect("node.CanChannel", "plant.x_p")
