@@ -580,8 +580,8 @@ fn resumed_path(path: &Path, time: f64) -> PathBuf {
         return path.to_owned();
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    // Digits after a point are a part of the name, not an ending.
-    let is_ending = |text: &str| text.contains(|letter: char| !letter.is_ascii_digit());
+    // Numbers such as 1.5 and 1.5e-5 are a part of the name.
+    let is_ending = |text: &str| text.starts_with(|letter: char| !letter.is_ascii_digit());
     let (name, ending) = match name.rsplit_once('.') {
         Some((name, ending)) if !name.is_empty() && is_ending(ending) => {
             (name, format!(".{ending}"))
@@ -667,6 +667,7 @@ mod tests {
             ("log-from-lab.csv", "log-from-lab-from-2.5.csv"),
             ("a/trace", "a/trace-from-2.5"),
             ("trace-from-1.5", "trace-from-2.5"),
+            ("trace-from-1.5e-5", "trace-from-2.5"),
             ("k=1.5.csv", "k=1.5-from-2.5.csv"),
             (STANDARD_OUTPUT, STANDARD_OUTPUT),
         ] {
