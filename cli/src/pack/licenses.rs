@@ -57,14 +57,17 @@ fn line(package: &Crate) -> String {
 }
 
 /// Returns the files with licence texts: the one that the manifest states, and those of the first folder that has any,
-/// from that of the package upwards to its workspace. A package of a registry has its folder only: a folder above it,
-/// in which it is vendored, has the licences of other packages.
+/// from that of the package upwards to its workspace. A package that is vendored or of a registry has its folder only:
+/// the folders above it have the licences of other packages.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     let is_from_registry =
         package.source.as_ref().is_some_and(|source| !source.repr.starts_with("git+"));
-    let levels = if is_from_registry { 1 } else { usize::MAX };
-    for folder in package.manifest_path.as_std_path().ancestors().skip(1).take(levels) {
+    let manifest = package.manifest_path.as_std_path();
+    // `cargo vendor` writes this file, also for packages from git.
+    let is_alone = is_from_registry || manifest.with_file_name(".cargo-checksum.json").is_file();
+    let levels = if is_alone { 1 } else { usize::MAX };
+    for folder in manifest.ancestors().skip(1).take(levels) {
         let manifest = folder.join("Cargo.toml");
         if !manifest.is_file() {
             continue;
@@ -122,5 +125,7 @@ mod tests {
         let registry = "registry+https://github.com/rust-lang/crates.io-index";
         assert!(texts_of(json!(registry)).is_empty());
         assert_eq!(texts_of(Value::Null), [project.path().join("LICENSE")]);
+        fs::write(folder.join(".cargo-checksum.json"), "{}").unwrap();
+        assert!(texts_of(json!("git+https://example.org/small#0123456789abcdef")).is_empty());
     }
 }
