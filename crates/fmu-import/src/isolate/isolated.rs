@@ -302,8 +302,8 @@ impl Isolated {
             return Err(failure);
         }
         if !self.is_attached() {
-            // The first call starts when the process has become a worker.
-            *start = None;
+            // The first call starts when the process has become a worker, at the latest at the next check.
+            *start = Some(Instant::now() + self.slice);
             let is_late = self.started.elapsed() > START_LIMIT;
             let late = Failure::TimedOut(START_LIMIT.as_secs_f64());
             return if is_late { Err(late) } else { Ok(()) };
