@@ -196,7 +196,7 @@ impl Quota {
     fn report_lost(&mut self, instance: &str) {
         let count = std::mem::take(&mut self.lost);
         if count > 0 {
-            tracing::warn!(target: "fmu", instance, lost = count, "{count} messages too many were lost");
+            tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages are lost: there were too many");
         }
     }
 }
