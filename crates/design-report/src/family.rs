@@ -27,8 +27,8 @@ pub struct FamilyReport {
 /// A Lyapunov matrix for several loops.
 #[derive(Serialize, JsonSchema)]
 pub struct CommonCertificate {
-    /// The matrix P, row by row. For the whole loop in the order: states of the plant, with ten for each
-    /// delay, filtered measurements, estimates of the states, estimates of the faults, integrals of references.
+    /// The matrix P, row by row. For the whole loop in the order: states of the plant (ten for each
+    /// delay), filtered measurements, estimates of the states, estimates of the faults, integrals of references.
     pub p: Vec<Vec<f64>>,
     /// Margin of the inequalities of all members, relative; larger than the rounding errors.
     pub margin: f64,
