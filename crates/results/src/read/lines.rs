@@ -113,8 +113,12 @@ fn unit(cell: &[u8]) -> String {
     let text = text.trim();
     let inside = |(open, close): (char, char)| {
         let inner = text.strip_prefix(open)?.strip_suffix(close)?;
-        // The brackets of `(m/s)/(rad/s)` are two pairs.
-        let is_pair = inner.find(close).is_none_or(|end| inner[..end].contains(open));
+        // The first and the last bracket of `((m/s)^2)/(rad/s)` are no pair.
+        let mut depth = 0;
+        let is_pair = inner.chars().all(|sign| {
+            depth += i32::from(sign == open) - i32::from(sign == close);
+            depth >= 0
+        });
         is_pair.then(|| inner.trim())
     };
     [('[', ']'), ('(', ')')].into_iter().find_map(inside).unwrap_or(text).to_owned()

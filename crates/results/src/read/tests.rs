@@ -104,7 +104,7 @@ fn layouts_of_other_programs_are_read() {
         ("J/(kg.K)", "J/(kg.K)"),
         ("[J/(kg.K)]", "J/(kg.K)"),
         ("(J/(kg.K))", "J/(kg.K)"),
-        ("(m/s)/(rad/s)", "(m/s)/(rad/s)"),
+        ("((m/s)^2)/(rad/s)", "((m/s)^2)/(rad/s)"),
         ("( m )", "m"),
     ] {
         let text = format!("time,x\ns,{cell}\n0,1\n");
