@@ -98,7 +98,11 @@ impl Binder<'_> {
             path => path,
         };
         self.warn_unmatched(values, owner, &unmatched);
-        self.warn_unmatched(values, "it", &missing);
+        let set = match binding.prefix.as_str() {
+            "" => "it".to_owned(),
+            prefix => format!("with the prefix {prefix:?}, it"),
+        };
+        self.warn_unmatched(values, &set, &missing);
         Ok(())
     }
 
@@ -122,7 +126,7 @@ impl Binder<'_> {
         }
     }
 
-    /// Warns about `names` that `owner`, an element or the parameter set itself ("it"), does not have.
+    /// Warns about `names` that `owner`, an element or the parameter set itself ("it"), lacks.
     fn warn_unmatched(&mut self, values: &ParameterSet, owner: &str, names: &[String]) {
         let (names, nameless): (Vec<&str>, Vec<&str>) =
             names.iter().map(String::as_str).partition(|name| !name.is_empty());

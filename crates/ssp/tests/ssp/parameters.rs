@@ -96,7 +96,7 @@ fn a_prefix_stands_before_every_name_of_the_source() {
         opened.warnings,
         [
             "parameter set \"set\": the system has no d.x: ignored",
-            "parameter set \"set\": it has no k: ignored"
+            "parameter set \"set\": with the prefix \"c.\", it has no k: ignored"
         ]
     );
 }
