@@ -155,10 +155,13 @@ impl EntryConverter<'_> {
         Err(unfit(what, &self.target, expected))
     }
 
-    /// Returns `number`; an error if the input is not of a floating-point type and `number` is not whole. It may
-    /// be beyond the range of the input, to which the faulty value is limited.
+    /// Returns `number`; an error if the input is not of a floating-point type and `number` is not whole or may be
+    /// rounded. It may be beyond the range of the input, to which the faulty value is limited.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
-        let fits = self.target.is_real() || number.fract() == 0.0;
+        let is_real = self.target.is_real();
+        let is_exact = is_real || number.abs() < 2_f64.powi(53);
+        require(what, number, is_exact, "a magnitude below 2^53, as larger integers are rounded")?;
+        let fits = is_real || number.fract() == 0.0;
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 

@@ -256,6 +256,12 @@ fn faults_that_do_not_fit_their_connection_are_refused() {
             "value is 0.5, expected a whole number, as the input is an Integer",
         ),
         (
+            "ctrl.count",
+            "bias = { value = 9007199254740992 }",
+            "value is 9007199254740992, expected a magnitude below 2^53, as larger integers \
+             are rounded",
+        ),
+        (
             "ctrl.level",
             "stuck = {}",
             &format!("ctrl.level is an input without a source, {no_source}"),
