@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Tolerance, relative to the interval, by which a communication point may precede an instant of the
-/// grid and still count as at the instant, because times are rounded. The rounding of the time itself is added.
+/// grid and still count as at the instant, because times are rounded. The rounding of start and time is added.
 const TOLERANCE: f64 = 1e-9;
 
 /// The communication points to record.
@@ -50,7 +50,7 @@ impl Due {
                 due
             }
             Decimation::Every(interval) => {
-                let rounding = 4.0 * f64::EPSILON * time.abs();
+                let rounding = 4.0 * f64::EPSILON * time.abs().max(self.start.abs());
                 let passed = (time - self.start + rounding) / interval + TOLERANCE;
                 let due = passed >= self.next;
                 if due {
