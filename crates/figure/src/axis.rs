@@ -43,7 +43,7 @@ impl Axis {
         Self::longer_than(1e-12, (low, high), pixels, ticks)
     }
 
-    /// As [`Self::exact`]; a range is widened up to this length relative to the magnitude of its ends.
+    /// Same as [`Self::exact`], but widens a range whose length is at most `relative` times the magnitude of its ends.
     fn longer_than(relative: f64, (low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
