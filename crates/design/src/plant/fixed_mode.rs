@@ -4,18 +4,23 @@ use control::Domain;
 use control::rank::Mode;
 use nalgebra::Complex;
 
+/// Whether a rate p, real or one of a complex pair, has the eigenvalue e^(p T) of a sampled mode: none has 0 or a
+/// negative number.
+pub(crate) fn has_rate(mode: &Mode) -> bool {
+    mode.eigenvalue.re > 0.0 || mode.eigenvalue.im != 0.0
+}
+
 /// Returns `the eigenvalue -2 1/s, which x2 dominates`, with the eigenvalue in the plane in which the plant file states
-/// it: of the sampled loop if `sampled`, or if it is 0 or negative, which no real rate gives; otherwise in 1/s. `name`
-/// returns the name of a state.
+/// it: of the sampled loop if `sampled`, or without a rate, see [`has_rate`]; otherwise in 1/s. `name` returns the name
+/// of a state.
 pub(crate) fn described_in(
     mode: &Mode,
     domain: Domain,
     sampled: bool,
     name: impl Fn(usize) -> String,
 ) -> String {
-    let has_rate = mode.eigenvalue.re > 0.0 || mode.eigenvalue.im != 0.0;
     let (eigenvalue, unit) = match domain {
-        Domain::Sampled { period } if !sampled && has_rate => {
+        Domain::Sampled { period } if !sampled && has_rate(mode) => {
             (mode.eigenvalue.ln() / period, " 1/s")
         }
         Domain::Sampled { .. } => (mode.eigenvalue, " of the sampled loop"),

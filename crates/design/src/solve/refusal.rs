@@ -8,7 +8,7 @@ use files::PlaceError;
 use plant_file::PlantFile;
 use plant_file::requirements::{Request, Requirement};
 
-use crate::plant::fixed_mode::described_in;
+use crate::plant::fixed_mode::{described_in, has_rate};
 use crate::plant::linear::LinearPlant;
 use crate::solve::gain::Refusal;
 use crate::solve::names::feedback_states;
@@ -100,6 +100,10 @@ pub(crate) fn fixed(
     let sampled = matches!(requirement, Requirement::SampledEigenvalues(_));
     let described = described_in(mode, domain, sampled, name);
     match requirement {
+        Requirement::Eigenvalues(_) if domain != Domain::Continuous && !has_rate(mode) => format!(
+            "no gain moves {described}; expected `sampled_eigenvalues` with it, or `region` or weights in \
+             place of eigenvalues"
+        ),
         Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => format!(
             "no gain moves {described}; expected it among the requested eigenvalues, or `region` or \
              weights in place of eigenvalues"
