@@ -18,8 +18,8 @@ use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
 use plant_file::requirements::Requirement;
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
-/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves; for `sampled_eigenvalues`
-/// relative to 1, if the mode is within the unit circle.
+/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves; relative to 1 for
+/// `sampled_eigenvalues`, if the mode is within the unit circle.
 const SAME: f64 = 1e-4;
 
 /// Computes K of u = K x.
@@ -150,13 +150,16 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
     let mut fixed_eigenvalues = Vec::new();
     for mode in fixed {
         let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
-        let near = |one: &Complex<f64>| (one - stated).norm();
+        let near = |one: &Complex<f64>| match sampling {
+            // e^(p T) is 0 if it underflows; no other p has the mode 0.
+            Some(period) if !stated.is_finite() => (one * period).exp().norm(),
+            _ => (one - stated).norm(),
+        };
         let nearest = (0..rest.len()).min_by(|&i, &j| near(&rest[i]).total_cmp(&near(&rest[j])));
         let scale = match required {
             Requirement::SampledEigenvalues(_) => stated.norm().max(1.0),
             _ => stated.norm(),
         };
-        // No p has e^(p T) = 0.
         let largest = if stated.is_finite() { SAME * scale } else { 0.0 };
         match nearest.filter(|&at| near(&rest[at]) <= largest) {
             Some(at) => drop(rest.swap_remove(at)),
@@ -216,9 +219,9 @@ fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
 mod tests {
     use super::*;
 
-    /// e^(p T) is 0 for no p, so that an eigenvalue in 1/s cannot be that of the mode.
+    /// e^(p T) is 0 for p = -1e4 / s, as it underflows, but for none of the others.
     #[test]
-    fn a_fixed_mode_at_zero_takes_no_requested_eigenvalue_of_the_continuous_loop() {
+    fn a_fixed_mode_at_zero_takes_only_a_requested_eigenvalue_that_is_zero_in_the_sampled_loop() {
         let a = DMatrix::from_row_slice(2, 2, &[0.5, 0.0, 0.0, 0.0]);
         let b = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
         let mut fixed = uncontrollable_modes(&a, &b).unwrap();
@@ -226,14 +229,17 @@ mod tests {
         fixed[0].eigenvalue = Complex::new(0.0, 0.0);
         let real = |values: [f64; 2]| values.map(|value| Complex::new(value, 0.0)).to_vec();
         let domain = Domain::Sampled { period: 0.1 };
-        let refused = movable(&Requirement::Eigenvalues(real([-1.0, -7.0])), &fixed, domain);
-        assert!(matches!(refused, Err(Refusal::Fixed(_))));
-        let Ok(assignment) =
-            movable(&Requirement::SampledEigenvalues(real([0.9, 0.0])), &fixed, domain)
-        else {
-            panic!("the eigenvalue 0 of the sampled loop is requested");
-        };
-        assert_eq!(assignment.movable, [Complex::new(0.9, 0.0)]);
+        let required = Requirement::Eigenvalues(real([-1.0, -7.0]));
+        assert!(matches!(movable(&required, &fixed, domain), Err(Refusal::Fixed(_))));
+        let message = crate::solve::refusal::fixed(&required, &fixed[0], domain, |_| "x2".into());
+        assert!(message.contains("expected `sampled_eigenvalues` with it"), "{message}");
+        for (required, rest) in [
+            (Requirement::SampledEigenvalues(real([0.9, 0.0])), 0.9),
+            (Requirement::Eigenvalues(real([-1.0, -1e4])), (-0.1_f64).exp()),
+        ] {
+            let assignment = movable(&required, &fixed, domain).ok().unwrap();
+            assert_eq!(assignment.movable, [Complex::new(rest, 0.0)]);
+        }
     }
 
     /// A has the eigenvalue 0.3 with the eigenvector (1, 1, 1), which is B, and twice 0, which is computed with a
