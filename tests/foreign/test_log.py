@@ -277,13 +277,20 @@ def test_logs_of_different_columns_are_refused(aso_ftc, tmp_path):
 
 def test_logs_in_different_units_are_refused(aso_ftc, tmp_path):
     signals = columns(*log(TANKS, rows=400, noise=0.02))
-    paths = [
-        write(tmp_path / f"{unit}.csv", {f"y2 [{unit}]" if name == "y2" else name: signals[name] for name in signals})
-        for unit in ("m", "mm")
-    ]
-    done = aso_ftc("design", "--init", *paths, "--out", tmp_path / "plant.toml")
-    message = "mm.csv: expected y2 in m as in the first log, found mm"
+
+    def drafted(*units):
+        paths = [
+            write(tmp_path / f"{k}.csv", {f"y2 [{unit}]" if name == "y2" else name: signals[name] for name in signals})
+            for k, unit in enumerate(units)
+        ]
+        return aso_ftc("design", "--init", *paths, "--out", tmp_path / "plant.toml", "--force")
+
+    done = drafted("m", "mm")
+    message = "1.csv: expected y2 in m as in the first log, found mm"
     assert done.returncode == 2 and message in done.stderr, done.stderr
+    # One unit in two notations.
+    done = drafted("N.m", "m*N")
+    assert done.returncode != 2, done.stderr
 
 
 def test_logs_of_different_sample_times_are_refused(aso_ftc, tmp_path):

@@ -10,7 +10,7 @@ use results::Table;
 use crate::Error;
 use crate::init::labelled::named;
 use crate::init::log::{LogOptions, rounded};
-use plant_file::signals::Signal;
+use plant_file::signals::{Signal, is_one_unit};
 
 /// The largest deviation of a time from its place in the grid, as a part of the sample time.
 const JITTER: f64 = 0.2;
@@ -56,7 +56,7 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
             }
             let conflict = first.signals().zip(log.signals()).find_map(|(signal, other)| {
                 let (expected, unit) = (signal.unit.as_ref()?, other.unit.as_ref()?);
-                (unit != expected).then_some((&signal.name, expected, unit))
+                (!is_one_unit(unit, expected)).then_some((&signal.name, expected, unit))
             });
             if let Some((name, expected, unit)) = conflict {
                 return Err(invalid(format!(
