@@ -230,9 +230,9 @@ fn norms<'a>(report: &'a Report) -> Markup {
         @if !norms.is_empty() {
             (table_of("H-infinity norms", &norms, &columns))
             p {
-                "No gain has a norm below the lower bound, nor has a filter of any order; for the feedback, \
-                 no state feedback has, even one that knows the states of the weights. A lower bound marked \"disc\" \
-                 holds only for gains that place all eigenvalues in the disc of the region. The gap is the relative \
+                "No observer, of any order, and no state feedback, even one that knows the states of the \
+                 weights, has a norm below the lower bound. A lower bound marked \"disc\" holds only for \
+                 gains that place all eigenvalues in the disc of the region. The gap is the relative \
                  distance from the lower bound; with a lower bound of 0, ever larger gains lower the norm \
                  without end."
             }
