@@ -15,7 +15,7 @@ const SETTLED: f64 = 15.0;
 /// The most samples of a response that are computed.
 const MOST_SAMPLES: usize = 20_000;
 /// A constant fault leaves no trace if the steady mean of the residuals is at most this part of their largest mean, or,
-/// with decoupled inputs, of their steady mean with none.
+/// with other faults decoupled, of their steady mean without.
 const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
