@@ -10,6 +10,8 @@ mod states;
 mod structure;
 mod typed;
 
+use std::collections::HashSet;
+
 use crate::model::{Failure, Model};
 use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
 use describe::{describe_aliases, describe_variables, replace_type};
@@ -351,8 +353,10 @@ impl<M> Interface<M> {
         // Before elements become arrays: only those with equal attributes do.
         let mut scalars = description.clone();
         self.clocks.enter(&mut scalars)?;
+        let interpolated = self.interpolated.iter().map(|&position| &self.reals[position].name);
+        let interpolated: HashSet<&String> = interpolated.collect();
         for variable in &mut scalars.variables {
-            variable.intermediate_update = self.interpolates(&variable.name);
+            variable.intermediate_update = interpolated.contains(&variable.name);
         }
         let (table, mut converted) = fmi3::describe(&scalars, indicators);
         self.sizes.enter(&mut converted)?;

@@ -1,5 +1,7 @@
 //! The clocks of clocked variables.
 
+use std::collections::HashMap;
+
 use crate::model::Failure;
 use crate::variable::Declaration;
 use fmu_description::{Kind, ModelDescription};
@@ -20,21 +22,24 @@ impl Clocks {
 
     /// Sets `clocks` of the variables of a description. An error for a name that is not the name of a clock.
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
+        // Without a search for each name: an array has many clocked elements.
+        let indices: HashMap<String, u32> = (1..)
+            .zip(&description.variables)
+            .map(|(index, variable)| (variable.name.clone(), index))
+            .collect();
         for (name, clocks) in &self.0 {
             let index = |clock: &String| {
-                let is_clock = |(_, variable): &(u32, &fmu_description::ScalarVariable)| {
-                    variable.name == *clock && matches!(variable.kind, Kind::Clock(_))
+                let index = indices.get(clock).copied();
+                let is_clock = |index: &u32| {
+                    matches!(description.variables[*index as usize - 1].kind, Kind::Clock(_))
                 };
-                let variable = (1..).zip(&description.variables).find(is_clock);
-                variable
-                    .map(|(index, _)| index)
+                index
+                    .filter(is_clock)
                     .ok_or_else(|| Failure::Error(format!("variable {name}: {clock} is no clock")))
             };
             let clocks = clocks.iter().map(index).collect::<Result<Vec<_>, _>>()?;
-            if let Some(variable) =
-                description.variables.iter_mut().find(|variable| variable.name == *name)
-            {
-                variable.clocks = clocks;
+            if let Some(&index) = indices.get(name) {
+                description.variables[index as usize - 1].clocks = clocks;
             }
         }
         Ok(())

@@ -44,11 +44,6 @@ impl<M> Interface<M> {
 
 /// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
 impl<M> Interface<M> {
-    /// Whether the variable called `name` is an input with derivatives.
-    pub(crate) fn interpolates(&self, name: &str) -> bool {
-        self.interpolated.iter().any(|&position| self.reals[position].name == name)
-    }
-
     /// Copies the inputs with derivatives to `to`.
     pub(crate) fn read_interpolated(&self, model: &mut M, to: &mut [f64]) {
         for (&position, value) in self.interpolated.iter().zip(to) {
