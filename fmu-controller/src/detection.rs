@@ -25,12 +25,13 @@ use serde::{Deserialize, Serialize};
 use crate::dense::dense;
 use crate::mode::Mode;
 use crate::observer::{self, Propagators};
+use crate::sampled::clock_rounding;
 use aso_controller::Design;
 use aso_controller::design::detection::DetectionDesign;
 pub(crate) use decision::Decision;
 use tests_of_residuals::TestState;
 
-/// The part of the sample time by which a sample may be early: an importer adds up its steps with rounding.
+/// The part of the sample time by which a sample may be early, in addition to [`clock_rounding`].
 const TOLERANCE: f64 = 1e-6;
 /// Times between samples are rounded to this part of the sample time, so that equal times have equal bits.
 const RESOLUTION: f64 = 1.0 / 1_073_741_824.0;
@@ -162,7 +163,7 @@ impl Detector {
         let Some(period) = detection.sample_time else { return Ok(()) };
         let start = stretch.start + stretch.offset;
         let (mut at, end) = (0.0, stretch.size);
-        let tolerance = TOLERANCE * period + 8.0 * f64::EPSILON * start.abs();
+        let tolerance = TOLERANCE * period + clock_rounding(start);
         self.work.before.clear();
         self.work.before.extend(stretch.z.iter().chain(&self.state));
         loop {
@@ -228,7 +229,7 @@ impl Detector {
             self.clear();
         }
         // An importer adds up its steps with rounding.
-        if time < self.start + detection.from - 8.0 * f64::EPSILON * time.abs() {
+        if time < self.start + detection.from - clock_rounding(time) {
             return;
         }
         let mut first = 0;

@@ -31,6 +31,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::loss::Loss;
+use crate::sampled::clock_rounding;
 use aso_controller::Design;
 
 /// Which actuators are gone.
@@ -86,7 +87,7 @@ impl Reconfigurator {
                 let above = !is_fall_back_set && loss.is_some_and(|loss| loss.estimate > most);
                 *since = since.or(Some(time)).filter(|_| above);
                 // The importer adds up its steps with rounding, and the time of the event is rounded.
-                let rounding = 1e-9 * least_time + 8.0 * f64::EPSILON * time.abs();
+                let rounding = 1e-9 * least_time + clock_rounding(time);
                 let enough = since.is_some_and(|since| time - since >= least_time - rounding);
                 self.decided |= u64::from(enough) << case.actuator;
             }

@@ -33,9 +33,13 @@ use crate::number::Number;
 use crate::signals::{OperatingPoint, Signals, Values};
 use aso_controller::design::{Design, Estimator};
 
-/// The part of the sample time by which a sample may be early, in addition to 8 units of rounding of the time: an
-/// importer adds up its steps with rounding.
+/// The part of the sample time by which a sample may be early, in addition to [`clock_rounding`].
 const TOLERANCE: f64 = 1e-4;
+
+/// The distance in s from `time` that counts as a rounding error of an importer, which adds up its steps.
+pub(crate) fn clock_rounding(time: f64) -> f64 {
+    8.0 * f64::EPSILON * time.abs()
+}
 
 /// Clock and state of a sampled controller.
 #[derive(Clone, Serialize, Deserialize)]
@@ -98,7 +102,7 @@ impl Sampler {
     /// The instant in s of the next sample, at most `end`; `None` if it is due after `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.next_instant();
-        let tolerance = TOLERANCE * self.period + 8.0 * f64::EPSILON * end.abs();
+        let tolerance = TOLERANCE * self.period + clock_rounding(end);
         (next <= end + tolerance).then_some(next.min(end))
     }
 

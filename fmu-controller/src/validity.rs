@@ -13,6 +13,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::sampled::clock_rounding;
 use crate::signals::Values;
 use aso_controller::Design;
 use aso_controller::design::HOLD_ROUNDING;
@@ -116,8 +117,7 @@ impl MeasurementCheck {
         }
         let mut held = self.held_since.iter().zip(&self.longest);
         self.is_held = self.held_since.iter().any(Option::is_some);
-        // The times of the importer are rounded.
-        let rounding = 8.0 * f64::EPSILON * start.abs();
+        let rounding = clock_rounding(start);
         self.is_lost = held.any(|(since, longest)| {
             since.is_some_and(|since| start - since >= longest * (1.0 - HOLD_ROUNDING) - rounding)
         });

@@ -9,7 +9,7 @@ use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer, Part};
 use crate::reconfiguration::Reconfigurator;
-use crate::sampled::Sampler;
+use crate::sampled::{Sampler, clock_rounding};
 use crate::signals::{Signals, Values};
 use crate::validity::MeasurementCheck;
 use aso_controller::design::detection::DetectionDesign;
@@ -329,9 +329,4 @@ impl AsoController {
         }
         self.sampler = Some(sampler);
     }
-}
-
-/// The distance in s from `time` that counts as a rounding error of an importer.
-fn clock_rounding(time: f64) -> f64 {
-    8.0 * f64::EPSILON * time.abs()
 }
