@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The part of the sample time by which a sample may be early: an importer adds up its steps with rounding.
+/// The part of the sample time by which a sample may be early, in addition to 8 units of rounding of the time: an
+/// importer adds up its steps with rounding.
 const TOLERANCE: f64 = 1e-4;
 
 /// The clock of the samples at start + k T. Sample 0 belongs to the initialisation.
@@ -31,7 +32,7 @@ impl Clock {
         self.start
     }
 
-    /// The instant of the next sample in s, at most `end`; `None` if it is not due until `end`.
+    /// The instant of the next sample in s, at most `end`; `None` if it is due after `end`.
     pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
         let next = self.start + self.next * self.period;
         let tolerance = TOLERANCE * self.period + 8.0 * f64::EPSILON * end.abs();
