@@ -11,7 +11,7 @@ const TIME: usize = 12;
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
     let mut text = String::new();
-    // A text takes everything.
+    // Writing to a `String` does not fail.
     let _ = write_rounded(&mut text, value, digits);
     text
 }

@@ -55,7 +55,7 @@ fn check_settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> 
 }
 
 /// Returns the failure for a value beyond the range of the variable `name`. A limit that the variable does not have is
-/// the smallest or largest finite number in the range, and not in the message.
+/// [`f64::MIN`] or [`f64::MAX`] in the range, and the message leaves it out.
 pub(super) fn out_of_range(name: &str, (min, max): (f64, f64), value: f64) -> Failure {
     let expected = match (min > f64::MIN, max < f64::MAX) {
         (true, true) if value.is_finite() => format!("{min} to {max}"),
