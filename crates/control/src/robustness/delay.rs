@@ -132,14 +132,15 @@ pub(super) fn refine(
     };
     // A mode that decays slowly without a delay, such as a resonance, grows slowly with one.
     let clear = CLEAR.min(RELATIVE * value(0.0)?.abs());
-    // The first unstable one of the tested delays.
-    let mut unstable = f64::INFINITY;
+    // The first unstable one of the tested delays, and the delay up to which the sweeps show all of them to be stable.
+    let (mut unstable, mut least) = (f64::INFINITY, f64::INFINITY);
     for part in (0..parts).map(|at| f64::from(at) * step) {
         let stable = if part > 0.0 {
             stable_delay(plant, controller, period, part)?
         } else {
             (estimate / period).floor()
         };
+        least = least.min(stable);
         for delay in (0..=REFINED_SAMPLES).map(|samples| f64::from(samples) + part) {
             if delay >= unstable {
                 break;
@@ -153,7 +154,11 @@ pub(super) fn refine(
         let samples = (estimate / period).max(f64::from(REFINED_SAMPLES));
         return Ok(period * if parts > 1 { samples } else { samples.floor() });
     }
-    let start = unstable - step;
+    let mut start = unstable - step;
+    // At the delays before, an unstable mode may grow more slowly than `clear`.
+    while start > least.max(0.0) && value(start)? > 0.0 {
+        (start, unstable) = (start - step, start);
+    }
     if parts == 1 {
         return Ok(period * start);
     }
