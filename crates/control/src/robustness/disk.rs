@@ -113,7 +113,7 @@ pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error>
 ///
 /// # Errors
 ///
-/// Same as [`crate::response::h_infinity`]; [`Error::Shape`] for a system with other numbers of inputs and outputs.
+/// Same as [`crate::response::h_infinity`]; [`Error::Shape`] for a system that is not square.
 pub fn scaled_peak(system: &StateSpace) -> Result<ScaledPeak, Error> {
     check::square("D", &system.d)?;
     peak_of(&KnownResponse::new(system.clone())?)
