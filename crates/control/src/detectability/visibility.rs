@@ -55,7 +55,7 @@ struct Reach {
     column: DMatrix<f64>,
 }
 
-/// The transposed output matrix of the reached states, for that of all states, `c`; None if it is zero up to rounding.
+/// Restricts a transposed output matrix, `c`, to the reached states; None if it is zero up to rounding.
 fn reached_output(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (c, norm) = reached.reached_output(c);
     (c.norm() > TOLERANCE * norm).then_some(c)
