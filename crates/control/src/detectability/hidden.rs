@@ -157,7 +157,7 @@ fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix, Vec<f64
     Ok((rank, ComplexMatrix::from_fn(rows, cols, |i, j| null[(i, j)] / lengths[i]), lengths))
 }
 
-/// D^-1 z, `vector`, with zero for each entry that is negligible in z; `lengths`: the diagonal of D.
+/// Sets to zero the entries of `vector`, D^-1 z, that are negligible in z; `lengths`: the diagonal of D.
 fn without_rounding_errors(vector: &ComplexVector, lengths: &[f64]) -> ComplexVector {
     let size = |at: usize| vector[at].norm() * lengths[at];
     let zero = ENTRY_TOLERANCE * (0..vector.len()).map(size).fold(0.0, f64::max);
