@@ -74,8 +74,8 @@ use nalgebra::{DMatrix, DVector};
 pub enum Outcome<T, C = &'static str> {
     /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
-    /// No solution exists: by the eigenvalues each of these requirements is violated, or by the solver they contradict
-    /// each other, and every one of them is necessary for the contradiction.
+    /// No solution exists: eigenvalues show that each of these requirements is violated, or the solver has found that
+    /// they contradict each other, where each of them is necessary for the contradiction.
     Infeasible {
         /// Their names, in the order in which they were stated; for a family the indices of its
         /// members.
