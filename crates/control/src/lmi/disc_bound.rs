@@ -19,7 +19,7 @@ const BISECTIONS: usize = 30;
 /// in a disc of the left half plane, in continuous time.
 ///
 /// `disc`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay` <= 0;
-/// R is their largest distance from 0: radius - center, for a center above 0 the root of radius^2 - center^2.
+/// R is a bound of their distance from 0: radius - center, for a center above 0 the root of radius^2 - center^2.
 /// E B, q x q, must have an inverse; w enters y through the states only (D = 0). With
 /// T(s) = E (s I - A + L C)^-1 B, the first bound is
 ///
