@@ -81,8 +81,8 @@ impl TrackingRank {
 ///
 /// `a`: n x n; `b`: n x m; `output`: H C, t x n, all in continuous time. With (A, B) stabilisable, the rank is
 /// n + t if and only if for each r there are x and u with A x + B u = 0 and H C x = r. This needs at least as
-/// many commands as references, independent references, and no invariant zero at s = 0. It is then the
-/// condition for the pair of [`extended_pair`] to be stabilisable: its modes at s = 0 are those of the
+/// many commands as references, independent references, and no invariant zero at s = 0. A full rank is
+/// then the condition for the pair of [`extended_pair`] to be stabilisable: its modes at s = 0 are those of the
 /// integrals. For a sampled plant the condition is the same unless the sample time hides a mode, as
 /// [`A_T` - I, `B_T`] of the samples is an invertible matrix times [A, B].
 ///
