@@ -57,6 +57,16 @@ impl TimeResponse {
         Transient { peak, peak_time, settling_time, final_value }
     }
 
+    /// Times and values of the extrema between grid points in continuous time, ascending, see [`Self::transient`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such output.
+    #[must_use]
+    pub fn extrema(&self, output: usize) -> Vec<(f64, f64)> {
+        (0..self.time.len()).filter_map(|k| self.extremum(output, k)).collect()
+    }
+
     /// Time and value of an extremum between points k and k + 1; None without a known change of sign of the slope.
     fn extremum(&self, output: usize, k: usize) -> Option<(f64, f64)> {
         let slopes: &DMatrix<f64> = &self.slope;

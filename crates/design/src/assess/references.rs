@@ -113,7 +113,9 @@ impl<'a> ReferenceLoop<'a> {
         let stated = self.tracking.steps[at];
         let size = stated.unwrap_or(1.0);
         let tracked = self.tracked[at];
-        let points = self.points(&trace, tracked);
+        let mut points = self.points(&trace, tracked);
+        points.extend(trace.extrema(tracked));
+        points.sort_by(|x, y| x.0.total_cmp(&y.0));
         let peak = points.iter().map(|point| point.1).fold(0.0, f64::max);
         let mut curves = Vec::new();
         let mut others = Vec::new();
@@ -151,7 +153,7 @@ impl<'a> ReferenceLoop<'a> {
             size,
             stated: stated.is_some(),
             rise_time: rise_time(&points),
-            overshoot: (peak.max(trace.transient(tracked, SETTLED).peak) - 1.0).max(0.0),
+            overshoot: (peak - 1.0).max(0.0),
             settling_time: settled(&points),
             steady_state_error: 1.0 - trace.final_value[tracked],
             largest_step: largest_step(&commands, size),

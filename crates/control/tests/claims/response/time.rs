@@ -46,12 +46,16 @@ fn a_lag_settles_after_the_logarithm_of_the_band() {
 fn a_peak_between_points_counts_for_the_settling_time() {
     let zeta = 0.1;
     let trace = step_response(&oscillator(1.0, zeta), 0).unwrap();
+    let extrema = trace.extrema(0);
     let damped = f64::sqrt(1.0 - zeta * zeta);
     for k in 1..=12 {
         let time = f64::from(k) * std::f64::consts::PI / damped;
         let band = (1.0 - 1e-4) * (-zeta * time).exp();
         let late = trace.transient(0, band).settling_time - time;
         assert!((0.0..0.1).contains(&late), "{k}: {late}");
+        let is_peak = |extremum: &&(f64, f64)| (extremum.0 - time).abs() < 1e-2;
+        let (_, value) = extrema.iter().find(is_peak).expect("a peak");
+        assert!(((value - 1.0).abs() - (-zeta * time).exp()).abs() < 1e-6, "{k}: {value}");
     }
 }
 
