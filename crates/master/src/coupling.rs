@@ -56,11 +56,12 @@ pub(crate) struct Iterated {
     /// Whether a step whose iteration fails is made once without iteration.
     falls_back: bool,
     pub(crate) fallbacks: Fallbacks,
-    /// Start in s of the communication step in which the iteration failed last; NaN if there is none.
-    failed_at: f64,
+    /// Start in s of the communication step in which the iteration failed last; NaN if there is none, and after a
+    /// return to an earlier state.
+    pub(crate) failed_at: f64,
 }
 
-/// Count of the communication steps in which the iteration failed, so that they were made once without iteration.
+/// Count of the communication steps in which the iteration failed, so that a step was made once without iteration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fallbacks {
     /// Number of such steps; one that step control or an event repeats counts once.

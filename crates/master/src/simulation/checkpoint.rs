@@ -233,6 +233,7 @@ impl Simulation {
         let iterated = &mut self.coupler.iterated;
         if let (Some(iterated), Some(iteration)) = (iterated, &state.iteration) {
             iterated.iteration = iteration.clone();
+            iterated.failed_at = f64::NAN;
         }
         // Faults that the state lacks record the present values.
         self.engine.commit();

@@ -17,7 +17,7 @@ struct Direct {
     limit: f64,
     u: f64,
     y: f64,
-    slots: [(f64, f64); 3],
+    slots: [(f64, f64); 4],
 }
 
 impl Direct {
@@ -33,7 +33,7 @@ impl Direct {
             <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
             </ModelStructure></fmiModelDescription>"#;
         let description = ModelDescription::parse(xml).unwrap();
-        let (limit, slots) = (f64::INFINITY, [(0.0, 0.0); 3]);
+        let (limit, slots) = (f64::INFINITY, [(0.0, 0.0); 4]);
         Box::new(Self { description, function, limit, u: 0.0, y: 0.0, slots })
     }
 }
@@ -130,6 +130,19 @@ fn a_step_that_the_step_control_repeats_counts_as_one_fallback() {
     let error = simulation.step().unwrap_err();
     assert!(matches!(error, SystemError::Stuck { .. }), "{error}");
     assert_eq!(simulation.fallbacks().unwrap().count, 1);
+}
+
+#[test]
+fn a_step_from_a_kept_state_counts_again() {
+    let algorithm =
+        Algorithm { coupling: Coupling::Newton, fallback: true, ..Algorithm::new(STEP) };
+    let mut simulation = started(&algorithm);
+    let state = simulation.keep(0).unwrap();
+    for count in [1, 2] {
+        simulation.step().unwrap();
+        assert_eq!(simulation.fallbacks().unwrap().count, count);
+        simulation.return_to(&state).unwrap();
+    }
 }
 
 /// The loop u = -1 - 3 u has the solution -0.25. The iteration starts at 0, the limit: a larger value, as a difference
