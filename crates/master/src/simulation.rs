@@ -149,8 +149,8 @@ impl Simulation {
 
     /// Returns the time in s at which an FMU requested the end.
     ///
-    /// It is later than [`Simulation::time`] if there are other FMUs and the algorithm does not repeat
-    /// steps. The run then ends at the last communication point, and the FMUs have values at
+    /// After a request within a step, it is later than [`Simulation::time`] if there are other FMUs and the
+    /// algorithm does not repeat steps. The run then ends at the start of the step, and the FMUs have values at
     /// different times.
     #[must_use]
     pub fn ended_at(&self) -> Option<f64> {
