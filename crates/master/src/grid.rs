@@ -9,7 +9,8 @@ use crate::system::System;
 use fmu_description::number::seconds;
 use slave::Slave;
 
-/// A rest of the run that is less than this fraction of the step gets no step of its own; nor does one of rounding.
+/// A rest of the run that is less than this fraction of the step, or within the rounding of the stop time, gets no step
+/// of its own.
 const ROUNDING: f64 = 1e-6;
 
 /// The communication points of a run, and the one reached.
@@ -146,8 +147,8 @@ impl Grid {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
-    /// Returns the time in s by which a grid point may differ from `time` although it is the same beside steps of
-    /// `size` s: grid points and stop times in seconds since 1970 are rounded to 2.4e-7 s.
+    /// Returns the difference in s below which a grid point counts as `time`, for steps of `size` s. It exceeds the
+    /// rounding of both, which is 2.4e-7 s in seconds since 1970.
     #[inline]
     fn negligible(&self, size: f64, time: f64) -> f64 {
         (ROUNDING * size).max(2.0 * f64::EPSILON * self.start.abs().max(time.abs()))
