@@ -94,6 +94,9 @@ impl Literal {
                 let items = items.iter().map(|(name, number)| (name, *number as f64));
                 let fits = |item: &(_, f64)| fits_integer(item.1, &variable.kind, description);
                 let items: Vec<(&String, f64)> = items.filter(fits).collect();
+                if items.is_empty() {
+                    return Err("a whole number".to_owned());
+                }
                 let item = items
                     .iter()
                     .find(|(name, _)| matches!(self, Self::Text(text) if text == *name));
@@ -138,5 +141,20 @@ pub(super) fn integers(kind: &Kind, description: &ModelDescription) -> String {
             format!("a whole number from {least} to {largest}")
         }
         _ => "an Integer of 32 bits".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_description::IntegerType;
+
+    #[test]
+    fn an_enumeration_without_items_expects_a_whole_number() {
+        let kind = Kind::Enumeration(IntegerType::default());
+        let variable = ScalarVariable { kind, ..ScalarVariable::default() };
+        let refused =
+            Literal::Text("on".to_owned()).number(&variable, &ModelDescription::default());
+        assert_eq!(refused, Err("a whole number".to_owned()));
     }
 }
