@@ -81,7 +81,7 @@ fn check_names_the_functions_that_the_library_lacks() {
 fn an_error_of_a_stated_interval_names_the_description() {
     let folder = tempfile::tempdir().unwrap();
     let (from, to) = (r#"intervalDecimal="0.5""#, r#"intervalDecimal="0""#);
-    let fmu = scheduled::write_with(folder.path(), from, to).display().to_string();
+    let fmu = format!("a={}", scheduled::write_with(folder.path(), from, to).display());
     for more in [&[][..], &["--isolate"]] {
         let run = ["run", "--fmu", &fmu, "--stop-time", "1", "--step", "0.5", "--out"];
         let out = folder.path().display().to_string();
