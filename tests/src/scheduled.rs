@@ -14,11 +14,11 @@ pub fn write(folder: &Path) -> PathBuf {
     write_with(folder, "", "")
 }
 
-/// Like [`write`], with `to` in place of `from` in the model description.
+/// Like [`write()`], with `to` in place of `from` in the model description.
 ///
 /// # Panics
 ///
-/// Same as [`write`]; if the description has no `from`.
+/// Same as [`write()`]; if the description has no `from`.
 #[must_use]
 pub fn write_with(folder: &Path, from: &str, to: &str) -> PathBuf {
     assert!(DESCRIPTION.contains(from), "{from}");
