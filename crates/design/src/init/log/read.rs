@@ -56,7 +56,10 @@ pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, 
             }
             let conflict = first.signals().zip(log.signals()).find_map(|(signal, other)| {
                 let (expected, unit) = (signal.unit.as_ref()?, other.unit.as_ref()?);
-                (!is_one_unit(unit, expected)).then_some((&signal.name, expected, unit))
+                // A unit that FMI does not know has no other notation.
+                let are_known = [unit, expected].iter().all(|unit| Unit::parse(unit).is_ok());
+                let is_same = unit == expected || (are_known && is_one_unit(unit, expected));
+                (!is_same).then_some((&signal.name, expected, unit))
             });
             if let Some((name, expected, unit)) = conflict {
                 return Err(invalid(format!(
