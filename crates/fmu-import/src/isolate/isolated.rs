@@ -47,7 +47,7 @@ pub struct Isolated {
     pub(super) place: Arc<Place>,
     /// The last known turn: odd while a command is pending.
     turn: u64,
-    /// When the pending command of [`Isolated::start_timer`] was posted, if there is a time limit.
+    /// When the time limit of the next wait starts; `None`: when the wait starts.
     posted_at: Option<Instant>,
     /// Why the worker ended; `None` while it runs.
     ended: Option<Failure>,
@@ -157,6 +157,8 @@ impl Isolated {
     /// Lets the worker load and instantiate the FMU.
     fn open(&mut self, name: &str, options: &Options) -> Result<Opening, CallError> {
         let package = self.package.clone();
+        // The process has usually become a worker by the first check, one slice from now.
+        self.posted_at = Some(Instant::now() + self.slice);
         self.request(&Request::Open(Open {
             folder: package.folder().as_os_str().as_bytes(),
             name,
