@@ -228,7 +228,6 @@ impl Detector {
         if self.reset {
             self.clear();
         }
-        // An importer adds up its steps with rounding.
         if time < self.start + detection.from - clock_rounding(time) {
             return;
         }
