@@ -53,7 +53,7 @@ def of_fmpy(file, between, times):
 
 @pytest.fixture(scope="session")
 def of_ours(root):
-    """Value, slope and time of the next break, by the example `signal` of the crate master."""
+    """Value, slope and time of the next break, by the program tests/examples/signal.rs."""
 
     def run(file, between, times):
         command = [root / "target" / "release" / "examples" / "signal", file, "u", between]
