@@ -12,7 +12,7 @@ use ssp::{Element, Link, Opened, Terminal};
 use crate::assembly_options::AssemblyOptions;
 use crate::config::{ConnectionEntry, LoadedConfig, Solver};
 use crate::instances::instantiate;
-use crate::link::link as link_ports;
+use crate::link::{link as link_ports, link_others};
 
 /// A connected system before initialisation.
 pub struct AssembledSystem {
@@ -161,7 +161,7 @@ fn connect(
     by_unit: bool,
 ) -> Result<(), Error> {
     let config = &loaded.config;
-    let mut connected = HashSet::new();
+    let mut replaced = HashSet::new();
     let mut stated_links = Vec::new();
     for entry in config.connections.iter().flatten() {
         let ConnectionEntry { from, to, factor, offset } = entry.get_ref();
@@ -178,7 +178,7 @@ fn connect(
         let linear =
             Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
         for (from, to) in pairs {
-            connected.insert(terminal(to));
+            replaced.insert(system.holder(to));
             let transformation = if stated { linear.clone() } else { Transformation::Identity };
             let link = Link {
                 from: terminal(from),
@@ -189,8 +189,8 @@ fn connect(
             stated_links.push((entry.span(), link));
         }
     }
-    for link in links.iter().filter(|link| !connected.contains(&link.to)) {
-        link_ports(system, link)?;
+    for link in links {
+        link_others(system, link, &replaced)?;
     }
     for (place, link) in &stated_links {
         link_ports(system, link).map_err(|error| loaded.point(place, error))?;
@@ -220,6 +220,40 @@ fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::parse;
+    use ssp::Function;
+
+    #[test]
+    fn a_connection_of_the_file_replaces_the_elements_of_an_array_that_the_structure_connects() {
+        let terminal = |element: &str, variable: &str| Terminal {
+            element: element.to_owned(),
+            variable: variable.to_owned(),
+        };
+        let link = Link {
+            from: terminal("a", "out"),
+            to: terminal("sum", "in"),
+            transformation: Transformation::Identity,
+            units_settled: true,
+        };
+        let sources = |from: &str, to: &str| {
+            let mut system = System::default();
+            for name in ["a", "b"] {
+                let vector = Function::VectorSum { inputs: 1, dimension: 2 };
+                system.add(name, Box::new(vector.slave())).unwrap();
+            }
+            system.add("sum", Box::new(Function::Sum { inputs: 2 }.slave())).unwrap();
+            let text = format!("[[connections]]\nfrom = '{from}'\nto = '{to}'\n");
+            let config = parse(&text, Path::new("system.toml")).unwrap();
+            let loaded = LoadedConfig { config, source: None };
+            connect(&mut system, &loaded, std::slice::from_ref(&link), false).unwrap();
+            ["sum.in[0]", "sum.in[1]"].map(|input| {
+                let input = system.port(input).unwrap();
+                system.name(system.source(input).unwrap().from)
+            })
+        };
+        assert_eq!(sources("b.out", "sum.in"), ["b.out[0]", "b.out[1]"]);
+        assert_eq!(sources("b.out[1]", "sum.in[1]"), ["a.out[0]", "b.out[1]"]);
+    }
 
     #[test]
     fn a_variable_of_an_element_with_the_name_of_the_folder_is_no_file() {
