@@ -138,15 +138,27 @@ impl Value {
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
-            Kind::Real(real) => real.start.map(Value::Real),
-            // As the FMU holds it.
-            #[expect(clippy::cast_possible_truncation, reason = "the nearest f32")]
-            Kind::Float32(real) => real.start.map(|start| Value::Real((start as f32).into())),
+            Kind::Real(real) | Kind::Float32(real) => {
+                real.start.map(|start| Value::Real(start).held_by(kind))
+            }
             Kind::Boolean(start) => start.map(Value::Boolean),
             other => {
                 let start = other.as_integer()?.start?;
                 i64::try_from(start).ok().map(Value::Integer)
             }
+        }
+    }
+
+    /// Returns the value that a variable of that kind holds: a `Float32` rounds a Real that is not too large for it.
+    #[must_use]
+    pub fn held_by(self, kind: &Kind) -> Self {
+        match (self, kind) {
+            (Value::Real(value), Kind::Float32(_)) => {
+                #[expect(clippy::cast_possible_truncation, reason = "the nearest f32")]
+                let rounded = f64::from(value as f32);
+                Value::Real(if rounded.is_finite() { rounded } else { value })
+            }
+            (value, _) => value,
         }
     }
 

@@ -14,6 +14,7 @@ use slave::{CallError, Value};
 #[derive(Clone, Debug)]
 pub(crate) struct Setting {
     pub(crate) port: Port,
+    /// As the variable holds it.
     pub(crate) value: Value,
     /// The value as the user wrote it.
     text: String,
@@ -51,6 +52,7 @@ impl System {
         if self.variable(port).causality == Causality::StructuralParameter {
             return self.configure(port, &value, text);
         }
+        let value = value.held_by(&self.variable(port).kind);
         let setting = Setting { port, value, text: text.to_owned() };
         match self.setting_positions.entry(self.holder(port)) {
             Entry::Occupied(known) => self.settings[*known.get()] = setting,
@@ -166,12 +168,8 @@ impl System {
         }
         let set = self.input_values.get(&port).or_else(|| self.setting(port)).cloned();
         match set.or_else(|| Value::start(&variable.kind))? {
-            #[expect(clippy::cast_possible_truncation, reason = "as the FMU holds it")]
-            Value::Real(value) if matches!(variable.kind, Kind::Float32(_)) => {
-                Some(Value::Real((value as f32).into()))
-            }
             Value::String(_) | Value::Binary(_) => None,
-            number => Some(number),
+            number => Some(number.held_by(&variable.kind)),
         }
     }
 }

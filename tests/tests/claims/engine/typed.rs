@@ -177,6 +177,44 @@ fn a_fault_of_an_integer_of_64_bits_has_values_beyond_32_bits() {
     assert_eq!(value, Value::Integer(5_000_000_001));
 }
 
+/// A slave whose only variable is a `Float32`.
+struct Single {
+    description: ModelDescription,
+    value: f32,
+}
+
+impl Slave for Single {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Done {
+        values[0] = self.value.into();
+        Ok(())
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "the nearest f32")]
+    fn set_real(&mut self, _: &[u32], values: &[f64]) -> Done {
+        self.value = values[0] as f32;
+        Ok(())
+    }
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+        Ok(StepResult::Whole)
+    }
+}
+
+/// The `f32` nearest to 0.1 is 1.5e-9 larger.
+#[test]
+fn a_parameter_of_type_float32_keeps_a_setting_that_it_rounds() {
+    let variables = r#"<Float32 name="p" valueReference="0" causality="parameter" start="1"/>"#;
+    let mut system = System::default();
+    let description = of_fmi_3(variables).description;
+    system.add("a", Box::new(Single { description, value: 1.0 })).unwrap();
+    system.set("a.p", "0.1").unwrap();
+    let parameter = system.port("a.p").unwrap();
+    let mut simulation = Simulation::new(system, &Algorithm::new(1.0), &until(1.0)).unwrap();
+    let value = simulation.system().get_value(parameter).unwrap();
+    assert_eq!(value, Value::Real(0.1_f32.into()));
+}
+
 impl Slave for Typed {
     fn description(&self) -> &ModelDescription {
         &self.description
