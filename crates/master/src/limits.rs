@@ -8,7 +8,7 @@ use fmu_description::{IntegerType, Kind, ModelDescription, RealType, ScalarVaria
 use crate::system::{Port, System};
 use slave::{Transformation, Value};
 
-/// Part of the limit, or of the nominal value if this is larger, by which a value may exceed the limit: rounding.
+/// [`Limits::rounding`] of a floating-point type, unless its own precision is coarser.
 const ROUNDING: f64 = 1e-9;
 /// Largest number of variables and of items that a warning names, and of connected inputs that are reported.
 const NAMED: usize = 5;
@@ -20,7 +20,9 @@ const DIGITS: usize = 6;
 struct Limits {
     min: f64,
     max: f64,
-    tolerance: f64,
+    nominal: f64,
+    /// Part of the limit, or of the nominal value if this is larger, by which a value may exceed the limit.
+    rounding: f64,
     /// The items of an enumeration; empty for another type.
     items: Vec<(String, i64)>,
 }
@@ -49,7 +51,7 @@ impl Limits {
                     #[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
                     of(kind).or_else(|| of(declared?)).map(|limit| limit as f64)
                 };
-                (stated(|kind| kind.min), stated(|kind| kind.max), Some(0.0))
+                (stated(|kind| kind.min), stated(|kind| kind.max), None)
             }
             _ => return None,
         };
@@ -60,14 +62,18 @@ impl Limits {
             return None;
         }
         let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
-        Some(Self { min, max, tolerance: ROUNDING * nominal.unwrap_or(1.0).abs(), items })
+        let rounding = match variable.kind {
+            Kind::Real(_) => ROUNDING,
+            Kind::Float32(_) => f32::EPSILON.into(),
+            // Integers have no rounding errors.
+            _ => 0.0,
+        };
+        Some(Self { min, max, nominal: nominal.unwrap_or(1.0).abs(), rounding, items })
     }
 
     /// Says why `value` is not allowed; `None` if it is allowed.
     fn refuse(&self, value: f64) -> Option<String> {
-        // Integers, whose tolerance is 0, have no rounding errors.
-        let relative = if self.tolerance > 0.0 { ROUNDING } else { 0.0 };
-        let rounding = |limit: f64| self.tolerance.max(relative * limit.abs());
+        let rounding = |limit: f64| self.rounding * self.nominal.max(limit.abs());
         let is_item =
             |(_, number): &(String, i64)| slave::to_real(*number).total_cmp(&value).is_eq();
         if !self.items.is_empty() && !self.items.iter().any(is_item) {
@@ -227,9 +233,23 @@ impl Watch {
 mod tests {
     use super::*;
 
+    /// The largest `f32` below 1234567.8 is 1234567.75, the one next to 0.1 is 1.5e-9 larger.
+    #[test]
+    fn a_value_that_a_float32_rounds_to_its_limit_is_allowed() {
+        let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
+            <CoSimulation modelIdentifier="m"/><ModelVariables><Float32 name="u" valueReference="1"
+            causality="input" start="1" min="0.1" max="1234567.8"/></ModelVariables><ModelStructure/>
+            </fmiModelDescription>"#;
+        let description = ModelDescription::parse(xml).unwrap();
+        let variable = description.variable("u").unwrap();
+        let limits = Limits::of(variable, &types(&description)).unwrap();
+        assert_eq!([0.1, 1_234_567.8].map(|value| limits.refuse(value)), [None, None]);
+        assert!([0.09999, 1_234_569.0].iter().all(|value| limits.refuse(*value).is_some()));
+    }
+
     #[test]
     fn five_inputs_are_reported_if_more_leave_their_limits_at_once() {
-        let limits = Limits { min: 0.0, max: 1.0, tolerance: 0.0, items: Vec::new() };
+        let limits = Limits { min: 0.0, max: 1.0, nominal: 1.0, rounding: 0.0, items: Vec::new() };
         let watched = |number: usize| Watched {
             name: format!("a.u{number}"),
             source: Source::Real(number),
