@@ -105,8 +105,7 @@ impl DecoupledPart {
 /// A, E, C, D for the outputs R y and time in units of 1 / |A|; the diagonal of R; |A|, the norm.
 fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVector<f64>, f64) {
     let (e, d) = plant.unknown_inputs(decoupled);
-    let (n, norm) = (plant.a.nrows(), plant.a.norm());
-    let size = if norm > 0.0 { norm } else { 1.0 };
+    let (n, size) = (plant.a.nrows(), size_or_one(&plant.a));
     let outputs = plant.c.row_iter().zip(d.row_iter()).map(|(state, direct)| {
         let length = if state.norm() > 0.0 { state.norm() } else { direct.norm() };
         if length > 0.0 { 1.0 / length } else { 1.0 }
@@ -115,6 +114,12 @@ fn scaled(plant: &DisturbedPlant, decoupled: &[bool]) -> ([DMatrix<f64>; 4], DVe
     let inputs = unit_columns(&stacked(&(e / size), &multiply_rows(&d, &outputs)));
     let (e, d) = (inputs.rows(0, n).into_owned(), inputs.rows(n, d.nrows()).into_owned());
     ([&plant.a / size, e, multiply_rows(&plant.c, &outputs), d], outputs, size)
+}
+
+/// The norm of A or C, by which values are divided; 1 for zero, as A of integrators is, and without entries.
+pub(super) fn size_or_one(m: &DMatrix<f64>) -> f64 {
+    let norm = m.norm();
+    if norm > 0.0 { norm } else { 1.0 }
 }
 
 /// W: an orthonormal basis of the smallest subspace with [A W, E] ker [C W, D] in it.

@@ -1,7 +1,7 @@
 //! Patterns that a plant admits, and the patterns of given residuals.
 
 use super::DisturbedPlant;
-use super::decoupled::{DecoupledPart, Gap, complement};
+use super::decoupled::{DecoupledPart, Gap, complement, size_or_one};
 use super::generator::{Requirements, Residual, gains};
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
@@ -89,10 +89,9 @@ fn is_strong(
 ) -> Result<bool, Error> {
     let s = domain.point(requirements.frequency);
     let n = part.a.nrows();
-    let size = part.a.norm().max(f64::MIN_POSITIVE);
     // Rows in units of A and of C.
+    let (size, outputs) = (size_or_one(&part.a), size_or_one(&part.c));
     let shifted = (&part.a - DMatrix::identity(n, n) * s.re) / size;
-    let outputs = part.c.norm().max(f64::MIN_POSITIVE);
     let real = stacked(&shifted, &(&part.c / outputs));
     let imaginary =
         DMatrix::from_fn(real.nrows(), n, |i, j| if i == j { -s.im / size } else { 0.0 });

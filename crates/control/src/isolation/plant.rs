@@ -1,6 +1,6 @@
 //! The plant with commands, disturbances and faults.
 
-use super::decoupled::{Gap, observable_states};
+use super::decoupled::{Gap, observable_states, size_or_one};
 use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
 use crate::blocks::beside;
 use crate::{Domain, Error, check};
@@ -82,7 +82,7 @@ impl DisturbedPlant {
         self.check()?;
         let n = self.a.nrows();
         let Balance { matrix, scale } = Balance::new(&self.a);
-        let size = if matrix.norm() > 0.0 { matrix.norm() } else { 1.0 };
+        let size = size_or_one(&matrix);
         let [b_u, b_d, b_f] = [&self.b_u, &self.b_d, &self.b_f].map(|b| divide_rows(b, &scale));
         let inputs = unit_columns(&beside(&beside(&b_u, &b_d), &b_f)).transpose();
         let mut gap = Gap::none();

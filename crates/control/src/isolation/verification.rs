@@ -1,6 +1,7 @@
 //! Verification of a residual generator on its plant.
 
 use super::DisturbedPlant;
+use super::decoupled::size_or_one;
 use crate::blocks::{ComplexMatrix, beside, to_complex};
 use crate::residual::ResidualGenerator;
 use crate::response::Transfer;
@@ -40,7 +41,7 @@ pub(super) fn decoupling_error(
     };
     let lengths: Vec<f64> =
         plant.c.row_iter().map(|row| if row.norm() > 0.0 { row.norm() } else { 1.0 }).collect();
-    let size = plant.a.norm().max(f64::MIN_POSITIVE);
+    let size = size_or_one(&plant.a);
     let possible = |input: usize| {
         let direct = whole.d.column(input);
         let direct = direct.iter().zip(&lengths).map(|(d, length)| d.abs() / length);

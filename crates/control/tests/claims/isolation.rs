@@ -224,6 +224,40 @@ fn three_sensors_of_one_signal_are_isolated_by_static_differences() {
     assert_eq!(count, 4);
 }
 
+/// Of two sensors of a state that a disturbance moves, `y_1` - `y_2` is `f_1` - `f_2`. Of a tank x' = u + f with
+/// y = x, (s y - u) / (s + 1) is f / (s + 1).
+#[test]
+fn constant_faults_are_visible_in_a_difference_of_sensors_and_at_an_integrator() {
+    let sensors = DisturbedPlant {
+        a: matrix(1, 1, &[-1.0]),
+        b_u: matrix(1, 1, &[1.0]),
+        b_d: matrix(1, 1, &[1.0]),
+        b_f: DMatrix::zeros(1, 2),
+        c: DMatrix::from_element(2, 1, 1.0),
+        d_u: DMatrix::zeros(2, 1),
+        d_d: DMatrix::zeros(2, 1),
+        d_f: DMatrix::identity(2, 2),
+        domain: Domain::Continuous,
+    };
+    let tank = DisturbedPlant {
+        a: DMatrix::zeros(1, 1),
+        b_d: DMatrix::zeros(1, 0),
+        b_f: matrix(1, 1, &[1.0]),
+        c: matrix(1, 1, &[1.0]),
+        d_u: DMatrix::zeros(1, 1),
+        d_d: DMatrix::zeros(1, 0),
+        d_f: DMatrix::zeros(1, 1),
+        ..sensors.clone()
+    };
+    for plant in [sensors, tank] {
+        let requirements = Requirements::with_pole(-1.0);
+        let patterns = achievable_patterns(&plant, &requirements).unwrap();
+        assert!(patterns.len() == 1 && patterns[0].strong, "{patterns:?}");
+        let residual = residual_generator(&plant, &patterns[0].pattern, &requirements).unwrap();
+        assert!(residual.gains.iter().all(|gain| gain.norm() > 0.5), "{:?}", residual.gains);
+    }
+}
+
 #[test]
 fn bad_requirements_and_patterns_are_refused_and_a_plant_without_disturbances_is_accepted() {
     let mut plant = plant(Domain::Continuous);
