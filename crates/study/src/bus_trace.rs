@@ -114,15 +114,16 @@ fn read_operations(
 }
 
 impl Writer {
-    /// Writes the operations in `bytes` that `bus` has not had at `time` yet.
+    /// Writes the operations in `bytes`, of one terminal, that `bus` has not had at `time` from another terminal.
     fn add(&mut self, time: f64, bus: usize, bytes: &[u8]) {
         if self.time.to_bits() != time.to_bits() {
             self.time = time;
             self.frames.clear();
         }
+        let others = self.frames.len();
         for operation in Operation::read(bytes) {
             let frame = (bus, operation);
-            if self.failed.is_some() || self.frames.contains(&frame) {
+            if self.failed.is_some() || self.frames[..others].contains(&frame) {
                 continue;
             }
             let result = self.format.write_operation(&mut self.bytes, time, bus, &frame.1);
@@ -229,4 +230,27 @@ fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
         }
     }
     links
+}
+
+#[cfg(test)]
+mod tests {
+    use fmu_description::can::{Frame, FrameKind};
+
+    use super::*;
+
+    /// The second call has the frames of another terminal of the bus.
+    #[test]
+    fn two_equal_frames_of_a_terminal_are_both_in_the_trace() {
+        let (kind, data) = (FrameKind::Data, vec![1]);
+        let frame = Operation::Transmit(Frame { identifier: 5, extended: false, kind, data });
+        let mut sent = Vec::new();
+        frame.append_to(&mut sent);
+        frame.append_to(&mut sent);
+        let (path, bytes, time, frames) = (PathBuf::new(), Vec::new(), f64::NAN, Vec::new());
+        let format = Format::Candump;
+        let mut writer = Writer { path, file: None, bytes, format, time, frames, failed: None };
+        writer.add(0.5, 0, &sent);
+        writer.add(0.5, 0, &sent);
+        assert_eq!(writer.bytes, "(0.500000) can0 005#01\n".repeat(2).as_bytes());
+    }
 }
