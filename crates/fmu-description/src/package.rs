@@ -89,12 +89,8 @@ pub fn platforms_of(version: Version) -> &'static [&'static str] {
     platforms()
 }
 
-/// The folder of FMI 3.0: the platform tuple among [`folders`], or that of Linux on 32-bit ARM, which FMI 2.0 does
-/// not have. Empty for an unknown platform.
+/// The folder of FMI 3.0: the platform tuple among [`folders`]. Empty for an unknown platform.
 fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
-    if (system, processor) == ("linux", "arm") {
-        return &["aarch32-linux"];
-    }
     let tuple = folders(system, processor).iter().find(|folder| folder.contains('-'));
     tuple.map_or(&[], std::slice::from_ref)
 }
@@ -105,6 +101,7 @@ fn folders(system: &str, processor: &str) -> &'static [&'static str] {
         ("linux", "x86_64") => &["linux64", "x86_64-linux"],
         ("linux", "x86") => &["linux32", "x86-linux"],
         ("linux", "aarch64") => &["aarch64-linux"],
+        ("linux", "arm") => &["aarch32-linux"],
         ("windows", "x86_64") => &["win64", "x86_64-windows"],
         ("windows", "x86") => &["win32", "x86-windows"],
         ("windows", "aarch64") => &["aarch64-windows"],

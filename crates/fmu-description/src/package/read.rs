@@ -259,9 +259,7 @@ fn is_needed(name: &str) -> bool {
         (Some("documentation" | "sources" | "model.png"), _) => false,
         (Some("terminalsAndIcons"), _) => name == terminals::PATH,
         (Some("binaries"), Some(platform)) => {
-            platforms().contains(&platform)
-                || platforms_of(Version::V3).contains(&platform)
-                || !is_platform(platform)
+            platforms().contains(&platform) || !is_platform(platform)
         }
         _ => true,
     }

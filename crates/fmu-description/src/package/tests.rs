@@ -127,6 +127,7 @@ fn folders_for_libraries_are_those_of_the_standard() {
     assert_eq!(folders("windows", "x86_64")[0], "win64");
     assert_eq!(folders("macos", "x86_64")[0], "darwin64");
     assert_eq!(folders("linux", "aarch64"), ["aarch64-linux"]);
+    assert_eq!(folders("linux", "arm"), ["aarch32-linux"]);
     assert_eq!(folders("macos", "aarch64"), ["aarch64-darwin", "darwin64"]);
     assert_eq!(folders("plan9", "mips"), [""; 0]);
 }
