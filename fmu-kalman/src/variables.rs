@@ -104,12 +104,13 @@ fn estimates(design: &KalmanDesign) -> Vec<Variable> {
     for (k, Element { estimate, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
         let text = format!("Estimate of {meaning}");
         let variable = Variable::real(estimate, text, move |model| &mut model.estimate.mean[k]);
-        all.push(output(with_unit(variable, unit.as_ref())));
+        let variable = with_unit(variable, unit.as_ref());
+        all.push(output(if k < n { variable } else { variable.difference() }));
     }
     for (k, Element { deviation, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
         let text = format!("Standard deviation of the estimate of {meaning}");
         let variable = Variable::real(deviation, text, move |model| &mut model.deviations[k]);
-        all.push(output(with_unit(variable, unit.as_ref())));
+        all.push(output(with_unit(variable, unit.as_ref()).difference()));
     }
     let text = "Square of the innovation relative to its covariance; on average the number of measurements";
     all.push(output(
@@ -144,7 +145,8 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
     for (k, Element { initial, meaning, unit, .. }) in elements(design).into_iter().enumerate() {
         let text = format!("Estimate of {meaning} before the first sample");
         let variable = Variable::real(initial, text, move |model| &mut model.initial[k]);
-        all.push(with_unit(variable, unit.as_ref()).parameter());
+        let variable = with_unit(variable, unit.as_ref()).parameter();
+        all.push(if k < design.states.len() { variable } else { variable.difference() });
     }
     all
 }

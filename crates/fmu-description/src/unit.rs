@@ -162,6 +162,13 @@ impl Unit {
         let base = Cursor::new(expression).unit()?;
         Ok(Unit { name: expression.to_owned(), base: Some(base), display_units: displays(&base) })
     }
+
+    /// Whether this is a unit of temperature: [differences](crate::RealType::is_relative) and values have different
+    /// conversions.
+    #[must_use]
+    pub fn is_temperature(&self) -> bool {
+        self.base.is_some_and(|base| base.exponents() == [0, 0, 0, 0, 1, 0, 0, 0])
+    }
 }
 
 /// Returns the display unit in degrees for `rad` and `rad/s`; none for other units.

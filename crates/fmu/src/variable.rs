@@ -3,6 +3,7 @@
 mod declaration;
 mod typed;
 
+use fmu_description::unit::Unit;
 use fmu_description::{Causality, DependencyKind, Initial, IntervalVariability, Variability};
 
 pub(crate) use declaration::{Base, Declaration};
@@ -376,6 +377,18 @@ impl<M> Variable<M> {
     #[must_use]
     pub fn tunable(self) -> Self {
         self.any_parameter(Variability::Tunable)
+    }
+
+    /// Makes a Real with a unit of temperature a [relative quantity](Variable::relative_quantity). In other units, a
+    /// difference is converted as a value is. Call it after [`Variable::unit`].
+    #[must_use]
+    pub fn difference(self) -> Self {
+        let unit = self.declaration.number.unit.as_deref().map(Unit::parse);
+        if unit.is_some_and(|unit| unit.is_ok_and(|unit| unit.is_temperature())) {
+            self.relative_quantity()
+        } else {
+            self
+        }
     }
 
     /// Makes the variable a parameter of this variability; a structural parameter remains a structural one.

@@ -160,6 +160,29 @@ fn the_estimate_is_held_before_the_activation_unless_it_is_monitored() {
     }
 }
 
+/// Without `relativeQuantity` an importer shows a fault of 5 degC as 278.15 K.
+#[test]
+fn the_fault_of_a_temperature_is_a_difference_and_its_state_a_value() {
+    for unit in ["degC", "K"] {
+        let mut text = small("");
+        for name in ["x", "f"] {
+            let entry = format!("s]]\nname = \"{name}\"\n");
+            text = text.replacen(&entry, &format!("{entry}unit = \"{unit}\"\n"), 1);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("design.toml"), text).unwrap();
+        let description = fmu::describe::<AsoController>(folder.path()).unwrap();
+        let is_relative = |name: &str| {
+            let variable = description.variables.iter().find(|variable| variable.name == name);
+            let kind = &variable.unwrap().kind;
+            assert_eq!(kind.as_real().unwrap().unit.as_deref(), Some(unit), "{name}");
+            kind.as_real().unwrap().is_relative()
+        };
+        let names = ["x_hat[1]", "x_hat_0[1]", "f_hat", "f_hat_0"];
+        assert_eq!(names.map(is_relative), [false, false, true, true]);
+    }
+}
+
 #[test]
 fn a_copy_through_bytes_continues_with_the_same_bits() {
     let mut controller = ready(AsoController::new(&shipped()).unwrap());

@@ -265,7 +265,8 @@ fn faults(design: &Design) -> Vec<Variable> {
             let Label { unit, meaning } = design.faults[i].label();
             let (name, text) = (channel("f_hat", i, count), format!("Estimate of {meaning}"));
             let variable = Variable::real(name, text, move |model| &mut model.deviations.f_hat[i]);
-            output(design, with_unit(variable, unit), dependencies::of_fault(design, i))
+            let variable = with_unit(variable, unit).difference();
+            output(design, variable, dependencies::of_fault(design, i))
                 .initially(dependencies::of_initial_fault(design, i))
                 .derivative(move |model| &mut model.with_slopes().f_slopes[i])
         })
@@ -273,14 +274,18 @@ fn faults(design: &Design) -> Vec<Variable> {
 }
 
 fn estimates(design: &Design) -> Vec<Variable> {
+    let (n, q) = (design.states.len(), design.faults.len());
+    let is_difference = |k: usize| (n..n + q).contains(&k) || k >= design.transfer_at(0);
     let mut states = states(design);
-    let faults = states.split_off(design.states.len());
+    let faults = states.split_off(n);
     faults
         .into_iter()
         .chain(states)
         .map(|State { position: k, name, texts: [text, _], units: [unit, _] }| {
             let variable = Variable::real(name, text, move |model| &mut model.values.z[k]);
-            output(design, with_unit(variable, unit.as_ref()), Vec::new())
+            let variable = with_unit(variable, unit.as_ref());
+            let variable = if is_difference(k) { variable.difference() } else { variable };
+            output(design, variable, Vec::new())
                 .initially(dependencies::of_initial_estimate(design, k))
                 .derivative(move |model| &mut model.with_slopes().z_slopes[k])
         })

@@ -104,7 +104,8 @@ fn starts(design: &Design) -> Vec<Variable> {
                 k if k < n + q => &mut model.f_hat_0[k - n],
                 k => &mut model.x_i_0[k - n - q],
             });
-            with_unit(variable, unit.as_ref()).parameter()
+            let variable = with_unit(variable, unit.as_ref()).parameter();
+            if (n..n + q).contains(&k) { variable.difference() } else { variable }
         })
         .collect()
 }
@@ -137,7 +138,7 @@ fn sliding_mode(design: &Design) -> Vec<Variable> {
             let variable = Variable::real(name, text, move |model| {
                 &mut accessor(model.design.sliding_mode.get_or_insert_default())[k]
             });
-            with_unit(variable, unit).parameter()
+            with_unit(variable, unit).difference().parameter()
         })
     };
     bounds("rho", "Largest estimate", rho, |law| &mut law.rho)
