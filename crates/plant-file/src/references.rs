@@ -2,9 +2,13 @@
 
 use crate::read::Result;
 use files::{Entry, Place, Table};
+use fmu_description::unit::Unit;
 use nalgebra::DMatrix;
 
 use crate::signals::{Signal, description, name, position, position_of, unit};
+
+/// The error of a sum of factors, such as three times 0.3333, up to which it is 1.
+const ROUNDING: f64 = 1e-3;
 
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +84,7 @@ impl References {
 
     /// Returns the references with operating points and units. The operating points follow from those of the
     /// measurements, `None` if none has one. A unit that is not stated is that of the measurements, if they have the
-    /// same one.
+    /// same one. A combination of temperatures in degC has it only if its factors add up to 1: a difference has none.
     #[must_use]
     pub fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
         let complete = |(at, signal): (usize, &Signal)| {
@@ -91,9 +95,15 @@ impl References {
             let mut units = weights.iter().zip(measurements).filter(|(weight, _)| **weight != 0.0);
             let first = units.next().and_then(|(_, one)| one.unit.clone());
             let same = units.all(|(_, one)| one.unit == first);
+            let is_mean = (weights.sum() - 1.0).abs() < ROUNDING;
+            let has_offset = |unit: &String| {
+                let base = Unit::parse(unit).ok().and_then(|unit| unit.base);
+                base.is_some_and(|base| base.offset != 0.0)
+            };
+            let unit = first.filter(|unit| same && (is_mean || !has_offset(unit)));
             Signal {
                 operating: stated.then(|| operating.sum()),
-                unit: signal.unit.clone().or(first.filter(|_| same)),
+                unit: signal.unit.clone().or(unit),
                 ..signal.clone()
             }
         };

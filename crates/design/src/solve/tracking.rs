@@ -350,4 +350,26 @@ mod tests {
         let message = refusal("measurement = \"y\", unit = \"m\"").unwrap();
         assert!(message.ends_with("expected this unit, found m"), "{message}");
     }
+
+    /// A difference of 5 degC is no temperature of 278.15 K.
+    #[test]
+    fn the_reference_of_temperatures_in_degrees_celsius_has_this_unit_only_if_it_is_a_mean() {
+        let unit_of = |combination: &str, unit: &str| {
+            let text = format!(
+                "A = [[-1, 0], [0, -2]]\nB = [[1], [1]]\nC = [[1, 0], [0, 1]]\nactuator_faults = \"all\"\n\
+                 measurements = [{{ name = \"y\", unit = \"{unit}\" }}, {{ name = \"z\", unit = \"{unit}\" }}]\n\
+                 reference.track = [{{ name = \"r\", combination = {{ {combination} }} }}]\n"
+            );
+            let completed = |references: &References, measurements: &[Signal]| {
+                references.completed(measurements)[0].unit.clone()
+            };
+            let unit = read(&text, |file| {
+                file.references.as_ref().map(|references| completed(references, &file.measurements))
+            });
+            unit.unwrap().unwrap()
+        };
+        assert_eq!(unit_of("y = 0.5, z = 0.5", "degC").as_deref(), Some("degC"));
+        assert_eq!(unit_of("y = 1.0, z = -1.0", "degC"), None);
+        assert_eq!(unit_of("y = 1.0, z = -1.0", "m").as_deref(), Some("m"));
+    }
 }
