@@ -112,6 +112,9 @@ EXPORT fmi2Status fmi2GetStatus(fmi2Component c, fmi2StatusKind kind, fmi2Status
 
 EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *value) {
     Slave *slave = c;
+    if (is(slave, "discard at t1 and break")) {
+        return fmi2Fatal;
+    }
     if (kind != fmi2LastSuccessfulTime || is(slave, "discard at t1 without saying so")) {
         return fmi2Discard;
     }

@@ -132,6 +132,14 @@ fn a_discarded_step_without_a_last_successful_time_is_an_error() {
     assert_eq!(error.messages, ["the step is too long"]);
 }
 
+/// Section 2.1.3: after `fmi2Fatal` no function may be called; after a discarded step its state may be restored.
+#[test]
+fn an_fmu_that_breaks_when_asked_for_the_time_reached_is_unusable() {
+    let error = ready("discard at t1 and break").do_step(0.0, 1.0, true).unwrap_err();
+    assert_eq!(error.failure, Failure::Status(Status::Fatal));
+    assert!(!error.leaves_the_instance_usable());
+}
+
 #[test]
 fn a_last_successful_time_outside_of_the_step_is_an_error() {
     let error = ready("lie about t1").do_step(0.0, 1.0, true).unwrap_err();

@@ -153,6 +153,7 @@ macro_rules! finish_step {
                 size: f64,
             ) -> Result<StepResult, CallError> {
                 let (start, mut pause) = (Instant::now(), Duration::from_micros(1));
+                let fatal = Failure::Status(Status::Fatal);
                 while status == Status::Pending as c_int {
                     let limit = self.base.time_limit.filter(|limit| start.elapsed() > *limit);
                     if let Some(limit) = limit {
@@ -163,7 +164,6 @@ macro_rules! finish_step {
                     pause = (2 * pause).min(PAUSE);
                     let function = self.base.functions.get_status;
                     let answer = self.base.ask(function, &$get_status, StatusKind::DoStepStatus, 0);
-                    let fatal = Failure::Status(Status::Fatal);
                     if answer.as_ref().is_err_and(|error| error.failure != fatal) {
                         self.cancel();
                     }
@@ -175,9 +175,12 @@ macro_rules! finish_step {
                 let (function, kind) =
                     (self.base.functions.get_real_status, StatusKind::LastSuccessfulTime);
                 let answer = self.base.ask(function, &$get_real_status, kind, f64::NAN);
-                let reached = answer.map_err(|CallError { messages, .. }| {
+                let reached = answer.map_err(|error| {
+                    if error.failure == fatal {
+                        return error;
+                    }
                     let failure = Failure::Status(Status::Discard);
-                    CallError { function: $do_step, failure, messages }
+                    CallError { function: $do_step, failure, ..error }
                 })?;
                 // An FMU that does not answer does not request the end.
                 let terminated = false $(|| {
