@@ -11,6 +11,8 @@ const BALANCINGS: usize = 30;
 const EIGEN_ITERATIONS: usize = 1000;
 /// Half of the range of ln(d), about the balanced start, in which the best scaling is searched.
 const RANGE: f64 = 12.0;
+/// The balancing does not reduce effects on other channels below this part of the largest diagonal entry.
+const NEGLIGIBLE: f64 = 1e-3;
 
 /// The largest value over frequency of a structured singular value.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +95,9 @@ pub(super) fn balanced_norm(m: &DMatrix<Complex<f64>>) -> Result<f64, Error> {
 fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
     let k = m.nrows();
     let mut exponents = DVector::<f64>::zeros(k);
+    let largest = m.diagonal().iter().map(|entry| entry.norm_sqr()).fold(0.0, f64::max);
+    // Without this least size, coupling in one direction only would not be scaled.
+    let least = NEGLIGIBLE * NEGLIGIBLE * largest;
     for _ in 0..BALANCINGS {
         for at in 0..k {
             let size = |row: usize, column: usize| {
@@ -101,7 +106,7 @@ fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
             let others = || (0..k).filter(|other| *other != at);
             let row: f64 = others().map(|other| size(at, other)).sum();
             let column: f64 = others().map(|other| size(other, at)).sum();
-            let change = 0.25 * (column / row).ln();
+            let change = 0.25 * (column.max(least) / row.max(least)).ln();
             if change.is_finite() {
                 exponents[at] += change;
             }
@@ -189,5 +194,18 @@ mod tests {
         let m = DMatrix::from_row_slice(2, 2, &[2.0, 100.0, 0.0, 1.0]).map(Complex::from);
         let (bound, _) = scaled_norm(&m).unwrap();
         assert!((bound - 2.0).abs() < 1e-2, "{bound}");
+    }
+
+    /// As one position in m that moves a pressure in Pa, which moves a force in mN.
+    #[test]
+    fn coupling_in_one_direction_does_not_count_in_any_units() {
+        for unit in [1e6, 1e9, 1e12] {
+            let entries = [2.0, unit, unit * unit, 0.0, 1.0, unit, 0.0, 0.0, 0.5];
+            let m = DMatrix::from_row_slice(3, 3, &entries).map(Complex::from);
+            for one_way in [m.transpose(), m] {
+                let (bound, _) = scaled_norm(&one_way).unwrap();
+                assert!((bound - 2.0).abs() < 1e-4, "{unit}: {bound}");
+            }
+        }
     }
 }
