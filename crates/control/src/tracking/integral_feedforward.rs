@@ -8,6 +8,9 @@ use crate::svd::Svd;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
 
+/// The imaginary part of a real eigenvalue that is double is at most this part of it, by rounding.
+const DOUBLE: f64 = 1e-8;
+
 /// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntegralFeedforward {
@@ -117,7 +120,11 @@ fn of_controllable(
 
 /// The `count` slowest eigenvalues; None if half of a complex pair is the last of them, or there are fewer.
 fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
-    let mut upper: Vec<_> = values.iter().filter(|value| value.im >= 0.0).copied().collect();
+    let exact = |value: &Complex<f64>| {
+        let is_real = value.im.abs() <= DOUBLE * value.norm();
+        if is_real { Complex::from(value.re) } else { *value }
+    };
+    let mut upper: Vec<_> = values.iter().map(exact).filter(|value| value.im >= 0.0).collect();
     // Among equally slow eigenvalues a real one precedes a pair.
     upper.sort_by(|x, y| {
         domain.excess(*y).total_cmp(&domain.excess(*x)).then(x.im.total_cmp(&y.im))
@@ -147,4 +154,22 @@ fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f
     }
     let svd = Svd::new(&polynomial.transpose())?;
     Ok(svd.right.columns(n - values.len(), values.len()).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_double_real_eigenvalue_that_rounding_makes_a_pair_is_no_pair() {
+        let pair = |im: f64| [Complex::new(-1.0, im), Complex::new(-1.0, -im)];
+        let of = |[one, other]: [Complex<f64>; 2], count| {
+            slowest(&[one, Complex::from(-3.0), other], count, Domain::Continuous)
+        };
+        let real = Complex::from(-1.0);
+        assert_eq!(of(pair(1e-15), 1), Some(vec![real]));
+        assert_eq!(of(pair(1e-15), 2), Some(vec![real, real]));
+        assert_eq!(of(pair(1e-3), 1), None);
+        assert_eq!(of(pair(1e-3), 2), Some(pair(1e-3).to_vec()));
+    }
 }
