@@ -31,13 +31,20 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     let count = |sign: &char| header.matches(*sign).count();
     let separator = [',', ';', '\t'].into_iter().max_by_key(count).unwrap_or(',');
     let cells = |line: &str| -> Vec<String> {
-        line.split(separator).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
+        // A separator in quotes is part of a name: "q[1,2]".
+        let (mut is_quoted, mut is_start) = (false, true);
+        let ends = |sign: char| {
+            is_quoted ^= sign == '"' && (is_quoted || is_start);
+            is_start = sign == separator && !is_quoted;
+            is_start
+        };
+        line.split(ends).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
     };
     let columns: Vec<Signal> = cells(header).iter().skip(1).map(|cell| named(cell)).collect();
     if columns.is_empty() {
         return Err(EXPECTED.to_owned());
     }
-    let mut rows = Vec::new();
+    let (mut rows, mut derivatives) = (Vec::new(), 0);
     for (at, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
         let cells = cells(line);
         if cells.len() != columns.len() + 1 {
@@ -54,7 +61,14 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
         };
         let values = cells[1..].iter().zip(&columns).map(number).collect::<Result<Vec<_>, _>>()?;
         let row = named(&cells[0]);
-        rows.push((Signal { name: derivative(&row.name).to_owned(), ..row }, values));
+        let name = derivative(&row.name).to_owned();
+        // The first row with the name of a state is its derivative: `der(x)`, also behind a measurement x.
+        let mut place = rows.len();
+        if name != row.name {
+            place = derivatives;
+            derivatives += 1;
+        }
+        rows.insert(place, (Signal { name, ..row }, values));
     }
     split(&rows, &columns, file)
 }
@@ -143,6 +157,27 @@ mod tests {
         assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
         assert_eq!(b, DMatrix::from_row_slice(2, 1, &[0.0, 0.5]));
         assert_eq!(c, DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_measurement_with_the_name_of_a_state_may_precede_the_derivative_of_the_state() {
+        let text = ",position,speed,force\nposition,1,0,0\nposition',0,1,0\nspeed',0,-0.5,0.5\n";
+        let Model::Matrices { a, c, .. } = table(text, "trolley.csv").unwrap().model else {
+            panic!("matrices")
+        };
+        assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
+        assert_eq!(c, DMatrix::from_row_slice(1, 2, &[1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_name_in_quotes_may_contain_the_separator() {
+        let text = "\"\",\"q[1,1] [m]\",\"q[1,2]\",u\n\"q[1,1]\",0,1,0\n\
+                    \"q[1,2]\",0,-0.5,0.5\npipe 2\" wide,1,0,0\n";
+        let draft = table(text, "trolley.csv").unwrap();
+        let Model::Matrices { a, states, .. } = draft.model else { panic!("matrices") };
+        assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
+        assert_eq!([&states[0].name, &states[1].name], ["q[1,1]", "q[1,2]"]);
+        assert_eq!(draft.measurements[0].name, "pipe 2\" wide");
     }
 
     #[test]
