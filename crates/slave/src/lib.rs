@@ -6,6 +6,7 @@
 
 mod events;
 mod model_exchange;
+mod time;
 mod transformation;
 mod value;
 
@@ -13,6 +14,7 @@ pub use events::Events;
 pub use fmu_description::abi::Status;
 use fmu_description::{Experiment, ModelDescription};
 pub use model_exchange::{CompletedStep, EventInfo, ModelExchange};
+pub use time::time_rounding;
 pub use transformation::Transformation;
 pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 

@@ -5,16 +5,12 @@ use crate::error::refused;
 use crate::library::v3::{DoStepResult, Interface};
 use fmu_description::abi::Status;
 use fmu_description::number::seconds;
-use slave::{CallError, EventInfo, Events, Failure, StepResult};
+use slave::{CallError, EventInfo, Events, Failure, StepResult, time_rounding};
 
 /// Largest number of updates of the discrete states in one event.
 const UPDATES: u32 = 1000;
 /// Largest number of successive parts of a step that make no progress.
 const STANDSTILLS: u32 = 1000;
-/// Two times are equal if they differ by less than this fraction of the step, or by [`UNITS`].
-const ROUNDING: f64 = 1e-9;
-/// Two times are equal if they differ by less than this many units in the last place.
-const UNITS: f64 = 4.0;
 /// Largest difference, as a fraction of the step, between the time of an FMU that adds it up itself and that of its
 /// importer.
 const DEVIATION: f64 = 1e-3;
@@ -37,11 +33,6 @@ impl Mode {
     pub(super) fn is_initialized(self) -> bool {
         matches!(self, Mode::Event | Mode::Step)
     }
-}
-
-/// Returns the difference in s below which times are equal at `time` in a step of `size` s.
-fn rounding(time: f64, size: f64) -> f64 {
-    (ROUNDING * size).max(UNITS * f64::EPSILON * time.abs())
 }
 
 impl Instance {
@@ -134,7 +125,7 @@ impl Instance {
         if self.state.terminate {
             return Ok(StepResult::Part { reached: time, terminated: true });
         }
-        let (end, rounding) = (time + size, rounding(time, size));
+        let (end, rounding) = (time + size, time_rounding(time, size));
         let deviation = rounding.max(DEVIATION * size);
         let (mut now, mut left, mut largest, mut standstills) = (time, size, f64::INFINITY, 0);
         loop {
@@ -217,7 +208,7 @@ impl Instance {
 
     /// Returns whether a time event or a tick is due at `time`, in a step of `size` s.
     fn is_event_due(&self, time: f64, size: f64) -> bool {
-        self.state.next_event.is_some_and(|next| next <= time + rounding(time, size))
+        self.state.next_event.is_some_and(|next| next <= time + time_rounding(time, size))
             || self.state.clocks.is_due(time)
     }
 }
