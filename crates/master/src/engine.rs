@@ -19,13 +19,11 @@ use crate::order::Order;
 use crate::system::System;
 use groups::Groups;
 pub(crate) use instants::{InstantEnd, Instants, Parts};
-use slave::{CallError, CommunicationStep, Failure, StepResult};
+use slave::{CallError, CommunicationStep, Failure, StepResult, time_rounding};
 use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.
 const PARTS: u32 = 1000;
-/// A step is complete if the rest is less than this fraction of it.
-const ROUNDING: f64 = 1e-9;
 /// Smallest part of a step that is made before or after an event within it.
 const DIVISION: f64 = 1e-6;
 
@@ -463,12 +461,13 @@ impl Engine {
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
         let end = time + size;
+        let complete = end - time_rounding(end, size);
         let mut start = time;
         for _ in 0..PARTS {
             let (reached, terminated) = match done {
                 StepResult::Whole => return self.exchange.read(&mut self.system, slave, end),
                 StepResult::Part { reached, terminated } => (reached, terminated),
-                StepResult::Event { reached } if reached >= end - ROUNDING * size => {
+                StepResult::Event { reached } if reached >= complete => {
                     self.instants.record_event(slave, end, size);
                     return Ok(());
                 }
@@ -484,7 +483,7 @@ impl Engine {
             if reached <= start {
                 break;
             }
-            if reached >= end - ROUNDING * size {
+            if reached >= complete {
                 return self.exchange.read(&mut self.system, slave, end);
             }
             if self.repeats {

@@ -1,8 +1,9 @@
 //! Slaves whose step covers several communication steps: their outputs at the points in between.
 
 use super::reals::Reals;
+use slave::time_rounding;
 
-/// Two times are equal if they differ by less than this fraction of the step.
+/// Two times are equal if they differ by less than this fraction of the step, or by [`time_rounding`].
 const ROUNDING: f64 = 1e-6;
 
 impl Reals {
@@ -13,7 +14,8 @@ impl Reals {
             return None;
         }
         let end = span.start + span.size;
-        (end > time + ROUNDING * span.size).then_some((span.start, end))
+        let rounding = (ROUNDING * span.size).max(time_rounding(time, 0.0));
+        (end > time + rounding).then_some((span.start, end))
     }
 
     /// Whether the last step of `slave` ends after `time`; always false if all slaves make equal

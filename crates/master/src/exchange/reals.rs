@@ -10,10 +10,7 @@ use crate::algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 use crate::error::{SystemError, call};
 use crate::fault::FaultChain;
 use crate::system::{Port, System};
-use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult};
-
-/// Two times are equal if they differ by less than this fraction of the step.
-const ROUNDING: f64 = 1e-9;
+use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult, time_rounding};
 
 /// The connected Reals of a system.
 #[derive(Debug)]
@@ -215,7 +212,7 @@ impl Reals {
     /// method only a function does so, if the step of the source ends by `end`.
     pub(super) fn uses_end_value(&self, slave: usize, source: usize, end: f64) -> bool {
         let span = &self.trace.spans[source];
-        let is_there = || span.start + span.size <= end + ROUNDING * span.size;
+        let is_there = || span.start + span.size <= end + time_rounding(end, span.size);
         self.method == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 

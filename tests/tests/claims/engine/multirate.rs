@@ -1,8 +1,10 @@
 //! Slaves that make one step for several communication steps, as the others see them.
 
-use master::{Algorithm, Extrapolation, Method, Readout, Simulation};
+use fmu_description::Experiment;
+use master::{Algorithm, Extrapolation, Method, Readout, Simulation, Value};
 
 use crate::engine::puppet::{system, whole};
+use crate::engine::typed::ring;
 use crate::engine::until;
 
 /// The input of a, which makes every step, from p, which makes four at once and has the output 1 +
@@ -34,6 +36,30 @@ fn a_slave_that_steps_first_is_read_at_the_time_of_the_reader_and_not_at_its_own
 fn a_slave_that_steps_at_the_same_time_is_read_at_the_start_of_its_step() {
     let begins = (0..12).map(|count| 1.0 + 2.0 * f64::from(count / 4));
     assert_eq!(inputs(Method::Jacobi), begins.collect::<Vec<_>>());
+}
+
+/// The Integers of a ring of slaves, the first of which makes two steps at once, over 20 steps of 0.1 s.
+fn integers(start_time: f64) -> Vec<Value> {
+    let algorithm = Algorithm {
+        multiples: vec![2, 1, 1],
+        ..Algorithm::fixed(Method::GaussSeidel, Extrapolation::Hold, 0.1)
+    };
+    let experiment = Experiment { start_time, ..until(start_time + 2.0) };
+    let mut simulation = Simulation::new(ring(), &algorithm, &experiment).unwrap();
+    let outputs = ["a.out1", "b.out1", "c.out1"];
+    let ports = outputs.map(|output| simulation.system().port(output).unwrap());
+    let mut values = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        values.extend(ports.map(|port| simulation.system().get_value(port).unwrap()));
+    }
+    values
+}
+
+/// There, 0.1 s after the first point is one unit in the last place before the second one.
+#[test]
+fn a_slave_that_steps_first_has_its_integer_at_its_own_end_in_seconds_since_1970() {
+    assert_eq!(integers(1.7e9), integers(0.0));
 }
 
 /// A slave that ends a step of several communication steps early would be asked for the same step for ever.
