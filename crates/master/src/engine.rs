@@ -183,18 +183,24 @@ impl Engine {
         }
     }
 
+    /// Returns the times in s between which a step from `time` to `end` may be divided.
+    fn divisible(&self, time: f64, end: f64) -> (f64, f64) {
+        let size = end - time;
+        (time + DIVISION * size, end - self.grid.negligible(size, end))
+    }
+
     /// Returns the first jump or kink of a signal or fault within a step.
     fn change_within(&self, time: f64, end: f64) -> Option<f64> {
-        let rounding = DIVISION * (end - time);
-        let breaks = self.next_breaks(time + rounding).filter(|next| *next < end - rounding);
-        breaks.reduce(f64::min)
+        let (after, before) = self.divisible(time, end);
+        self.next_breaks(after).filter(|next| *next < before).reduce(f64::min)
     }
 
     /// Returns the first known event, jump or kink within a step.
     #[inline(never)]
     fn first_within(&self, time: f64, end: f64) -> Option<f64> {
-        let change = self.change_within(time, end).into_iter();
-        change.chain(self.instants.next_within(time, end)).reduce(f64::min)
+        let (after, before) = self.divisible(time, end);
+        let event = self.instants.next_after(after).filter(|next| *next < before);
+        self.change_within(time, end).into_iter().chain(event).reduce(f64::min)
     }
 
     /// Warns about the first change that takes effect late.
@@ -468,7 +474,7 @@ impl Engine {
                 StepResult::Whole => return self.exchange.read(&mut self.system, slave, end),
                 StepResult::Part { reached, terminated } => (reached, terminated),
                 StepResult::Event { reached } if reached >= complete => {
-                    self.instants.record_event(slave, end, size);
+                    self.instants.record_event(slave, end - self.grid.negligible(size, end));
                     return Ok(());
                 }
                 StepResult::Event { reached } => (reached, false),

@@ -7,7 +7,7 @@ use crate::error::{SystemError, contradiction};
 use crate::signal::reached;
 use crate::system::System;
 use fmu_description::number::seconds;
-use slave::Slave;
+use slave::{Slave, time_rounding};
 
 /// A rest of the run that is less than this fraction of the step, or within the rounding of the stop time, gets no step
 /// of its own.
@@ -147,11 +147,11 @@ impl Grid {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
-    /// Returns the difference in s below which a grid point counts as `time`, for steps of `size` s. It exceeds the
-    /// rounding of both, which is 2.4e-7 s in seconds since 1970.
+    /// Returns the length in s below which a rest of a step of `size` s up to `time` is no step of its own. It exceeds
+    /// the rounding of grid points.
     #[inline]
-    fn negligible(&self, size: f64, time: f64) -> f64 {
-        (ROUNDING * size).max(2.0 * f64::EPSILON * self.start.abs().max(time.abs()))
+    pub(crate) fn negligible(&self, size: f64, time: f64) -> f64 {
+        (ROUNDING * size).max(time_rounding(self.start.abs().max(time.abs()), 0.0))
     }
 
     /// Returns `end`, or the stop time if it is earlier or so close that the rest of a step of

@@ -15,8 +15,6 @@ use slave::{CallError, Events, absent};
 
 /// Largest number of updates of the discrete states in an instant, and of exchanges between two updates.
 const MOST: usize = 1000;
-/// Part of a step within which a time counts as its end.
-const ROUNDING: f64 = 1e-6;
 
 /// The slaves whose events the master handles.
 #[derive(Debug, Default)]
@@ -83,12 +81,10 @@ impl Instants {
         self.members.iter().any(|&slave| self.connected[slave])
     }
 
-    /// Returns the time of the first known event within the step from `time` to `end`, all in s.
+    /// Returns the time of the first known event after `time`, both in s.
     #[inline]
-    pub(crate) fn next_within(&self, time: f64, end: f64) -> Option<f64> {
-        let rounding = ROUNDING * (end - time);
-        let next = self.next.iter().copied().filter(|next| *next > time + rounding);
-        next.reduce(f64::min).filter(|next| *next < end - rounding)
+    pub(crate) fn next_after(&self, time: f64) -> Option<f64> {
+        self.next.iter().copied().filter(|next| *next > time).reduce(f64::min)
     }
 
     /// Whether an instant is due at `time`: a slave has an event, one of its driven variables has a break
@@ -277,10 +273,10 @@ impl Instants {
         Ok(())
     }
 
-    /// Records that the step of `slave`, of `size` s, has ended at an event at `end` s. The recorded time is a little
-    /// earlier, because the communication point may be less than `end` by rounding.
-    pub(crate) fn record_event(&mut self, slave: usize, end: f64, size: f64) {
-        self.pending[slave] = end - (ROUNDING * size).max(4.0 * f64::EPSILON * end.abs());
+    /// Records that the step of `slave` has ended at an event. `time`, in s, is a little before this end, because the
+    /// communication point may be less than it by rounding.
+    pub(crate) fn record_event(&mut self, slave: usize, time: f64) {
+        self.pending[slave] = time;
     }
 
     /// Forgets the events of a step that is repeated.

@@ -1,13 +1,16 @@
-//! Steps chosen by the step control end at the start and the end of a fault on a connection.
+//! Steps end at the start and the end of a fault on a connection.
 
 use std::path::Path;
 use std::sync::Arc;
 
+use fmu_description::Experiment;
+use master::fault::{Fault, FaultChain, Window};
 use master::{Algorithm, Simulation, StepControl};
 use study::scenario::{Scenario, Setup};
 use tests::linear::ABLE;
 use tests::problems;
 
+use crate::engine::typed::ring;
 use crate::engine::until;
 
 const FAULT: &str = r#"
@@ -43,5 +46,28 @@ fn chosen_steps_end_at_the_start_and_the_end_of_a_fault() {
             let actual = times.iter().any(|time| (time - edge).abs() < 1e-12);
             assert!(actual, "{}: {edge} is not in {times:?}", control.name());
         }
+    }
+}
+
+/// The start of the fault and the grid point are rounded by 1e-7 s, as much as 1e-6 of a step.
+#[test]
+fn in_seconds_since_1970_a_fault_from_a_grid_point_on_adds_no_step() {
+    let start_time = 1.7e9_f64;
+    let point = start_time + 0.5;
+    for from in [point.next_down(), point, point.next_up()] {
+        let system = ring();
+        let fault = (Window { from, until: None }, Fault::Stuck(Some(5.0)));
+        let chain = FaultChain::new(vec![fault], 0.1).unwrap();
+        let faults = vec![(system.port("b.in1").unwrap(), chain)];
+        let scenario = master::Scenario { faults, ..master::Scenario::default() };
+        let experiment = Experiment { start_time, ..until(start_time + 1.0) };
+        let run = Simulation::with_scenario(system, &Algorithm::new(0.1), &experiment, scenario);
+        let mut simulation = run.unwrap();
+        let mut steps = 0;
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+            steps += 1;
+        }
+        assert_eq!(steps, 10, "{from}");
     }
 }

@@ -9,7 +9,7 @@ use crate::{Algorithm, Extrapolation, Method, Scenario, Simulation, System};
 
 type Done = Result<(), CallError>;
 
-/// The time in s of the event.
+/// The time in s of the event, unless a test states another one.
 const EVENT: f64 = 1.5;
 
 /// The output y is the time, but at most 1. If `samples`, the event copies the input u to the output z. The output n is
@@ -17,6 +17,7 @@ const EVENT: f64 = 1.5;
 struct Sampler {
     description: ModelDescription,
     samples: bool,
+    event: f64,
     time: f64,
     u: f64,
     slope: f64,
@@ -36,7 +37,8 @@ fn sampler(samples: bool) -> Box<Sampler> {
         <Unknown index="2" dependencies=""/><Unknown index="4" dependencies=""/></Outputs>
         </ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
-    Box::new(Sampler { description, samples, time: 0.0, u: 0.0, slope: 0.0, z: 0.0, n: 0.0 })
+    let event = EVENT;
+    Box::new(Sampler { description, samples, event, time: 0.0, u: 0.0, slope: 0.0, z: 0.0, n: 0.0 })
 }
 
 impl Slave for Sampler {
@@ -63,7 +65,7 @@ impl Slave for Sampler {
     }
     fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         (self.u, self.time) = (self.u + self.slope * size, time + size);
-        let happens = self.samples && time < EVENT && self.time >= EVENT;
+        let happens = self.samples && time < self.event && self.time >= self.event;
         Ok(if happens { StepResult::Event { reached: self.time } } else { StepResult::Whole })
     }
     fn hand_over_events(&mut self, _: bool) -> Result<bool, CallError> {
@@ -76,7 +78,7 @@ impl Slave for Sampler {
 
 impl Events for Sampler {
     fn next_event(&mut self) -> Result<Option<f64>, CallError> {
-        Ok((self.time < EVENT).then_some(EVENT))
+        Ok((self.time < self.event).then_some(self.event))
     }
     fn enter_event_mode(&mut self) -> Done {
         Ok(())
@@ -105,6 +107,33 @@ fn an_instant_sees_the_value_of_an_input_and_not_its_extrapolation() {
     }
     let port = simulation.system().port("q.z").unwrap();
     assert_eq!(simulation.system().get_value(port).unwrap(), Value::Real(1.0));
+}
+
+/// One unit in the last place of these times is 2.4e-7 s, more than 1e-6 of a step.
+#[test]
+fn in_seconds_since_1970_an_event_just_before_a_grid_point_adds_no_step() {
+    let start_time = 1.7e9_f64;
+    let (mut p, mut q) = (sampler(false), sampler(true));
+    q.event = (start_time + 0.3).next_down();
+    for description in [&mut p.description, &mut q.description] {
+        let flags = description.co_simulation.as_mut().unwrap();
+        flags.can_handle_variable_communication_step_size = true;
+    }
+    let mut system = System::default();
+    system.add("p", p).unwrap();
+    system.add("q", q).unwrap();
+    system.connect("p.y", "q.u").unwrap();
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.1);
+    let stop_time = Some(start_time + 0.5);
+    let experiment = Experiment { start_time, stop_time, ..Experiment::default() };
+    let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();
+    let port = simulation.system().port("q.z").unwrap();
+    let mut values = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        values.push(simulation.system().get_value(port).unwrap());
+    }
+    assert_eq!(values, [0.0, 0.0, 1.0, 1.0, 1.0].map(Value::Real));
 }
 
 /// Ticks at 0.1 and 1.2 s, and steps of 0.5 s only.
