@@ -7,14 +7,15 @@ use crate::error::SystemError;
 use crate::grid::size_between;
 use crate::step_control::{PlannedStep, SizeControl, StepOutcome, step_to_ending};
 use crate::system::Port;
+use slave::time_rounding;
 use solve::Bracket;
 
 /// Slot of the FMU states to which the location of a crossing returns.
 const SLOT: usize = 2;
 /// Relative width, as a part of a step, within which a crossing is located.
 const WIDTH: f64 = 1e-9;
-/// Two times are equal if they differ by less than this fraction of the step.
-const ROUNDING: f64 = 1e-9;
+/// An event that is less than this fraction of the step after its start is at the start.
+const LEAST: f64 = 1e-9;
 
 /// The event sources, and the state from which a crossing is located.
 pub(crate) struct Events {
@@ -77,11 +78,11 @@ impl Events {
         time: f64,
         end: f64,
     ) -> Result<Option<f64>, SystemError> {
-        let rounding = ROUNDING * (end - time);
+        let (least, rounding) = (LEAST * (end - time), time_rounding(end, end - time));
         let mut first: Option<f64> = None;
         for &port in &self.times {
             let next = engine.system.read_real(port, time)?;
-            if next > time + rounding && next <= end + rounding {
+            if next > time + least && next <= end + rounding {
                 let next = if next < end - rounding { next } else { end };
                 first = Some(first.map_or(next, |first| first.min(next)));
             }

@@ -1,5 +1,6 @@
 //! Steps that end at events.
 
+use fmu_description::Experiment;
 use master::algorithm::EventSource;
 use master::{
     Algorithm, Extrapolation, Method, Readout, Simulation, StepControl, StepResult, System,
@@ -43,6 +44,22 @@ fn fixed_steps_end_at_the_times_that_an_output_announces_and_on_the_grid() {
     for (end, expected) in ends.iter().zip(&expected) {
         assert!((end - expected).abs() <= f64::EPSILON, "{end} {expected}");
     }
+}
+
+/// One unit in the last place of these times is 2.4e-7 s.
+#[test]
+fn in_seconds_since_1970_an_event_just_before_a_grid_point_is_there() {
+    const START: f64 = 1.7e9;
+    let event = |time: f64| {
+        let event = (START + 0.5).next_down();
+        if time < event { event } else { f64::INFINITY }
+    };
+    let (system, _) = system([f64::sin, event], whole);
+    let event = EventSource::NextTime(system.port("p.z").unwrap());
+    let algorithm = Algorithm { events: vec![event], ..Algorithm::new(0.25) };
+    let experiment = Experiment { start_time: START, ..until(START + 1.0) };
+    let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();
+    assert_eq!(times(&mut simulation), [0.25, 0.5, 0.75, 1.0].map(|time| START + time));
 }
 
 #[test]
