@@ -239,7 +239,7 @@ impl Model for AsoController {
             return self.step(step).map(|()| None);
         }
         self.sample(step.start, step.start);
-        Ok(self.sampler.as_ref().and_then(|sampler| sampler.next_until(step.end())))
+        Ok(self.sampler.as_ref().and_then(|sampler| sampler.clock.next_until(step.end())))
     }
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {
@@ -355,7 +355,7 @@ impl Model for AsoController {
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         if self.sampler.is_some() {
             self.sample(time, time);
-            let next_event_time = self.sampler.as_ref().map(Sampler::next_instant);
+            let next_event_time = self.sampler.as_ref().map(|sampler| sampler.clock.next_instant());
             return Ok(Event { next_event_time, ..Event::default() });
         }
         // In an integrated step a limit is reached and left where it is, and events only separate the parts.

@@ -31,8 +31,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::loss::Loss;
-use crate::sampled::clock_rounding;
 use aso_controller::Design;
+use aso_controller::clock::clock_rounding;
 
 /// Which actuators are gone.
 #[derive(Clone, Serialize, Deserialize)]

@@ -31,26 +31,15 @@ use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::number::Number;
 use crate::signals::{OperatingPoint, Signals, Values};
+use aso_controller::clock::Clock;
 use aso_controller::design::{Design, Estimator};
-
-/// The part of the sample time by which a sample may be early, in addition to [`clock_rounding`].
-const TOLERANCE: f64 = 1e-4;
-
-/// The distance in s from `time` that counts as a rounding error of an importer, which adds up its steps.
-pub(crate) fn clock_rounding(time: f64) -> f64 {
-    8.0 * f64::EPSILON * time.abs()
-}
 
 /// Clock and state of a sampled controller.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Sampler {
     estimator: Estimator,
-    /// T in s.
-    period: f64,
-    /// t_start in s.
-    start: f64,
-    /// k of the next sample: a whole number, exact up to 2^53.
-    next: f64,
+    /// The instants of the samples.
+    pub(crate) clock: Clock,
     /// z[k|k-1] of the next sample as the importer will see it, not as deviations: so an initial value has no rounding
     /// of the operating point.
     prediction: Vec<f64>,
@@ -63,9 +52,7 @@ impl Sampler {
     pub(crate) fn new(design: &Design) -> Option<Self> {
         Some(Self {
             estimator: design.estimator?,
-            period: design.sample_time?,
-            start: 0.0,
-            next: 0.0,
+            clock: Clock::new(design.sample_time?),
             prediction: vec![0.0; design.order()],
             last_prediction: vec![0.0; design.order()],
         })
@@ -73,13 +60,13 @@ impl Sampler {
 
     /// Starts at `time` from the estimate `z` as the importer sees it; sample 0 is due.
     pub(crate) fn start(&mut self, time: f64, z: &[f64]) {
-        (self.start, self.next) = (time, 0.0);
+        self.clock.start(time);
         self.prediction.copy_from_slice(z);
     }
 
     /// Whether no sample was taken since the start.
     pub(crate) fn is_at_start(&self) -> bool {
-        self.next <= 0.0
+        self.clock.number() <= 0.0
     }
 
     /// Sets an element of the prediction for the next sample.
@@ -91,26 +78,13 @@ impl Sampler {
     /// importer sees it.
     pub(crate) fn rest(&mut self, z: &[f64]) {
         self.prediction.copy_from_slice(z);
-        self.next += 1.0;
-    }
-
-    /// The instant of the next sample in s.
-    pub(crate) fn next_instant(&self) -> f64 {
-        self.start + self.next * self.period
-    }
-
-    /// The instant in s of the next sample, at most `end`; `None` if it is due after `end`.
-    pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
-        let next = self.next_instant();
-        let tolerance = TOLERANCE * self.period + clock_rounding(end);
-        (next <= end + tolerance).then_some(next.min(end))
+        self.clock.tick();
     }
 
     /// The time in s from `start` to the next sample, negative if the sample was due before; `None` if it is due
     /// after `end`.
     pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
-        self.next_until(end)?;
-        Some(self.next * self.period - (start - self.start))
+        self.clock.next_until(end).map(|_| self.clock.time_to_next(start))
     }
 
     /// Takes the next sample, `offset` s after the measurements in `values` were given: computes z, e
@@ -144,7 +118,7 @@ impl Sampler {
         for (next, point) in self.prediction.iter_mut().zip(&point.z) {
             *next += point;
         }
-        self.next += 1.0;
+        self.clock.tick();
         mode
     }
 

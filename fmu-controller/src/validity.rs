@@ -13,9 +13,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sampled::clock_rounding;
 use crate::signals::Values;
 use aso_controller::Design;
+use aso_controller::clock::clock_rounding;
 use aso_controller::design::HOLD_ROUNDING;
 use aso_controller::sample::measurements::Validity;
 

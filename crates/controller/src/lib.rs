@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod channel;
+pub mod clock;
 pub mod design;
 mod interpolation;
 pub mod kalman;

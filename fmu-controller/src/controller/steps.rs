@@ -9,9 +9,10 @@ use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer, Part};
 use crate::reconfiguration::Reconfigurator;
-use crate::sampled::{Sampler, clock_rounding};
+use crate::sampled::Sampler;
 use crate::signals::{Signals, Values};
 use crate::validity::MeasurementCheck;
+use aso_controller::clock::clock_rounding;
 use aso_controller::design::detection::DetectionDesign;
 
 impl AsoController {
@@ -295,7 +296,7 @@ impl AsoController {
     pub(super) fn sample(&mut self, start: f64, end: f64) {
         let Some(mut sampler) = self.sampler.take() else { return };
         while let Some(offset) = sampler.time_to_sample(start, end) {
-            let instant = sampler.next_instant();
+            let instant = sampler.clock.next_instant();
             let mut resumes = false;
             // The measurements of the sample at the start are taken before it.
             if !sampler.is_at_start() {

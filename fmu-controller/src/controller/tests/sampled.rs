@@ -74,7 +74,7 @@ fn ten_steps_of_a_tenth_of_the_sample_time_take_one_sample_a_million_times() {
         for k in 1..=1_000_000_u32 {
             model.step(&Step { start: time, size }).unwrap();
             time += size;
-            let next = model.sampler.as_ref().unwrap().next_instant();
+            let next = model.sampler.as_ref().unwrap().clock.next_instant();
             let required = start + f64::from(k / 10 + 1) * period;
             assert_eq!(next.to_bits(), required.to_bits(), "{period} {k}");
         }
