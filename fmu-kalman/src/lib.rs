@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod carried;
-mod clock;
+mod held_mean;
 mod variables;
 
 use std::path::Path;
@@ -13,10 +13,11 @@ use fmu::description::DefaultExperiment;
 use fmu::{About, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
+use aso_controller::clock::Clock;
 use aso_controller::kalman::KalmanDesign;
 use carried::{Carrier, Estimate};
-use clock::{Clock, HeldMean};
 use control::nonlinear_filter::Transform;
+use held_mean::HeldMean;
 
 /// `extended` of the parameter `method`.
 const EXTENDED: i32 = 1;
@@ -171,7 +172,9 @@ impl Model for KalmanFilter {
         let carrier = self.carrier()?;
         carrier.start(experiment.start_time)?;
         self.reset_estimate();
+        // Sample 0 belongs to the initialisation.
         self.clock.start(experiment.start_time);
+        self.clock.tick();
         self.applied.clear();
         self.correct(&carrier, [0.0, experiment.start_time, 0.0])
     }
@@ -184,13 +187,13 @@ impl Model for KalmanFilter {
         while let Some(instant) = self.clock.next_until(step.end()) {
             self.applied.add(&self.u, instant - from);
             let prediction = carried::Prediction {
-                time: self.clock.last(),
+                time: self.clock.last_instant(),
                 u: self.applied.mean(&self.u),
                 steps: self.integration_steps,
                 transform,
             };
             carrier.predict(&mut self.estimate, &prediction)?;
-            let number = self.clock.next_number();
+            let number = self.clock.number();
             self.correct(&carrier, [number, instant, instant - step.start])?;
             self.applied.clear();
             self.clock.tick();
