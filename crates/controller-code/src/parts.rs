@@ -1,5 +1,6 @@
 //! Signals, matrices and numbers of samples, which the parts of a controller share.
 
+use aso_controller::clock::clock_rounding;
 use aso_controller::design::{Actuator, Fault, Measurement};
 use nalgebra::DMatrix;
 
@@ -66,7 +67,7 @@ pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
 pub(super) fn first_at(name: &str, start: f64, period: f64) -> Result<u32, Error> {
     let is_reached = |sample: f64| {
         let time = sample * period;
-        time >= start - 8.0 * f64::EPSILON * time
+        time >= start - clock_rounding(time)
     };
     let mut sample = ((start / period).floor() - 2.0).max(0.0);
     while !is_reached(sample) && sample <= f64::from(u32::MAX) {
