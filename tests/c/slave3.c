@@ -12,7 +12,7 @@
  * end, "discard" discards steps above 0.03 s, "huge" gives `big` a value
  * beyond 63 bits, "null" gives binaries a null pointer with their size, "no event mode" does not
  * instantiate with eventModeUsed, "terminate" ends at 0.5 s. With
- * "intermediate" it asks for u in the middle and at the end of a step, and y follows by Simpson's rule.
+ * "intermediate" it asks for u and a in the middle and at the end of a step, and y follows by Simpson's rule.
  *
  * It is strict: a call that section 4.2 forbids in its mode ends the process by SIGABRT. */
 #include "fmi3.h"
@@ -49,7 +49,7 @@ typedef struct {
     void *environment;
     fmi3LogMessageCallback log;
     fmi3IntermediateUpdateCallback update;
-    /* Whether the slave asks for u. */
+    /* Whether the slave asks for u and a. */
     bool asks;
 } Slave;
 
@@ -92,7 +92,8 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     void *environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
     demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateCoSimulation");
     if (strcmp(token, "intermediate") == 0) {
-        demand(count == 1 && intermediate[0] == U && update != NULL, "intermediate update of u");
+        demand(count == 2 && intermediate[0] == U && intermediate[1] == A && update != NULL,
+               "intermediate update of u and a");
     } else {
         demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
     }
@@ -393,8 +394,8 @@ static fmi3Status float64(Slave *slave, const fmi3ValueReference *vr, size_t n, 
                           size_t count, bool set) {
     Values *now = &slave->now;
     size_t at = 0;
-    demand(!slave->asks || (set && n == 1 && vr[0] == U), "only u is set within a step");
     for (size_t k = 0; k < n; k++) {
+        demand(!slave->asks || (set && (vr[k] == U || vr[k] == A)), "only u and a are set within a step");
         double sum = 0;
         for (int i = 0; i < MATRIX; i++) {
             sum += now->m[i];

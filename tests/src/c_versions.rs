@@ -146,7 +146,7 @@ const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Float64 name="u" valueReference="1" causality="input" start="1" intermediateUpdate="INTERMEDIATE"/>
 <Float64 name="y" valueReference="2" causality="output"><Alias name="y_again"/></Float64>
 <UInt64 name="n" valueReference="3" causality="structuralParameter" variability="fixed" start="2"/>
-<Float64 name="a" valueReference="4" causality="input" start="1 2">
+<Float64 name="a" valueReference="4" causality="input" start="1 2" intermediateUpdate="INTERMEDIATE">
  <Dimension valueReference="3"/></Float64>
 <Float64 name="b" valueReference="5" causality="output"><Dimension valueReference="3"/></Float64>
 <Float64 name="M" valueReference="6" causality="parameter" variability="fixed"

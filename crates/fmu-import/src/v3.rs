@@ -186,6 +186,7 @@ impl Instance {
         set.and(exited)?;
         // The elements have new positions.
         self.component.free_states();
+        self.component.forget_inputs();
         self.slots.clear();
         self.state.held = vec![None; view.shadows];
         self.state.memory.clear();

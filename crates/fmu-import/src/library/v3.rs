@@ -21,7 +21,7 @@ use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption};
 use intermediate::Inputs;
-pub(crate) use intermediate::ORDERS;
+pub(crate) use intermediate::{InputElement, ORDERS};
 pub(crate) use step::DoStepResult;
 
 /// The interface of an instance of FMI 3.0.

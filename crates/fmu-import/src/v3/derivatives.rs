@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::Instance;
 use super::unknown;
+use crate::library::v3::InputElement;
 use slave::CallError;
 
 /// The whole variables to which the elements of a list belong.
@@ -82,11 +83,13 @@ impl Instance {
         values: &[f64],
     ) -> Result<(), CallError> {
         let (view, time) = (&self.view, self.state.time);
-        let is_followed = |reference| {
-            let place = view.locate(reference);
-            place.is_some_and(|(variable, _)| view.variables[variable].intermediate)
+        let locate = |input| {
+            let (number, element) = view.locate(input)?;
+            let variable = &view.variables[number];
+            let (reference, size) = (variable.reference, variable.size);
+            variable.intermediate.then_some(InputElement { reference, size, element })
         };
-        self.component.set_input_derivatives(list, orders, values, time, is_followed)
+        self.component.set_input_derivatives(list, orders, values, time, locate)
     }
 
     /// Reads derivatives of outputs with respect to time.

@@ -28,7 +28,7 @@ pub(super) struct Variable {
     /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
     /// section 4.2.1): all but continuous inputs without clocks.
     pub(super) event: bool,
-    /// Whether the FMU asks for this input within a step: a scalar with `intermediateUpdate`.
+    /// Whether the FMU asks for this input within a step: one of type `Float64` with `intermediateUpdate`.
     pub(super) intermediate: bool,
     /// Value references of the clocks of the variable.
     pub(super) clocks: Vec<u32>,
@@ -301,7 +301,6 @@ impl Builder {
             event,
             intermediate: !event
                 && kind == NativeType::Float64
-                && !is_array
                 && variable.intermediate_update
                 && description
                     .co_simulation

@@ -271,12 +271,33 @@ fn an_fmu_that_lacks_the_event_mode_it_promises_runs_without() {
     assert!((loaded.real("y") - 1.0).abs() < 1e-12);
 }
 
-#[test]
-fn inputs_follow_their_derivatives_where_the_fmu_asks_for_them_within_a_step() {
+/// Loads the FMU that asks for u and a within a step.
+fn asking() -> Loaded {
     let folder = tempfile::tempdir().unwrap();
     let path = c_versions::slave_3(folder.path(), "intermediate", false);
     let slave = Fmu::open(&path).unwrap().instantiate("slave").unwrap();
-    let mut loaded = Loaded { slave, _folder: folder }.initialised();
+    Loaded { slave, _folder: folder }
+}
+
+#[test]
+fn elements_of_an_array_follow_their_derivatives_within_a_step_after_a_change_of_its_size_too() {
+    let mut loaded = asking();
+    let size = loaded.reference("n");
+    loaded.slave.configure(&[size], &[3]).unwrap();
+    loaded.set_real("a[1]", 1.0);
+    loaded.set_real("a[3]", 2.0);
+    let mut loaded = loaded.initialised();
+    let [u, third] = ["u", "a[3]"].map(|name| loaded.reference(name));
+    loaded.slave.set_input_derivatives(&[third, u], &[1, 1], &[3.0, 2.0]).unwrap();
+    assert_eq!(loaded.step(0.0, 1.0), Ok(StepResult::Whole));
+    // u = 1 + 2 t, a = [1, 0, 2 + 3 t], b = 2 a.
+    assert!((loaded.real("y") - 2.0).abs() < 1e-12);
+    assert_eq!(["b[1]", "b[2]", "b[3]"].map(|name| loaded.real(name)), [2.0, 0.0, 10.0]);
+}
+
+#[test]
+fn inputs_follow_their_derivatives_where_the_fmu_asks_for_them_within_a_step() {
+    let mut loaded = asking().initialised();
     let flags = loaded.slave.description().co_simulation.clone().unwrap();
     assert!(flags.can_interpolate_inputs);
     let u = loaded.reference("u");

@@ -20,6 +20,17 @@ thread_local! {
     static CURRENT: Cell<*mut Inputs> = const { Cell::new(ptr::null_mut()) };
 }
 
+/// An element of an input for which the FMU asks within a step; a scalar is its own element.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InputElement {
+    /// Value reference of the whole input, in the FMU.
+    pub(crate) reference: u32,
+    /// Number of elements of the input.
+    pub(crate) size: usize,
+    /// Position among these elements.
+    pub(crate) element: usize,
+}
+
 /// The inputs of the present step.
 #[derive(Debug, Default)]
 pub(super) struct Inputs {
@@ -29,13 +40,13 @@ pub(super) struct Inputs {
     pub(super) start: f64,
     /// The last time for which the FMU asked, in s.
     asked_time: Option<f64>,
-    /// The inputs that have had derivatives in this or an earlier step.
+    /// The whole inputs that have had derivatives in this or an earlier step.
     pub(super) references: Vec<u32>,
-    /// The values at the start of the step.
+    /// The values of their elements at the start of the step.
     pub(super) values: Vec<f64>,
-    /// The derivatives of order 1 to [`ORDERS`] for this step.
+    /// The derivatives of order 1 to [`ORDERS`] of the elements for this step.
     derivatives: Vec<[f64; ORDERS]>,
-    /// Position of each input in these lists, by value reference.
+    /// Position of the first element of each input, by value reference.
     index: HashMap<u32, usize>,
     /// Buffer for the values at a time within the step.
     present: Vec<f64>,
@@ -44,30 +55,29 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// Stores the derivatives of the inputs that `is_followed` accepts; all others become 0. On failure returns an
-    /// order that is not supported.
+    /// Stores the derivatives of the inputs for which `locate` returns an element; all others become 0. On failure
+    /// returns an order that is not supported.
     pub(super) fn derive(
         &mut self,
         list: &[u32],
         orders: &[i32],
         values: &[f64],
-        is_followed: impl Fn(u32) -> bool,
+        locate: impl Fn(u32) -> Option<InputElement>,
     ) -> Result<(), i32> {
         self.derivatives.fill([0.0; ORDERS]);
-        let all = list.iter().zip(orders).zip(values);
-        for ((&reference, &order), &value) in
-            all.filter(|((reference, _), _)| is_followed(**reference))
-        {
+        for ((&input, &order), &value) in list.iter().zip(orders).zip(values) {
+            let Some(InputElement { reference, size, element }) = locate(input) else { continue };
             let place = usize::try_from(order).ok().and_then(|order| order.checked_sub(1));
             let place = place.filter(|place| *place < ORDERS).ok_or(order)?;
-            let index = *self.index.entry(reference).or_insert_with(|| {
+            let first = *self.index.entry(reference).or_insert_with(|| {
+                let (first, count) = (self.values.len(), self.values.len() + size);
                 self.references.push(reference);
-                self.values.push(0.0);
-                self.derivatives.push([0.0; ORDERS]);
-                self.present.push(0.0);
-                self.references.len() - 1
+                self.values.resize(count, 0.0);
+                self.derivatives.resize(count, [0.0; ORDERS]);
+                self.present.resize(count, 0.0);
+                first
             });
-            self.derivatives[index][place] = value;
+            self.derivatives[first + element][place] = value;
         }
         Ok(())
     }
@@ -99,10 +109,10 @@ impl Inputs {
             *present = value_at(*value, derivatives, elapsed);
         }
         let Some((instance, set)) = self.target else { return 0 };
-        let count = self.references.len();
-        let (references, values) = (self.references.as_ptr(), self.present.as_ptr());
-        // SAFETY: the instance is alive, as it asks or has just stepped; as many values as references.
-        unsafe { set(instance, references, count, values, count) }
+        let (references, values) = (&self.references, &self.present);
+        let (count, length) = (references.len(), values.len());
+        // SAFETY: the instance is alive, as it asks or has just stepped; both lists have their lengths.
+        unsafe { set(instance, references.as_ptr(), count, values.as_ptr(), length) }
     }
 }
 

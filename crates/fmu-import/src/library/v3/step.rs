@@ -3,7 +3,7 @@
 
 use super::super::calls::function;
 use super::Component;
-use super::ORDERS;
+use super::{InputElement, ORDERS};
 use slave::{CallError, EventInfo, Failure, absent};
 
 const SET: &str = "fmi3SetFloat64";
@@ -56,18 +56,18 @@ impl Component {
         Ok(DoStepResult { event, terminate, early, reached })
     }
 
-    /// Sets the derivatives of the inputs that `is_followed` accepts, for the step from `start` s. Reads the present
-    /// values of these inputs, which are those at `start`. An order beyond [`ORDERS`] is an error.
+    /// Sets the derivatives of the inputs for which `locate` returns an element, for the step from `start` s. Reads the
+    /// present values of these inputs, which are those at `start`. An order beyond [`ORDERS`] is an error.
     pub(crate) fn set_input_derivatives(
         &mut self,
         list: &[u32],
         orders: &[i32],
         values: &[f64],
         start: f64,
-        is_followed: impl Fn(u32) -> bool,
+        locate: impl Fn(u32) -> Option<InputElement>,
     ) -> Result<(), CallError> {
         self.inputs.is_set = false;
-        self.inputs.derive(list, orders, values, is_followed).map_err(|order| {
+        self.inputs.derive(list, orders, values, locate).map_err(|order| {
             let what =
                 format!("cannot follow a derivative of order {order}, expected 1 to {ORDERS}");
             self.base.failed(SET, Failure::InvalidAnswer(what))
@@ -95,6 +95,11 @@ impl Component {
     /// Forgets the derivatives of the inputs: they hold for one step.
     pub(crate) fn forget_input_derivatives(&mut self) {
         self.inputs.is_set = false;
+    }
+
+    /// Forgets the inputs that have had derivatives, whose sizes may have changed.
+    pub(crate) fn forget_inputs(&mut self) {
+        self.inputs = Box::default();
     }
 
     pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
