@@ -7,16 +7,16 @@ use std::path::{Path, PathBuf};
 
 use fmu_description::package::Unpacked;
 use fmu_description::unit::BaseUnit;
-use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable};
+use fmu_description::{Causality, Dimension as Extent, Kind, ModelDescription, ScalarVariable};
 
 use super::conversion::{Measure, items_of};
 use super::error::{SspError, missing};
 use super::flatten::kind_of;
 use super::render::{render_ssd, render_ssv};
 use super::structure::{
-    Component, Connection, Connector, Conversion, DefaultExperiment, Definitions, Element,
-    ElementBase, End, Enumeration, Parameter, ParameterBinding, ParameterSet, ParameterValue,
-    Source, System, SystemStructure, Transformation as Stated, Type, Unit,
+    Component, Connection, Connector, Conversion, DefaultExperiment, Definitions, Dimension,
+    Element, ElementBase, End, Enumeration, Parameter, ParameterBinding, ParameterSet,
+    ParameterValue, Source, System, SystemStructure, Transformation as Stated, Type, Unit,
 };
 use crate::assembly::{Assembly, Link, Setting, Terminal};
 use archive::Archive;
@@ -32,8 +32,9 @@ pub(super) const TOOL: &str = "aso-ftc";
 /// The FMUs go into `resources`, each with all its files: an archive as it is, also that of an FMU that
 /// [`crate::open`] has unpacked, and a folder packed. The settings of each element go into a parameter set `settings` in
 /// a separate file, bound to the component. Connectors are the connected variables and the
-/// outputs of type Real, Integer and Boolean, with the types and units of the FMUs. `step_size` in
-/// s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
+/// outputs of type Real, Integer and Boolean, with the types and units of the FMUs; those of arrays have their
+/// dimensions (SSP 2.0). `step_size` in s goes into the annotation that libcosim reads. Equal assemblies and FMUs give
+/// equal bytes.
 ///
 /// # Errors
 ///
@@ -138,14 +139,23 @@ impl Exporter {
         Ok(connectors)
     }
 
-    /// Returns the type of a variable and adds its unit or enumeration to the definitions. A unit
-    /// is left out if the FMU gives only its name, or if another FMU defines it differently. `None` if SSP 1.0
-    /// does not have the type, or if the enumeration is unknown or another FMU defines it differently.
+    /// Returns the type of a variable and adds its unit or enumeration to the definitions. Of an array, only the
+    /// dimensions are stated: importers take type and unit from the FMU. A unit is left out if the FMU gives only its
+    /// name, or if another FMU defines it differently. `None` if SSP 1.0 does not have the type, or if the enumeration
+    /// is unknown or another FMU defines it differently.
     fn value_type(
         &mut self,
         variable: &ScalarVariable,
         description: &ModelDescription,
     ) -> Option<Type> {
+        if !variable.dimensions.is_empty() {
+            let size = |extent: &Extent| match extent {
+                Extent::Fixed(size) => Dimension::Size(*size),
+                // The structural parameter has no connector, and a setting may change it.
+                Extent::Variable(_) => Dimension::Open,
+            };
+            return Some(Type::Array(variable.dimensions.iter().map(size).collect()));
+        }
         match &variable.kind {
             Kind::Real(real) => {
                 let unit = real.unit.as_ref().and_then(|name| {

@@ -6,11 +6,12 @@ use std::io::Write as _;
 use fmu_description::Version;
 use fmu_description::package::{Package, platforms_of};
 use ssp::structure::{ConnectorKind, Dimension, Element, ParameterValue, Type};
-use ssp::{open, read_ssd, read_ssv, render_ssd, render_ssv};
+use ssp::{open, read_ssd, read_ssv, render_ssd, render_ssv, write};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use crate::bench::{Bench, component, connection, links, root, settings, ssd, ssv};
+use crate::writing::entry;
 
 /// The same text as SSP 2.0.
 fn newer(text: &str) -> String {
@@ -118,6 +119,32 @@ fn numbers_of_every_width_of_fmi_3_have_units_and_transformations() {
     let expected = ["a.y -> b.u * 0.001 + 0.0", "a.n -> b.n [(1, 2)]"];
     assert_eq!(links(&opened.assembly), expected);
     assert!(!opened.warnings.join("\n").contains("of type"), "{:?}", opened.warnings);
+}
+
+#[test]
+fn connectors_of_arrays_are_written_with_their_dimensions() {
+    let bench = Bench::new();
+    let outputs = r#"<UInt64 name="n" valueReference="2" causality="structuralParameter" variability="fixed" start="2"/>
+<Float64 name="y" valueReference="1" causality="output" unit="mm"><Dimension start="3"/><Dimension valueReference="2"/></Float64>"#;
+    fmu_of_fmi_3(&bench, "a", outputs, r#"<Output valueReference="1"/>"#);
+    let input = r#"<Float64 name="u" valueReference="1" causality="input" unit="m" start="0 0 0 0 0 0"><Dimension start="3"/><Dimension start="2"/></Float64>"#;
+    fmu_of_fmi_3(&bench, "b", input, "");
+    let elements =
+        component("a", "a.fmu", "y output", "") + &component("b", "b.fmu", "u input", "");
+    let opened = bench.open(&root(&elements, &connection("a.y", "b.u", "", "")), "").unwrap();
+    let path = bench.path("x.ssp");
+    write(&opened.assembly, None, &path).unwrap();
+    let text = String::from_utf8(entry(&path, "SystemStructure.ssd")).unwrap();
+    assert!(text.contains("version=\"2.0\""), "{text}");
+    let structure = read_ssd(text.as_bytes()).unwrap();
+    let written = structure.system.elements.iter();
+    let kinds = written.map(|element| element.base().connectors[0].kind_of_value.clone());
+    let expected = [Dimension::Open, Dimension::Size(2)]
+        .map(|second| Some(Type::Array(vec![Dimension::Size(3), second])));
+    assert_eq!(kinds.collect::<Vec<_>>(), expected);
+    let again = open(&path).unwrap();
+    assert_eq!(links(&again.assembly), ["a.y -> b.u * 0.001 + 0.0"]);
+    assert_eq!(again.warnings, [""; 0]);
 }
 
 #[test]

@@ -280,7 +280,7 @@ fn complete_fmu(bench: &Bench, name: &str) -> PathBuf {
 }
 
 /// The entry `name` of an archive.
-fn entry(archive: &Path, name: &str) -> Vec<u8> {
+pub(crate) fn entry(archive: &Path, name: &str) -> Vec<u8> {
     let mut archive = zip::ZipArchive::new(fs::File::open(archive).unwrap()).unwrap();
     let mut bytes = Vec::new();
     archive.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
