@@ -307,7 +307,7 @@ class Design:
             peaks = ", ".join(f"{point['judged']:.3f} at the {point['point']}" for point in robustness["points"])
             # JSON has null for a margin without a limit.
             delay = robustness["delay_margin"]
-            lines.append(f"peak of S: {peaks}; delay margin: {'∞' if delay is None else f'{delay:.4g}'} s")
+            lines.append(f"peak of S: {peaks}; delay margin: {'no limit' if delay is None else f'{delay:.4g} s'}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

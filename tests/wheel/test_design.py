@@ -281,7 +281,7 @@ def test_a_delay_margin_without_a_limit_is_infinite():
     assert measures(design)["delay_margin"] == stated and f"delay margin: {stated:.4g} s" in str(design)
     # JSON has no infinity.
     design.report["robustness"]["delay_margin"] = None
-    assert measures(design)["delay_margin"] == np.inf and "delay margin: ∞ s" in str(design)
+    assert measures(design)["delay_margin"] == np.inf and "delay margin: no limit" in str(design)
 
 
 def test_a_wrong_system_says_what_is_expected():

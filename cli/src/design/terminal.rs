@@ -4,6 +4,7 @@ use design::report::detection::Detection;
 use design::report::fallback::FallbackReport;
 use design::report::family::MemberReport;
 use design::report::losses::LossLoop;
+use design::report::number::{NO_LIMIT, settled};
 use design::report::reconfiguration::ReconfigurationReport;
 use design::report::robustness::{LoopPoint, Number, ToleranceProof, ToleranceResult};
 use design::report::schedule::ScheduleReport;
@@ -382,7 +383,7 @@ fn print_reference(step: &ReferenceStep) {
         step.reference,
         number(step.size),
         number(100.0 * step.overshoot),
-        settled(step.settling_time),
+        settled(step.settling_time, number),
         number(if step.steady_state_error.abs() < ROUNDING {
             0.0
         } else {
@@ -399,15 +400,6 @@ fn print_reference(step: &ReferenceStep) {
     if step.largest_step.iter().any(|limit| limit.is_finite()) {
         let [low, high] = step.largest_step.map(number);
         println!("    within the limits: steps from {low} to {high}{unit}");
-    }
-}
-
-/// Describes when a response stays within its band; `time` is infinite if it leaves the band to the end of its trace.
-fn settled(time: f64) -> String {
-    if time.is_finite() {
-        format!("settled after {} s", number(time))
-    } else {
-        "not settled at the end of the response".to_owned()
     }
 }
 
@@ -436,7 +428,7 @@ fn seconds(time: f64) -> String {
 /// Formats a number with about five digits.
 fn number(value: f64) -> String {
     if value.is_infinite() {
-        return if value > 0.0 { "no limit".to_owned() } else { "-infinite".to_owned() };
+        return if value > 0.0 { NO_LIMIT } else { "-infinite" }.to_owned();
     }
     let size = value.abs();
     if size == 0.0 || (1e-3..1e5).contains(&size) {
@@ -461,7 +453,7 @@ mod tests {
     #[test]
     fn a_time_without_end_has_no_unit() {
         let expected = ["settled after 0.25 s", "not settled at the end of the response"];
-        assert_eq!([0.25, f64::INFINITY].map(settled), expected);
+        assert_eq!([0.25, f64::INFINITY].map(|time| settled(time, number)), expected);
         assert_eq!([0.25, f64::INFINITY].map(seconds), ["0.25 s", "no limit"]);
     }
 }

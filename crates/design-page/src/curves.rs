@@ -6,7 +6,7 @@ use super::chart::{legend, line_sample};
 use super::number::number;
 use super::plots::{Line, Mark, Plot, Plots, Quantity};
 use super::table::table_of;
-use design_report::number::rounded;
+use design_report::number::{rounded, settled};
 use design_report::{Curve, Frequency, Report, StepResponse};
 
 /// Shows the singular values on logarithmic axes.
@@ -165,13 +165,13 @@ pub(super) fn curve<'a>(
     let name =
         if unit.is_empty() { curve.name.clone() } else { format!("{} in {unit}", curve.name) };
     let title = format!(
-        "{} after {after}. Largest magnitude {} {unit} at {} s, settled after {} s.",
+        "{} after {after}. Largest magnitude {} {unit} at {} s, {}.",
         curve.name,
         rounded(curve.peak),
         rounded(curve.peak_time),
-        rounded(curve.settling_time)
+        settled(curve.settling_time, rounded)
     );
-    let settled = Some(curve.settling_time).filter(|time| time.is_finite()).map(Mark::At);
+    let settling = Some(curve.settling_time).filter(|time| time.is_finite()).map(Mark::At);
     let place = plots.add(Plot {
         id,
         quantity: Quantity::Time,
@@ -180,7 +180,7 @@ pub(super) fn curve<'a>(
         title,
         places: &curve.times,
         lines: vec![Line { name, values: &curve.values }],
-        marks: size.map(Mark::Size).into_iter().chain(settled).collect(),
+        marks: size.map(Mark::Size).into_iter().chain(settling).collect(),
     });
     html! {
         figure {

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use design_report::number::rounded;
+use design_report::number::{NO_LIMIT, rounded};
 
 /// Returns a text with the fewest significant digits that parse to the same finite number in TOML, numpy and MATLAB.
 pub(super) fn exact(value: f64) -> String {
@@ -21,6 +21,11 @@ pub(super) fn complex([re, im]: [f64; 2], part: fn(f64) -> String) -> String {
 /// Formats a number in a sentence: rounded, with all digits in the tooltip.
 pub(super) fn number(value: f64) -> Markup {
     html! { data value=(exact(value)) title=(exact(value)) { (rounded(value)) } }
+}
+
+/// Formats a time in a sentence; an infinite one has no unit.
+pub(super) fn seconds(time: f64) -> Markup {
+    html! { @if time.is_finite() { (number(time)) " s" } @else { (NO_LIMIT) } }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::curves::frequency;
 use super::matrix::matrices;
-use super::number::number;
+use super::number::{number, seconds};
 use super::plots::Plots;
 use super::table::{Cell, Columns, table, table_of, with_unit};
 use design_report::robustness::{
@@ -54,9 +54,9 @@ pub(super) fn robustness<'a>(
         (channels(robustness))
         (disks(robustness))
         p {
-            "All commands may be delayed by up to " (number(robustness.delay_margin)) " s"
-            @if robustness.delays.is_some() { " more" }
-            ". "
+            "Delay margin of all commands together"
+            @if robustness.delays.is_some() { ", beyond their delays" }
+            ": " (seconds(robustness.delay_margin)) ". "
             @if report.plant.sample_time.is_some() {
                 "This is in whole samples."
             } @else if robustness.longest_hold.is_infinite() {

@@ -422,6 +422,22 @@ fn a_hold_without_a_limit_makes_no_loop_unstable() {
 }
 
 #[test]
+fn an_infinite_time_is_no_number_with_a_unit() {
+    let mut report = hostile();
+    report.robustness.as_mut().unwrap().delay_margin = f64::INFINITY;
+    report.steps[0].curves[0].settling_time = f64::INFINITY;
+    let page = page(&report);
+    assert!(page.contains(", not settled at the end of the response.") && !page.contains("∞ s."));
+    let document = xml(&page);
+    let text = text(Document::parse(&document).unwrap().root());
+    for expected in
+        ["Delay marginno limit", "Delay margin of all commands together", ": no limit. "]
+    {
+        assert!(text.contains(expected), "{expected}");
+    }
+}
+
+#[test]
 fn signals_without_units_are_not_in_the_unit_of_a_change() {
     let mut report = hostile();
     let part = Number { name: "f1".to_owned(), unit: None, value: 0.375 };

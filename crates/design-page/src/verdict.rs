@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::advice::advice;
-use super::number::number;
+use super::number::{number, seconds};
 use super::plane::Plane;
 use design_report::robustness::Level;
 use design_report::{Loop, Report};
@@ -100,7 +100,7 @@ fn figures(report: &Report) -> Markup {
             }
             " (limit " (number(report.verdict.limits.amber)) ")"
         }))
-        (key("Delay margin", &html! { (number(robustness.delay_margin)) " s" }))
+        (key("Delay margin", &seconds(robustness.delay_margin)))
         (key("Parameters within their tolerances", &html! {
             @if let Some(part) = tolerance.stable {
                 (number(100.0 * part)) " % of " (tolerance.cases) " random cases stable, "

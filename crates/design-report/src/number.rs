@@ -1,4 +1,18 @@
-//! Rounds numbers, and formats them with five digits.
+//! Rounds numbers, and formats them with five digits. Says what an infinite time means.
+
+/// Takes the place of an infinite number and its unit in a sentence, where nothing limits the quantity.
+pub const NO_LIMIT: &str = "no limit";
+
+/// Describes when a response stays within its band, with the time formatted by `number`; `time` is infinite if it
+/// leaves the band to the end of its trace.
+#[must_use]
+pub fn settled(time: f64, number: impl Fn(f64) -> String) -> String {
+    if time.is_finite() {
+        format!("settled after {} s", number(time))
+    } else {
+        "not settled at the end of the response".to_owned()
+    }
+}
 
 /// Formats a number with five digits, or more for whole numbers below 1e7 and for numbers from 1e5 to 1e6. NaN is
 /// `undefined`.
