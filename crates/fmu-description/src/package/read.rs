@@ -213,11 +213,11 @@ impl Unpacked {
         }
     }
 
-    /// Whether the FMU has source code: a file in `sources`.
+    /// Whether the FMU has source code: a file in `sources`, at any depth.
     #[must_use]
     pub fn has_sources(&self) -> bool {
         self.names.iter().any(|name| name.starts_with("sources/") && !name.ends_with('/'))
-            || below(&self.folder().join("sources")).next().is_some()
+            || has_file(&self.folder().join("sources"))
     }
 
     /// The paths of the files in the folders of platforms in `binaries`, in upper or lower case; sorted, at most 20.
@@ -250,6 +250,11 @@ impl Unpacked {
 /// The paths of the files and folders in `folder`; none if it cannot be read.
 fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+/// Whether `folder` has a file, at any depth; a link counts as one. False if it cannot be read.
+fn has_file(folder: &Path) -> bool {
+    below(folder).any(|path| path.is_symlink() || !path.is_dir() || has_file(&path))
 }
 
 /// Whether a simulation on this platform may need the entry called `name`.

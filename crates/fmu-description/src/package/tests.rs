@@ -298,7 +298,7 @@ fn of_several_entries_with_one_name_the_last_is_used_with_a_warning() {
 }
 
 #[test]
-fn an_empty_folder_sources_is_no_source_code() {
+fn a_folder_sources_with_empty_folders_is_no_source_code() {
     let description = (DESCRIPTION, XML, 0o100_644);
     let code = raw::archive(&[description, ("sources/a.c", "", 0o100_644)]);
     assert!(opened(&code).unwrap().has_sources());
@@ -307,9 +307,9 @@ fn an_empty_folder_sources_is_no_source_code() {
     let error = empty.library("M").unwrap_err().to_string();
     assert!(!error.contains("source code"), "{error}");
     let sources = empty.folder().join("sources");
-    fs::create_dir_all(&sources).unwrap();
+    fs::create_dir_all(sources.join("inner/core")).unwrap();
     assert!(!Unpacked::in_folder(empty.folder()).unwrap().has_sources());
-    fs::write(sources.join("a.c"), "").unwrap();
+    fs::write(sources.join("inner/core/a.c"), "").unwrap();
     assert!(Unpacked::in_folder(empty.folder()).unwrap().has_sources());
 }
 
