@@ -421,6 +421,16 @@ fn a_hold_without_a_limit_makes_no_loop_unstable() {
     assert_eq!([hold(0.5), hold(f64::INFINITY)], [[true, false], [false, true]]);
 }
 
+/// The reasons of the verdict say "above 4 (red)" and "above 2 (amber)".
+#[test]
+fn the_peaks_of_s_are_beside_both_limits_of_the_verdict() {
+    let page = xml(&page(&hostile()));
+    let document = Document::parse(&page).unwrap();
+    let mut keys = elements(&document, "dt").filter(|key| text(*key) == "Peak of S");
+    let shown = text(keys.next().unwrap().parent().unwrap());
+    assert!(shown.ends_with(" (amber above 2, red above 4)"), "{shown}");
+}
+
 #[test]
 fn an_infinite_time_is_no_number_with_a_unit() {
     let mut report = hostile();

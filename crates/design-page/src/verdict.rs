@@ -91,14 +91,14 @@ fn figures(report: &Report) -> Markup {
             (settling(report))
         };
     };
-    let tolerance = &robustness.tolerance;
+    let (tolerance, limits) = (&robustness.tolerance, &report.verdict.limits);
     html! {
         (key("Peak of S", &html! {
             @for (index, point) in robustness.points.iter().enumerate() {
                 @if index > 0 { ", " }
                 (number(point.judged)) " at the " (point.point)
             }
-            " (limit " (number(report.verdict.limits.amber)) ")"
+            " (amber above " (number(limits.amber)) ", red above " (number(limits.red)) ")"
         }))
         (key("Delay margin", &seconds(robustness.delay_margin)))
         (key("Parameters within their tolerances", &html! {
