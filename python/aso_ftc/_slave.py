@@ -12,7 +12,7 @@ class Slave(Protocol):
     """What a Python object needs to take part in a :class:`System`.
 
     The object has the attributes ``inputs`` and ``outputs``: a list of names, or a dict of names and
-    start values (``float``, ``int`` or ``bool``, which is also the type of the variable). Optional:
+    start values (``float``, ``int`` or ``bool``, which is also the type of the variable; an ``int`` has 32 bits). Optional:
 
     * ``direct = False`` states that no output depends on the inputs of the same time.
     * ``start(t, inputs)`` is called before the first step of every run, and may return outputs.

@@ -43,8 +43,8 @@ impl PythonSlave {
     /// # Errors
     ///
     /// `TypeError` if the object has no function `step`, an attribute is a text or a start value is no number;
-    /// `ValueError` if one is an array of several elements, or if two variables have one name; an exception of the
-    /// object.
+    /// `ValueError` if one is an array of several elements or an integer beyond 32 bits, or if two variables have one
+    /// name; an exception of the object.
     pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
         if !object.hasattr("step")? {
             let kind = object.get_type().name()?;
@@ -63,6 +63,10 @@ impl PythonSlave {
                         "{name}: two variables are called {variable_name}, expected different names"
                     );
                     return Err(PyValueError::new_err(what));
+                }
+                if let Start::Integer(value) = start {
+                    check_integer("the start value of", &variable_name, value)
+                        .map_err(PyValueError::new_err)?;
                 }
                 let reference = u32::try_from(variables.len()).unwrap_or(u32::MAX);
                 values.push(start.number());
@@ -117,7 +121,7 @@ impl PythonSlave {
     }
 
     /// Returns position and value of each output in the answer of a call, none for `None`. A name that is no output is
-    /// an error, as is a number that is no integer for an output that starts with one.
+    /// an error, as is a number that is no integer of 32 bits for an output that starts with an integer.
     fn read_outputs(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
         if answer.is_none() {
             return Ok(Vec::new());
@@ -139,12 +143,8 @@ impl PythonSlave {
                 return Err(PyValueError::new_err(what));
             };
             let value: f64 = value.extract()?;
-            let is_integer = matches!(self.description.variables[position].kind, Kind::Integer(_));
-            if is_integer && value.fract() != 0.0 {
-                let what = format!(
-                    "the output {name} is {value}, expected an integer, as its start value is one"
-                );
-                return Err(PyValueError::new_err(what));
+            if matches!(self.description.variables[position].kind, Kind::Integer(_)) {
+                check_integer("the output", &name, value).map_err(PyValueError::new_err)?;
             }
             outputs.push((position, value));
         }
@@ -223,6 +223,14 @@ impl Slave for PythonSlave {
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        for (&reference, &value) in references.iter().zip(values) {
+            let variable = self.description.variables.get(reference as usize);
+            let name = variable.map_or("", |variable| variable.name.as_str());
+            check_integer("the input", name, slave::to_real(value)).map_err(|what| {
+                let failure = Failure::InvalidAnswer(format!("was not called: {what}"));
+                CallError { function: "step", failure, messages: Vec::new() }
+            })?;
+        }
         self.write(references, values.iter().map(|value| slave::to_real(*value)));
         Ok(())
     }
@@ -308,18 +316,29 @@ fn stop(object: &Bound<'_, PyAny>) -> PyResult<()> {
 #[derive(Clone, Copy)]
 enum Start {
     Real(f64),
-    Integer(i64),
+    /// An integer, which [`PythonSlave::new`] checks.
+    Integer(f64),
     Boolean(bool),
 }
 
 impl Start {
     fn number(&self) -> f64 {
         match self {
-            Self::Real(value) => *value,
-            Self::Integer(value) => slave::to_real(*value),
+            Self::Real(value) | Self::Integer(value) => *value,
             Self::Boolean(value) => f64::from(u8::from(*value)),
         }
     }
+}
+
+/// Checks the value of a variable that starts with an integer: it is an `Integer` of FMI 2.0. `what`: the kind of the
+/// value. On failure returns a sentence.
+fn check_integer(what: &str, name: &str, value: f64) -> Result<(), String> {
+    if value.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&value) {
+        return Ok(());
+    }
+    Err(format!(
+        "{what} {name} is {value}, expected an integer of 32 bits; a variable that starts with a float takes any number"
+    ))
 }
 
 /// Returns the variables that an attribute of the object declares; none if the object lacks the attribute. `TypeError`
@@ -355,6 +374,7 @@ fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
     scalar.extract().map(Start::Real)
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "an integer")]
 fn variable(name: String, reference: u32, causality: Causality, start: Start) -> ScalarVariable {
     let is_input = causality == Causality::Input;
     let (kind, variability) = match start {
@@ -363,7 +383,7 @@ fn variable(name: String, reference: u32, causality: Causality, start: Start) ->
             (Kind::Real(RealType { start, ..RealType::default() }), Variability::Continuous)
         }
         Start::Integer(value) => {
-            let start = is_input.then_some(value.into());
+            let start = is_input.then_some(value as i128);
             (Kind::Integer(IntegerType { start, ..IntegerType::default() }), Variability::Discrete)
         }
         Start::Boolean(value) => (Kind::Boolean(is_input.then_some(value)), Variability::Discrete),

@@ -414,5 +414,22 @@ def test_an_output_that_starts_with_an_integer_is_not_cut():
         def step(self, t, dt, inputs):
             return {"count": 0.5}
 
-    with pytest.raises(af.RunError, match="the output count is 0.5, expected an integer, as its start value is one"):
+    with pytest.raises(af.RunError, match="the output count is 0.5, expected an integer of 32 bits"):
         loop(Half(1.0)).run()
+
+
+def test_an_integer_beyond_32_bits_is_an_error():
+    class Large(Proportional):
+        def step(self, t, dt, inputs):
+            return {"count": 2**40}
+
+    sentence = "count is 1099511627776, expected an integer of 32 bits; a variable that starts with a float takes any"
+    with pytest.raises(af.RunError, match="raised ValueError: the output " + sentence):
+        loop(Large(1.0)).run()
+    start = Proportional(1.0)
+    start.outputs = {**Proportional.outputs, "count": 2**40}
+    with pytest.raises(ValueError, match="the start value of " + sentence):
+        loop(start).run()
+    last = Proportional(1.0)
+    last.step = lambda t, dt, inputs: {"u": 0.0, "count": -(2**31)}
+    assert loop(last).run()["law.count"][-1] == -(2**31)
