@@ -10,6 +10,8 @@ use std::f64::consts::PI;
 const ROUNDS: usize = 60;
 /// Relative width of the norms that are computed.
 const NORM_WIDTH: f64 = 1e-6;
+/// A worst error of this part of the target is at the accuracy of the solver: no lower bound is near to it.
+const ATTAINED: f64 = 1e-6;
 
 /// A constant gain with the least worst error over a family of systems.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +36,8 @@ pub struct ConstantGain {
 ///
 /// `family`: stable systems `G_i` with r outputs and m inputs each; `target`: M, s x m; `fixed`:
 /// entries (row, column, value) of Q that are given, counted from 0; `width`: relative distance of
-/// the worst error from its lower bound at which the iteration ends; below 1e-5 it counts as 1e-5.
+/// the worst error from its lower bound at which the iteration ends; below 1e-5 it counts as 1e-5. It
+/// also ends at a worst error of 1e-6 times the Frobenius norm of M, as of a target that a gain attains exactly.
 ///
 /// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator
 /// for all systems of the family: its error is the response to commands and disturbances together
@@ -83,6 +86,8 @@ pub fn constant_gain(
         let what = "the program for a constant gain";
         let (bound, gain) = minimum(&points, target, fixed, r)
             .ok_or(Error::NotConverged { what, iterations: ROUNDS })?;
+        // The solver may miss a bound of zero by its accuracy.
+        let bound = bound.max(0.0);
         let mut norms = Vec::with_capacity(family.len());
         for system in family {
             // Q G - M.
@@ -99,7 +104,8 @@ pub fn constant_gain(
             Some(best) if best.worst <= worst => best.lower_bound = lower_bound,
             _ => best = Some(ConstantGain { gain, norms, worst, lower_bound }),
         }
-        if let Some(best) = best.take_if(|best| best.worst <= lower_bound * (1.0 + width)) {
+        let enough = (lower_bound * (1.0 + width)).max(ATTAINED * target.norm());
+        if let Some(best) = best.take_if(|best| best.worst <= enough) {
             return Ok(best);
         }
     }
@@ -156,6 +162,24 @@ fn minimum(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Q = [-1, 1] makes Q G = 1 for G = [g; g + 1] with any g.
+    #[test]
+    fn a_target_that_is_attained_exactly_ends_the_iteration() {
+        let one = DMatrix::from_element(1, 1, 1.0);
+        let system = |rate: f64| StateSpace {
+            a: &one * -rate,
+            b: one.clone(),
+            c: DMatrix::from_element(2, 1, 1.0),
+            d: DMatrix::from_column_slice(2, 1, &[0.0, 1.0]),
+            domain: Domain::Continuous,
+        };
+        let family = [0.1, 1.0, 30.0].map(system);
+        let best = constant_gain(&family, &one, &[], 1e-3).unwrap();
+        assert!(best.worst < 1e-6 && best.lower_bound >= 0.0, "{best:?}");
+        let expected = DMatrix::from_row_slice(1, 2, &[-1.0, 1.0]);
+        assert!((&best.gain - expected).amax() < 1e-5, "{best:?}");
+    }
 
     #[test]
     fn a_given_entry_that_is_not_a_number_is_refused_by_its_place() {
