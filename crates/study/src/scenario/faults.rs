@@ -74,7 +74,8 @@ impl<'a> Resolver<'a> {
         }
         if let Some(source) = source {
             let stated_source = self.system.port(source)?;
-            if source_port != Some(stated_source) {
+            let holder = |port| self.system.holder(port);
+            if source_port.map(holder) != Some(holder(stated_source)) {
                 let description = source_port
                     .map_or_else(|| "a signal".to_owned(), |port| self.system.name(port));
                 let (target, stated) = (target.name, self.system.name(stated_source));

@@ -7,7 +7,7 @@ use master::drive::DriveState;
 use master::fault::FaultChain;
 use study::scenario::ResolvedScenario;
 
-use super::{resolve, scenario, setup, system};
+use super::{listener, of_fmi_3, resolve, scenario, setup, system};
 
 fn lines(text: &str) -> Vec<(String, FaultChain)> {
     let system = system().0;
@@ -50,6 +50,20 @@ fn each_kind_of_fault_changes_the_value_by_its_formula() {
         ("saturation = { max = 4 }", [1.0, 2.0, 3.0, 4.0, 4.0, 4.0]),
     ] {
         assert_eq!(series(line(body)), expected, "{body}");
+    }
+}
+
+#[test]
+fn an_alias_of_the_connected_output_names_the_connection_too() {
+    let mut system = of_fmi_3().0;
+    system.add("other", listener(false).0).unwrap();
+    system.connect("fmu.y", "other.force").unwrap();
+    for source in ["fmu.y", "fmu.also y"] {
+        let text = format!(
+            "[[scenario.fault]]\nconnection = \"{source}=other.force\"\nbias = {{ value = 1 }}"
+        );
+        let resolved = scenario(&text).resolve(&system, &setup(Path::new("."))).unwrap();
+        assert_eq!(system.name(resolved.scenario.faults[0].0), "other.force");
     }
 }
 

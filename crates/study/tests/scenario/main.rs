@@ -127,7 +127,8 @@ fn system() -> (System, Calls, Calls) {
     (system, plant_told, ctrl_told)
 }
 
-/// An FMU of FMI 3.0, called fmu, with inputs of several widths, and one that is a difference of temperatures.
+/// An FMU of FMI 3.0, called fmu, with inputs of several widths, one that is a difference of temperatures, and an
+/// output.
 fn of_fmi_3() -> (System, Calls) {
     let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="Listener" instantiationToken="t">
         <CoSimulation modelIdentifier="L"/>
@@ -145,7 +146,9 @@ fn of_fmi_3() -> (System, Calls) {
         <Float64 name="rise" valueReference="5" causality="input" unit="degC" relativeQuantity="true"
         start="0"/>
         <Enumeration name="size" valueReference="6" causality="input" declaredType="Size" start="1"/>
-        </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        <Float64 name="y" valueReference="7" causality="output"><Alias name="also y"/></Float64>
+        </ModelVariables><ModelStructure><Output valueReference="7"/></ModelStructure>
+        </fmiModelDescription>"#;
     let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
     let mut system = System::default();
     system.add("fmu", Box::new(Listener { description, calls: calls.clone() })).unwrap();
