@@ -7,12 +7,12 @@ use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::DMatrix;
 
-/// Rounding error per row of a matrix with entries of about one, with a margin.
+/// The rounding error of an eigenvalue, divided by n^2 and the largest entry of the matrix, with a safety margin.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The definiteness margin of a symmetric matrix S: the smallest eigenvalue of D S D, D the
-/// diagonal of powers of two that brings the diagonal of S to about one. Above zero, S is positive
-/// definite; zero, it was not shown to be.
+/// diagonal of powers of two that brings the diagonal of S to about one. If it is above zero, S is
+/// positive definite; zero means that this was not shown.
 ///
 /// D S D is positive definite if and only if S is (Sylvester), and scaling by powers of two does
 /// not round. The entries of S may have relative errors of a few units of rounding. The margin is
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(AccurateProduct::new(&row, &column).high[(0, 0)].to_bits(), 1.0_f64.to_bits());
         let tenth = DMatrix::from_element(1, 1, 0.1);
         let square = AccurateProduct::new(&tenth, &tenth);
-        // 0.1 as a number is 0.1 + 5.551115123125783e-18.
+        // The double nearest to 0.1 is 0.1 + 5.551115123125783e-18.
         assert!((square.low[(0, 0)] - (0.01 - square.high[(0, 0)] + 1.11e-18)).abs() < 2e-18);
     }
 

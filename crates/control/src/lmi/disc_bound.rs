@@ -8,18 +8,18 @@ use crate::zeros::{Zeros, zeros};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// The points s > 0 at which det H is considered: `POINTS` on each side of 1 / (least Re(-1 / s) of the region),
-/// `PER_DECADE` in a decade.
+/// det H is evaluated at `POINTS` points s > 0 on each side of 1 / (least Re(-1 / s) of the region), `PER_DECADE` of
+/// them per decade.
 const POINTS: i32 = 60;
 const PER_DECADE: f64 = 20.0;
 /// Bisections for the sum of the inverse eigenvalues.
 const BISECTIONS: usize = 30;
 
-/// A lower bound of the H-infinity norm of z = E x, x' = (A - L C) x + B w, for every L that places all eigenvalues
-/// in a disc of the left half plane, in continuous time.
+/// Bounds the H-infinity norm from w to z = E x, x' = (A - L C) x + B w, from below, for every L that places all
+/// eigenvalues in a disc of the left half plane, in continuous time.
 ///
-/// `disc`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay` <= 0;
-/// R is a bound of their distance from 0: radius - center, for a center above 0 the root of radius^2 - center^2.
+/// `disc`, `decay`: all eigenvalues s have |s - center| <= radius and a real part of at most -`decay` <= 0.
+/// So |s| <= R = radius - center, for a center above 0 the root of radius^2 - center^2. `a`: n x n.
 /// E B, q x q, must have an inverse; w enters y through the states only (D = 0). With
 /// T(s) = E (s I - A + L C)^-1 B, the first bound is
 ///
@@ -27,25 +27,25 @@ const BISECTIONS: usize = 30;
 /// gamma >= (|det E B| (n - q)^(n - q) q^q / n^n)^(1/q) / R
 /// ```
 ///
-/// det T = det(E B) N(s) / det(s I - A + L C) has N of degree n - q with leading coefficient 1. With its zeros
-/// mirrored into the left half plane, det T is nowhere on s > 0 larger than its maximum on the imaginary axis;
-/// s = (n - q) R / q is the best point.
+/// In det T = det(E B) N(s) / det(s I - A + L C), N has degree n - q and leading coefficient 1. Once the zeros of N are
+/// mirrored into the left half plane, |det T| at any s > 0 is at most its maximum on the imaginary axis.
+/// s = (n - q) R / q gives the largest bound.
 ///
-/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. Each eigenvalue `s_i` of A - L C has
-/// an inverse `v_i` = -1 / `s_i`. det H(s) / det H(0) is the product of (1 - s / `z_j`) over the invariant zeros of
-/// (A, B, C), divided by the product of (1 + s `v_i`). This gives two bounds, which depend on L by the `v_i` only:
+/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I. With `v_i` = -1 / `s_i` for the
+/// eigenvalues `s_i` of A - L C, det H(s) is the product of (1 - s / `z_j`) over the invariant zeros `z_j` of
+/// (A, B, C), divided by the product of (1 + s `v_i`). This gives two bounds, which depend on L through the `v_i` only:
 ///
 /// ```text
 /// gamma >= |sum of v_i - zeta| / sum of 1 / sigma_i(E B),     zeta = sum of -1 / z_j           (the trace at s = 0)
 /// gamma >= sigma_min(E B) (1 - |det H(s)|^(1/q)) / s                                           at each s > 0
 /// ```
 ///
-/// The larger the sum of Re `v_i`, the larger the second bound, whose least value for a sum has as many `v_i` at the
-/// ends of their range as possible. So min(first at a sum, second at this sum) is a bound for each sum below zeta;
-/// the best sum is searched.
+/// The second bound grows with the sum of Re `v_i`; for a given sum it is least when as many `v_i` as possible are at
+/// the ends of their range. The first bound falls as the sum grows to zeta. So for each sum below zeta the smaller of
+/// the two holds for every L; the sum is chosen for which it is largest.
 ///
-/// Returns the largest of these bounds, less 1e-6 for rounding errors; None if none is above 0, if E B has no
-/// inverse, or if D is not 0. For a plant with slow zeros beside the disc the bounds may be far below the least norm.
+/// Returns the largest of these bounds, lowered by 1e-6 of itself for rounding errors; None if none is above 0, if E B
+/// has no inverse, or if D is not 0. For a plant with slow zeros beside the disc it may be far below the least norm.
 /// Source: the derivation above, which is our own.
 ///
 /// # Errors
@@ -95,7 +95,7 @@ pub fn disc_norm_lower_bound(
     Ok((bound > 0.0).then_some(bound))
 }
 
-/// The number of the eigenvalues s and the range of their Re(-1 / s); the upper end may be infinite.
+/// The number of eigenvalues s and the range of Re(-1 / s); the upper end may be infinite.
 struct InverseRange {
     count: f64,
     least: f64,
@@ -103,7 +103,7 @@ struct InverseRange {
 }
 
 impl InverseRange {
-    /// The logarithm of the largest product of 1 / (1 + a v) over all v with this sum.
+    /// The logarithm of the largest product of 1 / (1 + a v) for `count` numbers v of the range with the sum `sum`.
     fn largest_log(&self, sum: f64, a: f64) -> f64 {
         let free = (sum - self.count * self.least).max(0.0);
         let width = self.largest - self.least;
@@ -118,7 +118,7 @@ impl InverseRange {
     }
 }
 
-/// The bound by the trace at 0 and det H at points s > 0; `sizes`: the q singular values of E B.
+/// The bound from the trace at s = 0 and det H at points s > 0; `sizes`: the q singular values of E B.
 fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
     let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
     let inputs = as_number(sizes.len());
@@ -234,14 +234,14 @@ mod tests {
         }
     }
 
-    /// A fault that two measurements show, f itself and its integral: the first bound alone.
+    /// Two measurements show the fault f and its integral: only the bound from the determinant applies.
     #[test]
     fn with_more_measurements_than_faults_the_bound_is_that_of_the_determinant() {
         let a = matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]);
         let fault = [0.0, 1.0];
         let performance = without_noise(matrix(2, 1, &fault), matrix(1, 2, &fault), 2);
         let c = DMatrix::identity(2, 2);
-        // The farthest points are -5, and near the imaginary axis 1 + 5 e^(i 1.77).
+        // The points farthest from 0 are -5, and 1 + 5 e^(1.77 i) near the imaginary axis.
         for (center, radius) in [(-3.0, 2.0), (1.0, 5.0)] {
             let disc = Disc { center, radius };
             let bound = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();

@@ -1,16 +1,16 @@
-//! An early end of the searches of this thread.
+//! Early termination of the searches of a thread.
 
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Whether a search shall end now.
+/// A condition at which searches end.
 pub type Ending = Arc<dyn Fn() -> bool + Send + Sync>;
 
 thread_local! {
     static ENDING: RefCell<Option<Ending>> = const { RefCell::new(None) };
 }
 
-/// Restores the former condition when it is dropped, also by a panic.
+/// Restores the previous condition when dropped, also on a panic.
 struct RestoreGuard(Option<Ending>);
 
 impl Drop for RestoreGuard {
@@ -19,9 +19,9 @@ impl Drop for RestoreGuard {
     }
 }
 
-/// Runs `compute` and ends the programs and descents of this thread within it as soon as `ending` is true; None never
-/// ends them. What is not proven by then is [`super::Outcome::Inconclusive`]. A program that is interrupted goes on in
-/// a thread of its own until its present iteration ends.
+/// Runs `compute`, in which all semidefinite programs and descents of this thread end as soon as `ending` is true; None
+/// never ends them. What is not proven by then is [`super::Outcome::Inconclusive`]. An interrupted program continues in
+/// a separate thread until its current iteration ends.
 ///
 /// ```
 /// use control::lmi::{Outcome, Region, certify_region, until};
@@ -38,8 +38,8 @@ pub fn until<T>(ending: Option<Ending>, compute: impl FnOnce() -> T) -> T {
     compute()
 }
 
-/// Returns the condition of this thread, to set it by [`until`] in a thread that shares its work; None if there is
-/// none.
+/// Returns the condition that [`until`] has set in this thread, to set it in a thread that shares the work; None
+/// without a condition.
 #[must_use]
 pub fn ending() -> Option<Ending> {
     ENDING.with_borrow(Clone::clone)

@@ -22,21 +22,21 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// (sampled: gamma_low^2 = tr(E H_+ E') / tr(H_ww),  H_+ = [A, B] H [A, B]',  H_+ - H_xx >= 0)
 /// ```
 ///
-/// Such an H is the covariance of growing disturbances that the measurement does not show: every
+/// Such an H is the covariance of growing disturbances that the measurement does not show, for which every
 /// filter estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a smaller norm.
 /// For error dynamics A - L C the traces of H with the inequality of the norm (see [`super::certify_gain`]) give the
-/// bound for every L. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C: the error one sample
-/// after the last measurement counts. The largest bound is computed; it equals the least norm of any filter (strong
-/// duality), which gains in general only approach.
+/// bound for every L. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C.
+/// The largest bound is computed; it equals the least norm of any filter (strong duality). Constant gains in general
+/// only approach this norm.
 ///
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and
-/// bound are not used. None if D has not full row rank (a measurement without noise), if no filter exists, if
-/// no such disturbance reaches a state or E = 0, or if the inequalities could not be verified in double
-/// precision.
+/// bound are not used. None if D does not have full row rank (a measurement without noise), if there is no Kalman
+/// filter, if no hidden disturbance reaches a state or E = 0, or if the inequalities could not be verified in
+/// double precision.
 ///
-/// Method: w = -D' (D D')^-1 C x + N d with the null space N of D meets [C, D] H = 0. The
+/// Method: w = -D' (D D')^-1 C x + N d, N a basis of the null space of D, meets [C, D] H = 0. The
 /// semidefinite program for the covariance of (x, d) is solved for the part of the states that d
-/// reaches, in coordinates in which the covariance of the Kalman filter is the identity, and verified by
+/// reaches, in coordinates in which the covariance of the Kalman filter is the identity. The result is verified by
 /// eigenvalues in the coordinates of that part.
 ///
 /// Source: dual of the inequality of the H-infinity filter; V. Balakrishnan and L. Vandenberghe,
@@ -45,7 +45,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 ///
 /// # Example
 ///
-/// No filter for x' = w, y = x + v has an error of x below the energy of [w; v]:
+/// No filter for x' = w, y = x + v keeps the energy of the error of x below the energy of [w; v]:
 ///
 /// ```
 /// use control::Domain;
@@ -100,8 +100,8 @@ pub fn feedback_norm_lower_bound(
     observer_norm_lower_bound(&a.transpose(), &b.transpose(), &performance.transposed(), domain)
 }
 
-/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x, for the states
-/// that d reaches.
+/// The system under the disturbances w that keep y = 0: x' = A x + B d, z = E x, |w|^2 = |W x|^2 + |d|^2, for the
+/// states that d reaches.
 struct HiddenDisturbance {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -155,7 +155,7 @@ impl HiddenDisturbance {
         }))
     }
 
-    /// The root of the largest ratio of the energies of z and w; None if z has none, or the ratio could not be computed
+    /// The root of the largest ratio of the energies of z and w; None if z is zero, or the ratio could not be computed
     /// or verified.
     fn largest_ratio(&self) -> Result<Option<f64>, Error> {
         let (order, free) = self.b.shape();
@@ -219,7 +219,7 @@ impl HiddenDisturbance {
         }
     }
 
-    /// M of tr(M H) for the energies of z, in sampled time one sample later, and of w.
+    /// The matrices M for which tr(M H) is the energy of z (in sampled time at the next sample), and of w.
     fn energies(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, free) = self.b.shape();
         let whole = order + free;

@@ -11,9 +11,9 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 /// Relative distance of a zero from the stability limit below which no bound is stated.
 const ON_THE_LIMIT: f64 = 1e-7;
-/// Relative remainder of the unstable part of the zeros that is accepted.
+/// Largest accepted residual of A U = U S, relative to the norm of A.
 const REMAINDER: f64 = 1e-9;
-/// The part of a bound that is given up for rounding errors.
+/// Relative reduction of a bound that allows for rounding errors.
 pub(super) const ROUNDING: f64 = 1e-6;
 /// Steps of the iteration for the sign of a matrix, and the relative change that ends it.
 const STEPS: usize = 100;
@@ -27,15 +27,15 @@ const SETTLED: f64 = 1e-13;
 /// gamma_low^2 = largest eigenvalue of P_w^-1 P_z,  S' P_w + P_w S = W' W,  S' P_z + P_z S = (E X)' (E X)
 /// ```
 ///
-/// S has the invariant zeros in the right half plane: w = W e^(S t) v, from t = -infinity to 0, is a growing
-/// disturbance that y does not show, so that every estimate is 0. Its energy is v' `P_w` v, that of z is
-/// v' `P_z` v. No estimate from y, of any order, has an error with a smaller norm; for a single zero
-/// s it is |E x| / |w|, for several it is the condition of Nevanlinna and Pick. It is the least norm if w has as
-/// many entries as y. Without such zeros the bound is 0: ever larger gains lower the norm without end.
+/// The eigenvalues of S are the invariant zeros in the right half plane. w = W e^(S t) v, from t = -infinity to 0, is
+/// a growing disturbance that y does not show, so that every estimate is 0. The energy of w is v' `P_w` v, the energy
+/// of z is v' `P_z` v. So no estimate from y, of any order, has an error with a smaller norm. For a single zero
+/// s the bound is |E x| / |w|, for several it is the condition of Nevanlinna and Pick. It is the least norm if w has as
+/// many entries as y. Without such zeros the bound is 0: the norm tends to 0 as the gain grows.
 ///
 /// In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C. The zeros are those outside of the unit
-/// circle, the infinite ones included: they are delays from w to y, within which no estimate knows w. They
-/// become finite by z = (1 + s) / (1 - s), which keeps the norm.
+/// circle. Infinite zeros count too: they are delays from w to y, during which no estimate knows w. They
+/// become finite by the bilinear transform z = (1 + s) / (1 - s), which keeps the norm.
 ///
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and bound are
 /// not used. None if some w has no effect on y (with noise see [`super::observer_norm_lower_bound`]), if a zero is on
@@ -89,7 +89,7 @@ pub fn noiseless_norm_lower_bound(
                 return Ok(None);
             };
             let root = std::f64::consts::SQRT_2;
-            // z[k+1] from y[0] to y[k].
+            // z[k+1] = E A x[k] + E B w[k], estimated from y[0] to y[k].
             let (next, through) = (e * a, e * b);
             let from_w = &inverse * b;
             let system = StateSpace {
@@ -255,7 +255,7 @@ pub(super) mod tests {
         }
     }
 
-    /// The bound for noise of the measurement is proven by linear matrix inequalities; it falls towards that
+    /// The bound with measurement noise is proven by linear matrix inequalities; it falls towards the bound
     /// without noise.
     #[test]
     fn it_is_the_limit_of_the_bound_for_vanishing_noise() {
@@ -274,7 +274,7 @@ pub(super) mod tests {
         assert!(before < 1.05 * least, "{before} {least}");
     }
 
-    /// f[k+1] = f[k] + w[k], and y shows f `delay` samples later: the error contains the last 1 + `delay` w.
+    /// f[k+1] = f[k] + w[k], and y shows f `delay` samples later: the error contains the last 1 + `delay` values of w.
     fn delayed(delay: usize) -> f64 {
         let n = delay + 1;
         let mut a = DMatrix::zeros(n, n);

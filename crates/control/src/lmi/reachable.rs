@@ -14,10 +14,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// Factors of Q that are tried in turn until its inequalities hold by more than rounding errors.
 const ENLARGEMENTS: [f64; 5] = [1.0, 1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
-/// The part of the trace in the objective of [`common_reachable_set`].
+/// Weight of the trace of Q in the objective of [`common_reachable_set`].
 const REGULARISATION: f64 = 1e-6;
-/// Values of Q below this in the direction of an output, in coordinates of about one, are not large compared with
-/// [`MARGIN`]: then the program is solved in the coordinates in which the smallest Q of the mean matrix is the identity.
+/// If c Q c' / |c|^2 of an output c is below this in the solver's coordinates, it is not large compared with
+/// [`MARGIN`]. Then the program is solved in coordinates in which the smallest Q of the mean matrix is the identity.
 const WEAK: f64 = 1e-4;
 const NOT_PROVEN: &str = "no common ellipsoid could be proven in double precision";
 
@@ -42,8 +42,8 @@ impl ReachableSet {
     }
 }
 
-/// Computes an ellipsoid that contains all states that a family of systems reaches from rest under a
-/// disturbance of at most one, small in the direction of given outputs.
+/// Computes an ellipsoid, small in the directions of given outputs, that contains all states that a family of
+/// systems reaches from rest under a disturbance of at most one.
 ///
 /// ```text
 /// x' = A(t) x + b w(t), |w| <= 1, A(t) in the hull of A_1, A_2, ...;  Q > 0
@@ -54,9 +54,9 @@ impl ReachableSet {
 ///
 /// `matrices`: the vertices `A_i`, n x n; `disturbance`: b, n entries; `outputs`: C, r x n; `rate`: lambda in
 /// 1/s, above zero and below twice a decay rate that [`super::certify_common`] proves, otherwise no Q exists.
-/// Of all Q the one with the smallest sum of c Q c' over the rows c of C is computed, each relative to the
-/// same number for the mean matrix. The Q that is returned is verified in the units of the data; it is enlarged by up
-/// to 1e-3 of itself where rounding errors hide the inequalities.
+/// Of all Q the one with the smallest sum of c Q c' over the rows c of C is computed, each c Q c' relative to its
+/// value for the mean matrix. The returned Q is verified in the units of the data; it is enlarged by up
+/// to 1e-3 of itself if rounding errors hide the inequalities.
 ///
 /// If `rate` is too large for the mean matrix alone, the outcome is [`Outcome::Infeasible`] with the conflict "rate";
 /// if no common Q could be proven, [`Outcome::Inconclusive`].
@@ -115,7 +115,7 @@ fn is_weak(outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> bool {
 /// The search of [`common_reachable_set`].
 struct Search<'a> {
     matrices: &'a [DMatrix<f64>],
-    /// Their mean.
+    /// The mean of `matrices`.
     mean: DMatrix<f64>,
     outputs: &'a DMatrix<f64>,
     /// In the units of the data.
@@ -131,7 +131,7 @@ impl Search<'_> {
         (Reachability { b: b / size, rate: rate / coordinates.unit, domain: *domain }, size)
     }
 
-    /// The smallest proven Q, with the program solved in `coordinates`; None if there is none.
+    /// The smallest Q, with the program solved in `coordinates`; None if no Q is proven.
     fn smallest(&self, coordinates: &Coordinates) -> Result<Option<ReachableSet>, Error> {
         let (inequality, size) = self.scaled(coordinates);
         let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&self.mean))? else {
@@ -168,7 +168,7 @@ struct Reachability {
 }
 
 impl Reachability {
-    /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for it.
+    /// The smallest Q for one matrix, where the inequality is an equation; None if the rate is too large for that.
     fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
         let (n, part) = (a.nrows(), self.part());
         let (equation, shifted) = match self.domain {
@@ -184,7 +184,7 @@ impl Reachability {
         equation.solve(&shifted.transpose(), &spread).map(Some)
     }
 
-    /// 1 - exp(-lambda period); lambda in continuous time.
+    /// r = 1 - exp(-lambda period); in continuous time lambda.
     fn part(&self) -> f64 {
         match self.domain {
             Domain::Continuous => self.rate,

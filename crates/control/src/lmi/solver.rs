@@ -23,8 +23,8 @@ pub(super) enum End {
 }
 
 /// Minimises `objective`' x subject to every matrix being positive semidefinite. None if the
-/// problem is infeasible or unbounded, the solver failed, or the time of this thread is over. The result is not
-/// verified.
+/// problem is infeasible or unbounded, the solver failed, or the condition of [`limit::ending`] is true. The result is
+/// not verified.
 ///
 /// The solver receives the upper triangle of each matrix column by column, off-diagonal entries times sqrt(2).
 pub(super) fn minimise(
@@ -68,7 +68,7 @@ pub(super) fn minimise(
     }
 }
 
-/// A program in the form of the solver.
+/// A program in the form of Clarabel: minimise `costs`' x subject to `right` - `left` x in the product of `cones`.
 struct Program {
     left: CscMatrix<f64>,
     right: Vec<f64>,
@@ -80,13 +80,13 @@ struct Program {
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 impl Program {
-    /// Solves in a thread of its own and waits for it until `ending` is true: one iteration of a large program takes
-    /// minutes. The thread ends after that iteration. None if `ending` was true first, or there is no solution.
+    /// Solves in a separate thread and stops waiting when `ending` is true: one iteration of a large program takes
+    /// minutes. The thread ends after its current iteration. None if `ending` was true first, or without a solution.
     fn solve_until(self, ending: &Ending) -> Option<(DVector<f64>, End)> {
         let (sender, receiver) = channel();
         let solver_ending = Ending::clone(ending);
         let solve = move || drop(sender.send(self.solve(Some(solver_ending))));
-        // Without a thread there is no answer, as for a program that the solver refuses.
+        // None if no thread can be created.
         thread::Builder::new().name("inequalities".to_owned()).spawn(solve).ok()?;
         loop {
             match receiver.recv_timeout(POLL_INTERVAL) {
