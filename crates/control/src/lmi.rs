@@ -11,20 +11,20 @@
 //!   and keeps or minimises such a bound.
 //! * [`ChannelWeights::observer_gain`], [`ChannelWeights::state_feedback`]: the same with weights over frequency;
 //!   [`weight_of_table`]: the weight whose magnitude is nearest to a table.
-//! * [`observer_norm_lower_bound`], [`feedback_norm_lower_bound`]: the H-infinity norm below which no gain
-//!   and no filter of any order is.
+//! * [`observer_norm_lower_bound`], [`feedback_norm_lower_bound`]: lower bounds of the H-infinity norm that hold
+//!   for every gain and for filters of any order.
 //! * [`noiseless_norm_lower_bound`], [`disc_norm_lower_bound`]: the same for measurements without noise, and for
 //!   gains whose eigenvalues are in a disc.
 //! * [`certify_common`], [`common_feedback`]: prove that the eigenvalues of all members of a family are in a
 //!   region, with one P, and compute one gain for all of them.
 //! * [`certify_schedule`]: proves that a loop that depends on a scheduling variable is stable while
-//!   this variable changes at a bounded rate, with a P that depends on it, too.
+//!   this variable changes at a bounded rate; P depends on the variable, too.
 //! * [`constant_gain`]: the static gain whose worst error over a family of systems is least.
 //! * [`until`]: ends the searches of a thread early.
 //!
-//! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are
-//! about one. Its result is never trusted: a certificate is returned only if the eigenvalues of its
-//! inequalities, in the units of the data, are positive by more than the rounding errors.
+//! Problems are solved by an interior point method (Clarabel) in coordinates in which the entries of
+//! the data are about one. A certificate is returned only if the eigenvalues of its inequalities, in
+//! the units of the data, are positive by more than the rounding errors.
 
 mod affine;
 mod constant_gain;
@@ -74,11 +74,11 @@ use nalgebra::{DMatrix, DVector};
 pub enum Outcome<T, C = &'static str> {
     /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
-    /// No solution exists: eigenvalues show that each of these requirements is violated, or the solver has found that
-    /// they contradict each other, where each of them is necessary for the contradiction.
+    /// No solution exists: eigenvalues violate each requirement in `conflict`, or the solver has found that these
+    /// requirements contradict each other. Then each of them is necessary for the contradiction.
     Infeasible {
-        /// Their names, in the order in which they were stated; for a family the indices of its
-        /// members.
+        /// Names of requirements, in the order in which they were stated; for a family the indices of
+        /// its members.
         conflict: Vec<C>,
     },
     /// Neither a solution nor a contradiction was found in double precision, with the reason.
@@ -112,8 +112,8 @@ impl<T, C> Outcome<T, C> {
 pub struct Solution {
     /// One number per unknown.
     unknowns: DVector<f64>,
-    /// Smallest eigenvalue of each requirement with its name, if it has one, as given to
-    /// [`Problem::require`]; at least half of the required margin.
+    /// For each requirement the name given to [`Problem::require`], if any, and the smallest eigenvalue of its
+    /// matrix, which is at least half of the required margin.
     pub margins: Vec<(Option<&'static str>, f64)>,
 }
 

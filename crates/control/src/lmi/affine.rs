@@ -34,7 +34,7 @@ impl Affine {
         Self::constant(&DMatrix::from_diagonal_element(order, order, factor))
     }
 
-    /// Rows and columns.
+    /// The numbers of rows and columns.
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
         self.constant.shape()
@@ -62,7 +62,7 @@ impl Affine {
     ///
     /// # Panics
     ///
-    /// When the blocks of a row differ in height or the rows differ in length, and without a block.
+    /// When the blocks of a row differ in height, the rows differ in length, or there is no block.
     #[must_use]
     pub fn blocks(rows: &[&[&Self]]) -> Self {
         let height = rows.iter().map(|row| row[0].shape().0).sum();
@@ -93,7 +93,7 @@ impl Affine {
         self.terms.iter().fold(self.constant.clone(), |sum, (at, m)| sum + m * unknowns[*at])
     }
 
-    /// The largest entry of all the matrices.
+    /// The largest modulus of an entry of `M_0`, `M_1`, ...
     pub(super) fn largest_entry(&self) -> f64 {
         self.terms.values().fold(self.constant.amax(), |size, m| size.max(m.amax()))
     }

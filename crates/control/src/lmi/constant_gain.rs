@@ -8,7 +8,7 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 const ROUNDS: usize = 60;
-/// Relative width of the norms that are computed.
+/// Relative distance between the computed lower and upper bound of a norm.
 const NORM_WIDTH: f64 = 1e-6;
 /// A worst error of this part of the target is at the accuracy of the solver: no lower bound is near to it.
 const ATTAINED: f64 = 1e-6;
@@ -19,12 +19,12 @@ const ATTAINED: f64 = 1e-6;
 pub struct ConstantGain {
     /// The gain Q, s x r.
     pub gain: DMatrix<f64>,
-    /// H-infinity norm of Q `G_i` - M for each system.
+    /// H-infinity norm of Q `G_i` - M for each system `G_i`, M the target.
     pub norms: Vec<f64>,
     /// The largest of `norms`.
     pub worst: f64,
-    /// No gain has a smaller worst error: the minimum over the frequencies that were considered, up
-    /// to the accuracy of the solver.
+    /// A lower bound of the worst error of every gain, up to the accuracy of the solver: the minimum for
+    /// the frequencies that were evaluated.
     pub lower_bound: f64,
 }
 
@@ -36,13 +36,13 @@ pub struct ConstantGain {
 ///
 /// `family`: stable systems `G_i` with r outputs and m inputs each; `target`: M, s x m; `fixed`:
 /// entries (row, column, value) of Q that are given, counted from 0; `width`: relative distance of
-/// the worst error from its lower bound at which the iteration ends; below 1e-5 it counts as 1e-5. It
-/// also ends at a worst error of 1e-6 times the Frobenius norm of M, as of a target that a gain attains exactly.
+/// the worst error from its lower bound at which the iteration ends, at least 1e-5. It also ends at a worst error
+/// of 1e-6 times the Frobenius norm of M, as of a target that a gain attains exactly.
 ///
 /// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator
 /// for all systems of the family: its error is the response to commands and disturbances together
-/// with the error of the fault estimate. With `D_i` alone in place of `G_i` at sensor faults, fixed
-/// entries of Q make the response to faults exact.
+/// with the error of the fault estimate. If sensor faults act through `D_i` only, fixed entries of Q
+/// make the response to them exact.
 ///
 /// The problem is convex. Method: for a finite set of frequencies of each system the minimum is a
 /// semidefinite program, and a lower bound; the frequencies of the largest singular values of
@@ -54,7 +54,7 @@ pub struct ConstantGain {
 ///
 /// [`Error::Empty`] for a family without systems; [`Error::Shape`], [`Error::NotFinite`],
 /// [`Error::NotHurwitz`], [`Error::NotSchur`] for a bad system, target or entry;
-/// [`Error::OutOfRange`] for `width`; [`Error::NotConverged`] when the programs do not end.
+/// [`Error::OutOfRange`] for a `width` not above 0; [`Error::NotConverged`] when the programs do not end.
 pub fn constant_gain(
     family: &[StateSpace],
     target: &DMatrix<f64>,
@@ -131,7 +131,7 @@ fn minimum(
     r: usize,
 ) -> Option<(f64, DMatrix<f64>)> {
     let s = target.nrows();
-    // Entries of Q in units in which the rows of G have length one.
+    // Column j of Q is in units in which the longest row j of all G has length one.
     let length = |row: usize| points.iter().map(|g| g.row(row).norm()).fold(0.0, f64::max);
     let units: Vec<f64> =
         (0..r).map(|row| if length(row) > 0.0 { length(row) } else { 1.0 }).collect();

@@ -28,9 +28,9 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// Coordinates in which the norm of A - c I is little more than its spectral radius: in balanced
-    /// coordinates T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
-    /// eigenvalues, s 1.2 times the largest distance from it, at least 0.1 |c|, and the norm of A if
+    /// Coordinates in which the norm of A - c I is little more than its spectral radius. In balanced
+    /// coordinates T'T = P solves (A - c I)' P (A - c I) - `s^2` P = -`s^2` I. c is the mean of the
+    /// eigenvalues, s 1.2 times their largest distance from c, at least 0.1 |c|, or the norm of A if
     /// all eigenvalues are zero. The unit is near |c| + s. None if rounding errors hide that P > 0;
     /// [`Error::NotConverged`] when eigenvalues are not found.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
@@ -84,7 +84,7 @@ impl Coordinates {
     }
 
     /// Coordinates in which the matrix P~ = `p` of these coordinates becomes the identity; None if
-    /// it is not positive definite.
+    /// `p` is not positive definite.
     pub(super) fn refined(&self, p: &DMatrix<f64>) -> Option<Self> {
         let root = p.clone().cholesky()?.l().transpose();
         let from = &self.from * inverse_of_upper(&root);
@@ -102,7 +102,7 @@ impl Coordinates {
         self.to.nrows()
     }
 
-    /// These coordinates with further states of the given sizes after the others.
+    /// These coordinates with further states of the given sizes at the end.
     pub(super) fn extended(&self, sizes: &DVector<f64>) -> Self {
         let (order, whole) = (self.order(), self.order() + sizes.len());
         let mut to = self.to.clone().resize(whole, whole, 0.0);
@@ -160,7 +160,7 @@ impl Coordinates {
     }
 }
 
-/// The unit of frequency of a program: 1 in sampled time.
+/// The unit of frequency of a program: `unit` in continuous time, 1 in sampled time.
 pub(super) fn time_unit(domain: Domain, unit: f64) -> f64 {
     if domain == Domain::Continuous { unit } else { 1.0 }
 }
@@ -184,8 +184,8 @@ fn spread(a: &DMatrix<f64>) -> Result<(f64, f64), Error> {
 
 /// The mean of the eigenvalues, and a power of two near the distance by which eigenvalues are moved.
 ///
-/// This is the distance from the mean eigenvalue of A to the target (the centre of the disc, else the limit of the
-/// decay rate, else the mean itself), at least the largest distance of an eigenvalue of A from the mean.
+/// The mean moves to the target: the centre of the disc, else the limit of the decay rate, else the mean itself. The
+/// distance is at least the largest distance of an eigenvalue of A from the mean.
 fn speed(a: &DMatrix<f64>, region: &Region, domain: Domain) -> Result<(f64, f64), Error> {
     let (mean, spread) = spread(a)?;
     let limit = |alpha: f64| match domain {

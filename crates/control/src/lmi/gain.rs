@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 /// verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
-/// A level below this, where B and C are about one, is not large compared with the margin of the inequalities: then the
-/// coordinates are refined, at most so many times.
+/// A level below `WEAK`, with B and C of about one, is not large compared with the margin of the inequalities. Then the
+/// coordinates are refined, up to `REFINEMENTS` times.
 const WEAK: f64 = 2e-3;
 const REFINEMENTS: usize = 3;
 
@@ -242,8 +242,8 @@ pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound
     }
 }
 
-/// [`certify_gain`] with the program solved in given coordinates, for a weak gain also in those in which its P is the
-/// identity.
+/// [`certify_gain`] with the program solved in given coordinates; if the level is below [`WEAK`], also in coordinates
+/// in which P is the identity.
 pub(super) fn certify_in(
     coordinates: Coordinates,
     system: &StateSpace,
@@ -267,7 +267,7 @@ pub(super) fn certify_in(
         }
         searches.push((next, (level, p)));
     }
-    // Rounding errors may hide the proof in coordinates that stretch the states by much.
+    // Rounding errors may hide the proof in strongly stretched coordinates.
     for (search, (smallest, p)) in searches.iter().rev() {
         if let Some(bound) = search.verified(*smallest, p)? {
             return Ok(Outcome::Optimal(bound));
@@ -331,7 +331,7 @@ impl<'a> BoundProblem<'a> {
 
     /// The bound at `level`; None if P does not prove it in the units of the data.
     ///
-    /// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms
+    /// P A and P B are sums `high` + `low`; the matrices of both parts are added after the large terms
     /// have cancelled. The constant blocks appear in the matrices of the low part too and are
     /// subtracted.
     fn verified(&self, level: f64, p: &DMatrix<f64>) -> Result<Option<GainBound>, Error> {

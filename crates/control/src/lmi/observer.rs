@@ -93,9 +93,9 @@ impl ObserverRequirements<'_> {
         }
     }
 
-    /// Returns the outcome; [`Outcome::Inconclusive`] in place of a conflict between parts of the region
-    /// that cannot be: when all states are observable and the parts have a real interval in common,
-    /// all eigenvalues can be assigned there.
+    /// Replaces an impossible conflict between parts of the region by [`Outcome::Inconclusive`]: if all
+    /// states are observable and the parts have a real interval in common, all eigenvalues can be
+    /// assigned there. Returns any other outcome unchanged.
     fn check_conflict(self, outcome: Outcome<Synthesis>) -> Result<Outcome<Synthesis>, Error> {
         if let Outcome::Infeasible { conflict } = &outcome
             && !conflict.contains(&"gain")
@@ -112,7 +112,7 @@ impl ObserverRequirements<'_> {
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,
     coordinates: Coordinates,
-    /// The coordinates of the states with those of the weights; None without weights.
+    /// The coordinates of plant states and weight states together; None without weights.
     extended: Option<Coordinates>,
     /// Units of the measurements: powers of two near the lengths of the rows of C in the
     /// coordinates.
@@ -134,8 +134,8 @@ impl Program {
         self
     }
 
-    /// Solves the program and returns L = P^-1 Z in the units of the data. The program is in `coordinates`, with
-    /// measurements in `units`.
+    /// Solves the program, which is in `coordinates` with measurements in `units`; returns L = P^-1 Z in the units of
+    /// the data.
     pub(super) fn solve(
         &self,
         coordinates: &Coordinates,
@@ -176,9 +176,9 @@ impl<'a> ObserverProgram<'a> {
 
     /// Computes a gain that meets the given bound.
     ///
-    /// Without a bound, the level is minimised: that of the norm, without a performance that of the norm of Z. Then
-    /// the gain with the largest margin of all inequalities is computed at a larger level; if that fails, the gain of
-    /// the smallest level is returned.
+    /// Without a bound, the level t of [`Self::program`] is minimised, which bounds the norm, or without a performance
+    /// the norm of Z. Then the gain with the largest margin of all inequalities is computed at a larger level; if that
+    /// fails, the gain of the smallest level is returned.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
         let solve = |program: &Program| program.solve(&self.coordinates, &self.units);

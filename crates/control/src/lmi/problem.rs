@@ -20,7 +20,7 @@ const UNDECIDED: f64 = 1e-7;
 /// ```
 ///
 /// Method: the interior point method of Clarabel (Goulart and Chen, 2024) on data in which the
-/// largest entry of each requirement is about one. Its result is accepted only if the eigenvalues
+/// largest entry of each requirement is about one. The result is accepted only if the eigenvalues
 /// of every `S_i`(x) show that at least half of the margin `m_i` is kept. Otherwise the largest t
 /// such that every `S_i`(x) - `m_i` I - t I is positive semidefinite is computed, which always
 /// exists. If t < 0 the requirements contradict each other. Requirements without which the others
@@ -154,7 +154,7 @@ impl Problem {
         self.objective = Some(objective.clone());
     }
 
-    /// A known number; for None an unknown that is minimised. Of one row and column.
+    /// The given number as a 1 x 1 matrix; for None a new unknown, which is minimised.
     pub(crate) fn level(&mut self, value: Option<f64>) -> Affine {
         if let Some(value) = value {
             return Affine::identity(1, value);
@@ -164,8 +164,8 @@ impl Problem {
         unknown
     }
 
-    /// Solves the program; without an objective, computes an x as far inside of all requirements as
-    /// possible, by at most the largest entry of each.
+    /// Solves the program; without an objective, computes the x with the largest margin in all
+    /// requirements, each margin at most about the largest entry of the requirement.
     ///
     /// # Errors
     ///

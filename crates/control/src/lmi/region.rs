@@ -60,7 +60,7 @@ enum Shape {
 }
 
 impl Region {
-    /// Checks that decay rate and radius are above zero, the centre is finite, and the sector is in its range, and in
+    /// Checks that decay rate and radius are above zero, the centre is finite, and a sector is in its range and in
     /// continuous time; otherwise [`Error::OutOfRange`].
     pub(super) fn check(&self, domain: Domain) -> Result<(), Error> {
         if let Some(decay) = self.decay {
@@ -181,8 +181,8 @@ impl Shape {
 /// P > 0 and, for each part of the region,
 /// Re s < -alpha:         A' P + P A + 2 alpha P < 0
 /// |s - c| < r:           [r P, P (A - c I); (A - c I)' P, r P] > 0
-/// |Im s| < tan(t) -Re s: [sin(t) (P A + A' P), cos(t) (P A - A' P);
-///                         cos(t) (A' P - P A), sin(t) (P A + A' P)] < 0
+/// |Im s| < tan(t) (-Re s): [sin(t) (P A + A' P), cos(t) (P A - A' P);
+///                           cos(t) (A' P - P A), sin(t) (P A + A' P)] < 0
 /// ```
 ///
 /// `a`: n x n. P exists if and only if the eigenvalues are in the region. Of all P <= I the one
@@ -232,7 +232,7 @@ pub fn certify_region(
     }
 }
 
-/// One P for all `vertices`, with the program solved in given coordinates.
+/// Computes one P for all `vertices`, with the program solved in given coordinates.
 pub(super) fn certify_in(
     coordinates: &Coordinates,
     vertices: &[DMatrix<f64>],

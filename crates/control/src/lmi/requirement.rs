@@ -15,7 +15,7 @@ pub struct Performance {
     /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a
     /// state feedback).
     pub feedthrough: DMatrix<f64>,
-    /// The norm.
+    /// The norm to bound.
     pub norm: Norm,
     /// The bound to keep; None for nearly the smallest one possible.
     pub gamma: Option<f64>,
@@ -25,7 +25,7 @@ pub struct Performance {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Synthesis {
-    /// The gain.
+    /// L of the observer, or K of the state feedback.
     pub gain: DMatrix<f64>,
     /// The proof that the eigenvalues are in the region.
     pub region: RegionCertificate,

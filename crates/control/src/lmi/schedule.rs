@@ -17,7 +17,7 @@ const BISECTIONS: usize = 3;
 
 /// A loop on an interval of its scheduling variable theta.
 ///
-/// The loop is a polynomial of t = (theta - `theta_1`) / length, which goes from 0 to 1:
+/// The loop is a polynomial of degree d in t = (theta - start) / length, which goes from 0 to 1:
 ///
 /// ```text
 /// A(t) = sum over j of C(d, j) t^j (1 - t)^(d - j) A_j
@@ -112,8 +112,8 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// proof holds between the grid points, too. It is sufficient, not necessary.
 ///
 /// Returns None if no P could be proven. The P of the solver is verified by the eigenvalues of all
-/// inequalities in the units of the data, with products that are computed in twice the precision, and in
-/// sampled time rounded then. Cost: that of a program with n (n + 1) / 2 unknowns for each grid point and,
+/// inequalities in the units of the data, with products that are computed in twice the precision and in
+/// sampled time then rounded. Cost: that of a program with n (n + 1) / 2 unknowns for each grid point and,
 /// for each interval, 4 (d + 2) inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
 ///
 /// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear
@@ -172,8 +172,8 @@ pub fn certify_schedule(
 /// [`certify_schedule`] proves, to 20 %; None if it proves none between an upper limit and 1/4096 of it.
 ///
 /// The limit is the length of the shortest interval; in continuous time this length times the largest
-/// modulus of the eigenvalues of the coefficients: a variable that passes the interval as fast as the
-/// fastest mode of the loop decays. Nothing above the limit is tried.
+/// modulus of the eigenvalues of the coefficients: theta then passes the interval as fast as the
+/// fastest mode of the loop decays. No change above the limit is tried.
 ///
 /// # Errors
 ///
@@ -235,7 +235,7 @@ fn inequalities(
         let right = (i + 1 < intervals.len()).then_some((i + 1, change));
         let left = i.checked_sub(1).map(|left| (left, -change));
         let moves = [(i, change), (i, -change)].into_iter().chain(right).chain(left);
-        // The degree of P A is that of A and 1 more.
+        // The degree of P A, one above the degree of A.
         let degree = a.len();
         for (interval, step) in moves {
             let difference = &slope(interval) * step;
@@ -253,7 +253,7 @@ fn inequalities(
     all
 }
 
-/// The Bernstein coefficient j of P A, of the degree of A and 1 more, with P linear between `p[0]` and `p[1]`.
+/// The Bernstein coefficient j of P A, whose degree is one above that of A, with P linear from `p[0]` to `p[1]`.
 fn product(
     p: &[Affine],
     a: &[DMatrix<f64>],
@@ -292,7 +292,7 @@ fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec
         let degree = a.len();
         let slope = (&p[i + 1] - &p[i]) * (rate / length * as_number(degree));
         for j in 0..=degree {
-            // (d + 1 - j) P_i A_j + j P_(i+1) A_(j-1) as one product: the copies of a term need no rounded factor.
+            // (d + 1 - j) P_i A_j + j P_(i+1) A_(j-1) as one product with repeated terms: a factor would round.
             let pair = |k: usize| if k < degree - j { (i, j) } else { (i + 1, j - 1) };
             let left = DMatrix::from_fn(n, n * degree, |row, k| p[pair(k / n).0][(row, k % n)]);
             let right = DMatrix::from_fn(n * degree, n, |k, col| a[pair(k / n).1][(k % n, col)]);

@@ -1,4 +1,4 @@
-//! Gains from inequalities.
+//! Observer and feedback gains from linear matrix inequalities.
 
 use super::gain::{GainBound, certify_gain};
 use super::observer::{Candidate, ObserverRequirements};
@@ -11,7 +11,7 @@ use std::slice::from_ref;
 
 const NOT_PROVEN: &str = "a gain was found, but the requirements could not be proven for it";
 
-/// An observer gain L: the eigenvalues of A - L C in a region, the gain from w to z bounded.
+/// Computes an observer gain L that places the eigenvalues of A - L C in a region and bounds the norm from w to z.
 ///
 /// ```text
 /// error dynamics x' = (A - L C) x + (B - L D_y) w, z = E x;  Z = P L
@@ -28,17 +28,17 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// possible. With a performance, one P for all inequalities is sufficient, not necessary. For a given bound
 /// the gain is as far inside of the inequalities as possible. Without one, the smallest bound is computed,
 /// and the gain is designed for a bound 5 % larger, as far inside as possible, because gains often grow
-/// without limit towards the smallest bound. When w does not act on the measurement, faster is always better:
-/// give a disc to limit the gain.
+/// without limit towards the smallest bound. If w does not act on the measurement, faster eigenvalues always lower
+/// the norm: give a disc to limit the gain.
 ///
 /// The program is solved in coordinates in which all states are equally observable at the speed
 /// that the region requires; if no gain is found, up to three times more in coordinates in which
-/// the most interior P becomes the identity. With a performance, P and Z are bounded by 1e6 there;
-/// a conflict that names "gain" means that none exists within this bound.
+/// the most interior P becomes the identity. With a performance, P and Z are bounded by 1e6 in these
+/// coordinates; a conflict that names "gain" means that no gain exists within these bounds.
 ///
-/// The region and the bound are then proven for A - L C itself, by [`certify_region`] and
-/// [`certify_gain`], each with a P of its own. Conflicts name the requirements "decay", "disc",
-/// "sector" ("stability" when no region is given) and "gain".
+/// Then [`certify_region`] and [`certify_gain`] prove region and bound for A - L C itself, each with a
+/// P of its own. Conflicts name the requirements "decay", "disc", "sector" ("stability" when no
+/// region is given) and "gain".
 ///
 /// Source: M. Chilali and P. Gahinet (1996, see [`certify_region`]), section IV, for the dual problem of state
 /// feedback; M. Chilali, P. Gahinet, P. Apkarian, Robust pole placement in LMI regions, IEEE Trans. Autom. Control 44
@@ -93,8 +93,8 @@ pub fn observer_gain(
     })
 }
 
-/// A state feedback K, u = K x: the eigenvalues of A + B K in a region, the gain from w to z
-/// bounded.
+/// Computes a state feedback u = K x that places the eigenvalues of A + B K in a region and bounds the norm from w to
+/// z.
 ///
 /// ```text
 /// x' = (A + B K) x + B_1 w, z = (C_1 + D_12 K) x
@@ -142,7 +142,7 @@ pub fn state_feedback(
     })
 }
 
-/// A bound to prove: that of `performance` for the closed loop from `input`, n x k, to `output`, r x n.
+/// The bound of `performance` to prove for the closed loop with B = `input`, n x k, and C = `output`, r x n.
 pub(super) struct Bound<'a> {
     performance: &'a Performance,
     input: DMatrix<f64>,

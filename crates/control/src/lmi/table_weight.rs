@@ -11,7 +11,7 @@ const BETWEEN: usize = 6;
 /// Width of the logarithm of the largest deviation at which the search ends, relative to that of a constant weight.
 const NARROW: f64 = 1e-3;
 /// Smallest value of the first and the last coefficient of the squared magnitude: magnitudes at frequency 0 and
-/// infinity are neither 0 nor infinite. For poles and zeros of second order at an end of four decades it is 1e-8.
+/// infinity are neither 0 nor infinite. Second-order poles and zeros at an end of four decades need 1e-8.
 const SMALLEST: f64 = 1e-10;
 /// Least damping ratio of poles and zeros.
 const DAMPING: f64 = 0.2;
@@ -29,17 +29,17 @@ pub struct TableWeight {
     pub deviation: f64,
 }
 
-/// Computes the weight of order 1 or 2 with the least largest deviation from a table of frequencies
-/// (rad/s, ascending) and magnitudes, in between straight lines of their logarithms.
+/// Computes the weight of order 1 or 2 whose largest deviation from a table is least. `table`: frequencies w (rad/s,
+/// ascending) and magnitudes m, with straight lines of their logarithms in between.
 ///
 /// ```text
 /// |W(j w)|^2 = N(w^2) / D(w^2),  minimise alpha:  m^2 / alpha <= N / D <= alpha m^2
 /// ```
 ///
 /// For a given alpha these are linear inequalities for the coefficients of N and D, and "N and D are positive
-/// with damping ratios of at least 0.2" is a linear matrix inequality; alpha is found by bisection, its
-/// logarithm to 0.1 % of that for a constant weight. So no other weight of this order with such damping is
-/// nearer by more. The inequalities hold at the frequencies of the table and five points between each two of
+/// with damping ratios of at least 0.2" is a linear matrix inequality. Bisection finds ln alpha to 0.1 % of its
+/// value for a constant weight; no other weight of this order with such damping is nearer by more than
+/// that. The inequalities hold at the frequencies of the table and five points between each two of
 /// them. Poles and zeros are the roots in the left half plane (spectral factorisation).
 ///
 /// Source: S. P. Wu, S. Boyd and L. Vandenberghe, FIR filter design via spectral factorization and convex
@@ -199,8 +199,7 @@ mod tests {
         }
     }
 
-    /// By symmetry the best first-order weight for a step from 1 to 4 at once in a table of three
-    /// points is between them.
+    /// A step from 1 to 4 within a factor of 2 of the frequency is too steep for a first-order weight.
     #[test]
     fn the_stated_deviation_is_that_of_the_weight() {
         let table = [(1.0, 1.0), (2.0, 4.0), (100.0, 4.0)];

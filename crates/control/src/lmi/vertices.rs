@@ -10,7 +10,7 @@ use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Bisections of [`largest_scaling`]: 1/128 of the family.
+/// Bisections of [`largest_scaling`], for an accuracy of 1/128.
 const BISECTIONS: u32 = 7;
 
 const NOT_PROVEN: &str = "a gain was found, but it could not be proven for all members";
@@ -35,7 +35,7 @@ pub struct CommonFeedback {
     pub certificate: RegionCertificate,
 }
 
-/// One P that proves for every `A_i` of a family that its eigenvalues are in a region.
+/// Computes one P that proves for every `A_i` of a family that its eigenvalues are in a region.
 ///
 /// ```text
 /// P > 0 and, for each i, the inequalities of certify_region with A = A_i
@@ -45,7 +45,7 @@ pub struct CommonFeedback {
 /// every matrix in the convex hull of the vertices. With P the function V = x' P x decreases along
 /// x' = A(t) x, or x+ = `A_k` x, while A varies in the hull with time in any way, arbitrarily fast:
 /// V(t) <= exp(-2 alpha t) V(0) for a decay rate alpha. For the disc and the sector P is a
-/// statement on each constant matrix of the hull. One P is sufficient, not necessary, for either.
+/// proof for each constant matrix of the hull only. One P is sufficient, not necessary.
 ///
 /// Of all P <= I the one farthest inside of all inequalities is computed, in the coordinates that
 /// suit the first vertex, then up to three times in those in which the most interior P is the
@@ -127,9 +127,9 @@ pub fn certify_common(
     contradiction(all, |members| decision(&coordinates, members).0)
 }
 
-/// The certificate of [`certify_common`], searched in the coordinates of the mean of the vertices and of the first one
-/// only, without a search for a contradiction. None if a vertex has an eigenvalue outside of the region, or if neither
-/// search succeeds, although a P may exist. There must be a vertex; the arguments are not checked.
+/// Searches the certificate of [`certify_common`] in the coordinates of the mean of the vertices and of the first one
+/// only, and no contradiction. None if a vertex has an eigenvalue outside of the region, or if neither search succeeds,
+/// although a P may exist. There must be a vertex; the arguments are not checked.
 pub(crate) fn find_common(
     vertices: &[DMatrix<f64>],
     region: &Region,
@@ -177,7 +177,7 @@ fn contradiction<T>(
     Ok(Outcome::Infeasible { conflict })
 }
 
-/// One state feedback u = K x that places the eigenvalues of all members of a family in a region.
+/// Computes one state feedback u = K x that places the eigenvalues of all members of a family in a region.
 ///
 /// ```text
 /// A_i + B_i K with P = X^-1, Y = K X:
@@ -320,8 +320,8 @@ struct CommonSearch<'a> {
 }
 
 impl CommonSearch<'_> {
-    /// One P for the closed loops, first in the coordinates of the gain, then as by [`certify_common`]; None if there
-    /// is none.
+    /// One P for the closed loops, searched in the coordinates of the gain, then as by [`certify_common`]; None if
+    /// neither search finds one.
     fn proof(
         &self,
         gain: &DMatrix<f64>,
@@ -334,8 +334,8 @@ impl CommonSearch<'_> {
         }
     }
 
-    /// Gains K, the preferred one first, with coordinates in which their P is the identity: the most
-    /// interior one for a norm of Z up to twice the smallest, and the one of the smallest norm.
+    /// Gains K, the preferred one first, with coordinates in which their P is the identity: the most interior
+    /// gain for a norm of Z up to twice the smallest, and the gain of the smallest norm of Z.
     fn candidates(
         &self,
         program: &Program,

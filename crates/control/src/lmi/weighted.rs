@@ -1,4 +1,4 @@
-//! Gains by a norm with weights that have states.
+//! Observer and feedback gains for an H-infinity norm with frequency-dependent weights.
 
 use super::descent::GainNorm;
 use super::observer::{Candidate, ObserverRequirements, WeightedDynamics};
@@ -10,7 +10,7 @@ use crate::riccati::kalman;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Largest factor between a proven bound and the norm at which the bound is stated.
+/// A proven bound is returned only if it is at most this factor above the norm.
 const LOOSE: f64 = 1.01;
 
 /// Of the gains with a norm up to this factor above the least one, the smallest gain is chosen.
@@ -51,8 +51,8 @@ impl ChannelWeights {
         }
     }
 
-    /// The pair (A, C) and the performance of the error dynamics with the states of the weights; a gain L
-    /// of the pair without weights is [L; 0] here.
+    /// The pair (A, C) and the performance of the error dynamics with the states of the weights. A gain L
+    /// for the original pair becomes [L; 0] for this pair.
     ///
     /// `a`: n x n; `c`: p x n; `performance`: as for [`super::observer_gain`].
     ///
@@ -92,22 +92,22 @@ impl ChannelWeights {
 
     /// An observer gain L as by [`super::observer_gain`], for an H-infinity norm with weights.
     ///
-    /// `performance`: as there, with [`super::Norm::HInfinity`].
+    /// `performance`: as for [`super::observer_gain`], with [`super::Norm::HInfinity`].
     ///
     /// The gain does not act on the states of the weights: the extended error dynamics have the gain
-    /// [L; 0], and the set of these gains with a norm below a bound is not convex. Up to three gains are
-    /// computed: one for the region alone and one for region and norm, by linear matrix inequalities (P =
-    /// diag(`P_1`, `P_2`), for which Z = `P_1` L makes the inequalities of the norm linear), and that of the
-    /// Kalman filter for disturbances of unit intensity, without its rows for the states of the weights. From
-    /// each of them the norm itself is lowered within the region, by its derivatives with respect to the
-    /// entries of L, as far as possible. Of the results with a norm up to 5 % above the least one, or below a
-    /// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum;
+    /// [L; 0], and the set of these gains with a norm below a bound is not convex. So descents start from up to
+    /// three gains. Linear matrix inequalities give one for the region alone and one for region and norm (with P =
+    /// diag(`P_1`, `P_2`), Z = `P_1` L makes the inequalities of the norm linear). The third is the Kalman gain
+    /// for disturbances of unit intensity, without its rows for the states of the weights. Each descent lowers
+    /// the norm within the region as far as possible, by its derivatives with respect to the entries of L.
+    /// Of the results with a norm up to 5 % above the least one, or below a given bound, the one with the
+    /// smallest Frobenius norm of L is chosen. It is a local minimum;
     /// [`super::observer_norm_lower_bound`] for [`Self::extend`] bounds the norm of the best observer.
     /// [`Outcome::Inconclusive`] if no result keeps the given bound.
     ///
-    /// The region is proven as in [`super::observer_gain`]. `bound` of the result is that of the weighted
+    /// The region is proven as in [`super::observer_gain`]. `bound` of the result is the bound of the weighted
     /// system, with P for the states of [`Self::around`], or None if it could not be proven to 1 %;
-    /// [`crate::response::h_infinity`] does not depend on it.
+    /// [`crate::response::h_infinity`] computes the norm in any case.
     ///
     /// # Errors
     ///
@@ -215,10 +215,10 @@ pub(super) fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
     whole
 }
 
-/// The first n rows of the gain of the Kalman filter; None if there is no such filter.
+/// The first n rows of the gain L of the Kalman filter; None if there is no such filter.
 ///
-/// The noises of states and measurements are correlated: S = B D', V = D D', L = `L_1` + S V^-1 with `L_1` of
-/// the filter for A - S V^-1 C and the intensity B B' - S V^-1 S'.
+/// The noises of states and measurements are correlated: S = B D', V = D D', L = `L_1` + S V^-1 with the gain
+/// `L_1` for A - S V^-1 C and the process noise intensity B B' - S V^-1 S'.
 fn kalman_gain(norm: &GainNorm<'_>, n: usize) -> Option<DMatrix<f64>> {
     let GainNorm { a, b, c, d, domain, .. } = *norm;
     let noise = symmetric_part(&(d * d.transpose()));
