@@ -13,7 +13,7 @@
 //! | changes of gain and phase in all channels at once | [`disk_margin`] |
 //! | changes of gain, phase and delay in one channel | [`channel_margins`] |
 //! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
-//! | several of these at one point of a loop | [`OpenedLoop`] |
+//! | several of these margins and peaks at one point of a loop | [`OpenedLoop`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
 //! | effect of measurement noise | [`noise_gains`] |
 //! | which of several loops has the lowest peaks of S | [`least_sensitive`] |
@@ -73,8 +73,8 @@ pub enum Point {
 
 /// The `plant` under a zero-order hold of its inputs, in samples of `period` seconds.
 ///
-/// A continuous plant is discretised; a sampled plant keeps A and B. With y = C x + D u a sample contains the
-/// command that was held until then: `y[k] = C x[k] + D v[k]`, `v[k+1] = u[k]`; the state is [x; v], D becomes zero.
+/// A continuous plant is discretised; a sampled plant keeps A and B. With y = C x + D u the output at a sample contains
+/// the previous command v: `y[k] = C x[k] + D v[k]`, `v[k+1] = u[k]`; the state is [x; v], D becomes zero.
 ///
 /// # Errors
 ///
@@ -105,7 +105,7 @@ fn with_previous_command(plant: StateSpace) -> StateSpace {
     }
 }
 
-/// The loop y = G u, u = K y of a plant G and a controller K, of which one is strictly proper.
+/// The loop y = G u, u = K y of a plant G and a controller K, at least one of them strictly proper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loop {
     plant: StateSpace,
@@ -145,7 +145,7 @@ impl Loop {
         &self.controller
     }
 
-    /// The dynamics of the states of plant and controller together.
+    /// The matrix A of the closed loop, with the states of plant and controller.
     #[must_use]
     pub fn dynamics(&self) -> DMatrix<f64> {
         let (plant, controller) = (&self.plant, &self.controller);

@@ -10,11 +10,11 @@ use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
 
-/// The largest gain up to which a limit is searched, as down to its reciprocal, and the number of gains at which
-/// stability is tested on each side.
+/// Gain limits are searched from 1 / `LARGEST_GAIN` to `LARGEST_GAIN`; stability is tested at `TESTED_GAINS` gains on
+/// each side of 1.
 const LARGEST_GAIN: f64 = 1e6;
 const TESTED_GAINS: u32 = 40;
-/// The same for loops with more than `LARGE` states.
+/// Number of tested gains on each side for loops with more than `LARGE` states.
 const TESTED_GAINS_IF_LARGE: u32 = 8;
 const LARGE: usize = 100;
 /// Where Im T changes its sign, L crosses the real axis if |Im L / Re L| is at most this; otherwise L has a pole there.
@@ -32,14 +32,14 @@ pub struct ChannelMargins {
     /// The frequency of `phase`, in rad per unit of time; zero if |L| is never 1.
     pub phase_frequency: f64,
     /// The delay, in the unit of time, below which the loop is stable; infinite if |L| is never 1. In sampled
-    /// time for delays of whole samples, of which longer ones may be stable, see [`super::delay_margin`].
+    /// time delays are whole samples, and longer ones may be stable, too, see [`super::delay_margin`].
     pub delay: f64,
 }
 
 /// Computes gain, phase and delay margin of the channel `channel` at `at`.
 ///
-/// With the other channels closed the loop transfer of the channel is L = T / S, T and S the
-/// diagonal entries. Gain limits are at real negative L, phase margins at |L| = 1. Method: changes
+/// With the other channels closed the loop transfer of the channel is L = T / S, with the diagonal
+/// entries of T and S. Gain limits are at real negative L, phase margins at |L| = 1. Method: changes
 /// of sign between 60 frequencies for each decade and the resonances of the closed and of the opened
 /// loop, up to frequencies where |T| is small, located by bisection; the gain limits are confirmed by
 /// the eigenvalues of the loop at 40 gains on each side, at 8 if the loop has more than 100 states. Two
@@ -105,7 +105,7 @@ fn modulus(t: Complex<f64>) -> f64 {
 /// `candidates`, or one that the tests find.
 fn gain_limits(system: &StateSpace, candidates: &[f64]) -> Result<[f64; 2], Error> {
     let StateSpace { a, b, c, domain, .. } = system;
-    // A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c gives the negative of the signal that returns.
+    // With T = c (s I - A)^-1 b of the channel, the loop with gain g has the dynamics A - (g - 1) b c.
     let family = RankOne::new(a, b, c);
     let instability =
         |gain: f64| Ok::<_, Error>(largest_excess(&family.eigenvalues(1.0 - gain)?, *domain));

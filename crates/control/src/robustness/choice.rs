@@ -15,20 +15,20 @@ const ACCEPTABLE: f64 = 1.02;
 
 /// Returns the index of the loop with the lowest peaks of S among loops with the same eigenvalues.
 ///
-/// The measure is `p_u^2 p_y` with the largest singular values `p_u` at the input and `p_y` at the output:
-/// relative changes of both count, those at the commands twice, because errors of actuators and
-/// delays of the computation act there. The first loop is preferred unless another is lower by over 10 %.
+/// The measure is `p_u^2 p_y` with the largest singular values of S, `p_u` at the input and `p_y` at the output.
+/// The peak at the input counts twice, because errors of actuators and delays of the computation act there.
+/// The first loop is preferred unless another is lower by over 10 %.
 ///
-/// `loops`: a first and a second list; an index counts through both. `references`: loops that other methods
-/// have for these eigenvalues. A loop is acceptable if each of its peaks is at most 2 % above the lowest one of
-/// the stable references: the measure alone could trade a peak far above theirs at one point for a lower one at
-/// the other. The loops of the second list are considered if none of the first list is acceptable. If no loop
-/// is acceptable, the result is the loop whose larger ratio to the lowest peaks is least; the lowest peaks at
-/// input and output need not be those of one reference. The result is 0 if the first list is empty, its first
-/// loop is not stable, or no loop can be compared.
+/// `loops`: a first and a second list; an index counts through both. `references`: loops of other methods with
+/// the same eigenvalues. A loop is acceptable if each of its peaks is at most 2 % above the lowest peak of the
+/// stable references at this point; the measure alone could trade a high peak at one point for a lower one at
+/// the other. The loops of the second list are considered if no loop of the first list is acceptable. If no loop
+/// is acceptable, the result is the loop for which the larger ratio of its peaks to the lowest ones is least; the
+/// lowest peaks at input and output may belong to different references. The result is 0 if the first list is
+/// empty, its first loop is not stable, or no loop can be compared.
 ///
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
-/// first loop. A resonance of S between two of them is possible only near an eigenvalue, and all loops have the
+/// first loop. A resonance of S between two frequencies is possible only near an eigenvalue, and all loops have the
 /// same eigenvalues. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
 /// p) for each frequency. A loop that is not stable, or whose response cannot be computed, is left out. The result is
 /// deterministic.
@@ -65,7 +65,7 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
     0
 }
 
-/// The largest singular values of S at the input and at the output over the frequencies.
+/// The peaks of S at the input and at the output over the frequencies.
 fn peaks(closed: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
     let (p, m) = closed.plant().d.shape();
     let d = DMatrix::identity(m + p, m + p);

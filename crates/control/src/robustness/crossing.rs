@@ -1,6 +1,6 @@
 //! The argument at which a function changes its sign.
 
-/// Relative width of the interval at the end.
+/// Relative width of the interval at which a search ends.
 const WIDTH: f64 = 1e-14;
 const STEPS: usize = 160;
 
@@ -12,9 +12,9 @@ pub(super) struct Evaluation {
 
 /// Narrows an interval in which a function changes its sign; returns its ends in the given order.
 ///
-/// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function
-/// need not be continuous. Method: regula falsi in the variant of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois);
-/// every third step bisects.
+/// `low`, `high`: the ends, with values of different signs; NaN counts as negative. The function need not be
+/// continuous. Method: regula falsi in the Illinois variant (M. Dowell and P. Jarratt, BIT 11, 1971); every third step
+/// bisects.
 pub(super) fn narrow<E>(
     mut low: Evaluation,
     mut high: Evaluation,
@@ -29,7 +29,7 @@ pub(super) fn narrow<E>(
             break;
         }
         let part = low.value / (low.value - high.value);
-        // A step away from both ends lets the interval close around the crossing.
+        // A least distance from both ends lets the interval close around the crossing.
         let edge = (0.5 * least / width.abs()).min(0.5);
         let finite = [low.value, high.value, part].iter().all(|value| value.is_finite());
         let inside = finite && step % 3 != 0;
@@ -48,8 +48,8 @@ pub(super) fn narrow<E>(
     Ok((low.at, high.at))
 }
 
-/// The argument up to which `instability` is negative from `start` on, tested at `points`; None if it is negative at
-/// all of them. At `start` it is taken as negative.
+/// The argument up to which `instability`, tested at `points`, is negative; None if it is negative at all of them. At
+/// `start` it is assumed to be negative.
 pub(super) fn stability_limit<E>(
     start: f64,
     points: impl IntoIterator<Item = f64>,

@@ -14,9 +14,9 @@ use std::f64::consts::{PI, TAU};
 
 /// Number of whole samples up to which the delay of a sampled loop is refined.
 const REFINED_SAMPLES: u32 = 20;
-/// Number of parts of a sample after which loops with a continuous plant are tested.
+/// Number of delays per sample at which loops with a continuous plant are tested.
 const PARTS: u32 = 4;
-/// Instability of a tested delay that is no rounding error of modes close to z = 1.
+/// Instability above which a tested delay is unstable; less may be a rounding error of modes close to z = 1.
 const CLEAR: f64 = 1e-6;
 /// The same, relative to the decay of the loop without a delay.
 const RELATIVE: f64 = 0.1;
@@ -32,11 +32,11 @@ const RELATIVE: f64 = 0.1;
 /// eigenvalues on 60 frequencies for each decade and at the resonances of the closed and of the opened loop, up to
 /// frequencies where T is small, located by bisection.
 ///
-/// In sampled time the loop bears every delay of whole samples up to the result, and may bear longer ones, since a
-/// modulus of 1 may ask for a part of a sample: [`sampled_delay_margin`] decides by eigenvalues. If an eigenvalue of L
-/// at z = -1 has a modulus above 1, the loop does not bear a delay of one sample: each sample of delay turns L by half
-/// a turn around -1, which adds an unstable eigenvalue of the loop. The result is then zero, unless the moduli give a
-/// limit below one sample.
+/// In sampled time the loop is stable for every delay of whole samples up to the result. It may be stable for longer
+/// ones, because the limit may be a fraction of a sample: [`sampled_delay_margin`] decides by eigenvalues. If an
+/// eigenvalue of L at z = -1 has a modulus above 1, the loop is unstable with a delay of one sample, because each
+/// sample of delay adds an encirclement of -1. The result is then zero, unless the moduli give a limit below one
+/// sample.
 ///
 /// # Errors
 ///
@@ -89,12 +89,12 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 /// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
 /// which the loop with the continuous plant becomes unstable.
 ///
-/// `plant`: continuous, or in the samples of the controller, for which the result is the largest number of whole
-/// samples at which the loop is stable; `controller`: sampled. Over an interval the plant receives first the command
-/// of the sample before, then the new one, so that every delay gives a sampled loop whose eigenvalues decide. Method:
-/// these eigenvalues for each quarter of a sample up to 20 samples, except for delays that [`delay_margin`] of the loop
-/// with the same part of a sample shows to be stable; then regula falsi below the first unstable one. Above 20 samples
-/// it is the result of [`delay_margin`].
+/// `plant`: continuous, or sampled at the period of the controller; then the result is the longest stable delay of
+/// whole samples. `controller`: sampled. Within a sample the plant first receives the previous command, then the new
+/// one, so that the loop with any delay is a sampled system. Method: eigenvalues of this system for each quarter of a
+/// sample up to 20 samples, except for delays that [`delay_margin`] of the loop with the same fraction of a sample
+/// shows to be stable; then regula falsi below the first unstable delay. Above 20 samples the result is that of
+/// [`delay_margin`].
 ///
 /// # Errors
 ///
@@ -132,7 +132,7 @@ pub(super) fn refine(
     };
     // A mode that decays slowly without a delay, such as a resonance, grows slowly with one.
     let clear = CLEAR.min(RELATIVE * value(0.0)?.abs());
-    // The first unstable one of the tested delays, and the delay up to which the sweeps show all of them to be stable.
+    // In samples: the first unstable tested delay, and the delay up to which sweeps show all tested ones to be stable.
     let (mut unstable, mut least) = (f64::INFINITY, f64::INFINITY);
     for part in (0..parts).map(|at| f64::from(at) * step) {
         let stable = if part > 0.0 {
@@ -155,7 +155,7 @@ pub(super) fn refine(
         return Ok(period * if parts > 1 { samples } else { samples.floor() });
     }
     let mut start = unstable - step;
-    // At the delays before, an unstable mode may grow more slowly than `clear`.
+    // At shorter delays an unstable mode may grow more slowly than `clear`.
     while start > least.max(0.0) && value(start)? > 0.0 {
         (start, unstable) = (start - step, start);
     }
@@ -168,8 +168,8 @@ pub(super) fn refine(
     Ok(period * narrow(start, end, value)?.0)
 }
 
-/// The largest of the delays of `part` of a sample, above 0 and below 1, and whole ones for which a sweep of
-/// frequencies shows that the loop is stable; minus infinity if the loop is unstable with the part alone.
+/// The longest delay, in samples, of `part` (above 0, below 1) and whole samples for which a sweep of frequencies shows
+/// that the loop is stable; minus infinity if the loop is unstable with the delay `part`.
 fn stable_delay(
     plant: &StateSpace,
     controller: &StateSpace,
@@ -191,8 +191,8 @@ fn stable_delay(
     }
 }
 
-/// Computes A and the effects of the last and of the new command over a sample, of which `part`, 0 to 1, has passed
-/// when the new one comes; for a plant in samples the part is 0.
+/// Computes, over a sample, A and the effects of the previous and of the new command, which arrives after the fraction
+/// `part` of the sample, 0 to 1; at a sampled plant it arrives at once.
 fn hold_late(plant: &StateSpace, period: f64, part: f64) -> Result<[DMatrix<f64>; 3], Error> {
     let (n, m) = plant.b.shape();
     let none = DMatrix::zeros(n, m);
@@ -210,8 +210,8 @@ fn hold_late(plant: &StateSpace, period: f64, part: f64) -> Result<[DMatrix<f64>
     Ok([a, old, new])
 }
 
-/// The loop whose commands are delayed by `samples` and a part of one, 0 to 1: its states are those of plant and
-/// controller and the last `samples` + 1 commands, the newest first.
+/// The dynamics of the loop whose commands are delayed by `samples` and a fraction `part` of one, 0 to 1. States: those
+/// of plant and controller and the last `samples` + 1 commands, the newest first.
 fn delayed(
     plant: &StateSpace,
     controller: &StateSpace,

@@ -28,8 +28,8 @@ pub struct DiskMargin {
 }
 
 impl DiskMargin {
-    /// The real factors of the disk: lowest and highest gain. From `alpha` = 2 on 0 and infinity, although a disk above
-    /// 2 also contains negative factors.
+    /// The lowest and the highest real factor of the disk. For `alpha` of 2 and above 0 and infinity, although a disk
+    /// above 2 also contains negative factors.
     #[must_use]
     pub fn gains(&self) -> [f64; 2] {
         let half = 0.5 * self.alpha;
@@ -40,7 +40,7 @@ impl DiskMargin {
         }
     }
 
-    /// The factors of modulus one: the largest angle in rad.
+    /// The phase margin in rad: the largest angle of a factor of modulus one.
     #[must_use]
     pub fn phase(&self) -> f64 {
         2.0 * (0.5 * self.alpha).atan()
@@ -54,11 +54,11 @@ impl DiskMargin {
 /// alpha = 1 / max over frequency of mu((S - T) / 2)
 /// ```
 ///
-/// mu is the structured singular value for a diagonal of complex numbers, of which its upper bound
-/// by diagonal scaling is used; it does not depend on the units of the channels, and is exact up to
-/// three of them. For one channel the maximum is an H-infinity norm. With several it is searched on
+/// mu is the structured singular value for a diagonal of complex numbers. In its place the upper bound
+/// by diagonal scaling is used, which does not depend on the units of the channels and is exact for up
+/// to three of them. For one channel the maximum is an H-infinity norm. With several it is searched on
 /// 60 frequencies for each decade and at the resonances, and refined; the gap between
-/// [`DiskMargin::alpha`] and [`DiskMargin::certified`] states what could have been missed.
+/// [`DiskMargin::alpha`] and [`DiskMargin::certified`] bounds what the search can have missed.
 ///
 /// Source: P. Seiler, A. Packard and P. Gahinet, An introduction to disk margins, IEEE Control
 /// Systems 40 (2020), (10) to (17).
@@ -148,7 +148,7 @@ struct Largest {
 }
 
 impl Largest {
-    /// Searches the frequencies of a [`Sweep`] and about the one with the largest value.
+    /// Searches the frequencies of a [`Sweep`], then between the neighbours of the best one.
     fn search(response: &KnownResponse) -> Result<Self, Error> {
         let (sweep, system) = (Sweep::new(response)?, &response.system);
         let scaling = DVector::zeros(system.d.nrows());
@@ -198,8 +198,8 @@ impl Largest {
         Ok(())
     }
 
-    /// Returns the bound at a frequency, and stores it if it is the largest. Its search ends as soon as it is at most
-    /// `enough`, as in [`scaled_norm_above`].
+    /// Returns the bound at a frequency, and stores it if it is the largest so far. The search for the scaling ends as
+    /// soon as the bound is at most `enough`, as in [`scaled_norm_above`].
     fn evaluate(
         &mut self,
         gain: &DMatrix<Complex<f64>>,

@@ -8,7 +8,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
-/// The largest singular value of S at a frequency, and its derivatives by the entries of the plant.
+/// The largest singular value of S at a frequency, and its derivatives with respect to the entries of the plant.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PeakDerivatives {
@@ -35,20 +35,20 @@ pub struct SensitivityPeak {
     pub scaled: bool,
 }
 
-/// Derivatives of the peak of S by each entry of the plant; the controller does not change.
+/// Computes the derivatives of the peak of S with respect to each entry of the plant; the controller does not change.
 ///
 /// ```text
 /// d sigma / d theta = Re(u* dS/d theta v),   S v = sigma u
 /// ```
 ///
-/// `plant`: in continuous time, or in the samples of the controller; `controller`: in continuous or sampled time. A
-/// continuous plant with a sampled controller is under a zero-order hold. At the peak the derivative of sigma with
-/// respect to the frequency is zero, so that a move of the peak has an effect of second order only. The derivative
-/// exists if the largest singular value is simple. For a sampled loop the derivatives with respect to A and B follow
-/// from those of the sampled plant by the adjoint of the derivative of the matrix exponential, L(M', G) for the
-/// gradient G. Cost: about that of three solutions of a complex system of the order of the loop. At an infinite
-/// frequency S = I, so that the value is 1 and only D has an effect, through the direct term of the controller; with
-/// several channels, all with the singular value 1, the derivatives are those for the first one.
+/// `plant`: in continuous time, or sampled at the period of the controller; `controller`: in continuous or sampled
+/// time. For a sampled controller a continuous plant is discretised with a zero-order hold. A move of the peak
+/// frequency has an effect of second order only, because the derivative of sigma with respect to it is zero. The
+/// derivative exists if the largest singular value is simple. The derivatives with respect to A and B of a discretised
+/// plant use the adjoint L(M', G) of the derivative of exp M, M = [A, B; 0, 0] times the period, for the gradient G.
+/// Cost: about that of three solutions of a complex system of the order of the loop. At an infinite frequency S = I:
+/// the value is 1, and only D has an effect, through the direct term of the controller; of several channels, all with
+/// the singular value 1, the first one is used.
 ///
 /// Source: derivative of a simple singular value, G. W. Stewart and J. Sun, Matrix perturbation
 /// theory (1990), section IV.2; Fréchet derivative of the exponential by a block matrix, N. J.
@@ -69,7 +69,7 @@ pub fn peak_derivatives(
         Domain::Continuous => plant.clone(),
         Domain::Sampled { period } => {
             let held = held_plant(plant, period)?;
-            // Entries of D that are zero would act on the previous command, too.
+            // Derivatives with respect to D need the previous command as a state, even for D = 0.
             if held.a.nrows() > n { held } else { with_previous_command(held) }
         }
     };
@@ -134,7 +134,7 @@ impl Loop {
         let left = (&weighted * &right) / Complex::from(value);
         let right = right.zip_map(&units, |entry, unit| entry / unit);
         let left = left.zip_map(&units, |entry, unit| entry * unit);
-        // u* times the effect on S of additions to x' and to y; x and u for the input v.
+        // u* times the effect on S of additions to x' and to y; states and commands for the input v.
         let on_states = left.adjoint() * y.view((from, 0), (count, n));
         let on_outputs = left.adjoint() * response.view((from, m), (count, p));
         let of_states = x.view((0, from), (n, count)) * &right;
@@ -163,8 +163,8 @@ fn through_hold(
     let square = |a: &DMatrix<f64>, b: &DMatrix<f64>| beside(a, b).resize_vertically(order, 0.0);
     let (both, gradient) = (square(&plant.a, &plant.b), square(&sampled.a, &sampled.b));
     let adjoint = both.transpose() * period;
-    // The derivative is linear in the gradient: with one of the size of the matrix the exponential needs no further
-    // squarings.
+    // The derivative is linear in the gradient. A gradient scaled to the size of the matrix needs no further squarings
+    // of the exponential.
     let size = gradient.amax();
     let unit = if size > 0.0 { adjoint.amax().max(f64::MIN_POSITIVE) / size } else { 1.0 };
     let zero = DMatrix::zeros(order, order);

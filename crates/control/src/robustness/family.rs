@@ -1,4 +1,4 @@
-//! The plants that a controller may meet, and their loops.
+//! Families of plants within tolerances, and their loops with a controller.
 
 use super::crossing::stability_limit;
 use super::{Loop, held_plant};
@@ -13,7 +13,7 @@ const FIRST: f64 = 1e-6;
 /// Below this multiple the tests are a factor of two apart.
 const SMALL: f64 = 0.05;
 
-/// The plants that a controller may meet: each parameter deviates by -1 to 1 of its tolerance.
+/// The plants that a controller may control: each parameter deviates by -1 to 1 of its tolerance.
 pub trait PlantFamily {
     /// The reason why a plant cannot be computed.
     type Error: From<Error>;
@@ -51,7 +51,7 @@ pub struct ToleranceCase {
     pub deviations: Vec<f64>,
 }
 
-/// The parts of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs in parallel.
+/// The steps of [`super::tolerance_test`], with its errors, for a caller that runs cases and climbs in parallel.
 pub struct ToleranceSearch<'a, F> {
     /// The plants.
     pub family: &'a F,

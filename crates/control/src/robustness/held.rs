@@ -20,8 +20,8 @@ const REACH: f64 = 0.5;
 /// J(2 h) = J(h) + (h / 2) A J(h)^2
 /// ```
 ///
-/// It consists of (14 + 2 s) products of nalgebra's fast kernels, whose last bits depend on the
-/// processor, s = log2(norm of A h) + 1; [`hold::zero_order_hold`] has the same bits everywhere.
+/// Cost: 14 + 2 s products, s = log2(norm of A h) + 1, by nalgebra's fast kernels. Their last bits depend
+/// on the processor; the bits of [`hold::zero_order_hold`] are the same everywhere.
 pub(super) fn mean(a: &Balance, h: f64) -> Result<DMatrix<f64>, Error> {
     let (n, norm) = (a.matrix.nrows(), a.matrix.norm());
     let mut doublings = 0;
@@ -64,7 +64,7 @@ pub(super) fn hold_inputs(
 mod tests {
     use super::*;
 
-    /// A chain of masses, lightly damped, and an unstable dense matrix: against the Pade approximant.
+    /// A chain of lightly damped masses and an unstable dense matrix, compared with the Padé approximant.
     #[test]
     fn large_matrices_have_the_exponential_of_the_pade_approximant() {
         let n = 50;

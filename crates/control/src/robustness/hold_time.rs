@@ -12,22 +12,22 @@ use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 use std::iter::successors;
 
-/// The search starts at this part of the shortest time constant and ends at `LONGEST` times the longest one.
+/// The longest hold is searched from `SHORTEST` times the shortest time constant to `LONGEST` times the longest one.
 const SHORTEST: f64 = 1e-9;
 const LONGEST: f64 = 100.0;
-/// Ratios of the times at which stability is tested: up to `SHORT` of the shortest time constant, where
-/// the hold hardly changes the loop, and above.
+/// Ratios of successive tested times: up to `SHORT` times the shortest time constant, where the hold hardly changes
+/// the loop, and above.
 const FACTORS: [f64; 2] = [8.0, 1.25];
 const SHORT: f64 = 1e-2;
 
 /// Computes the longest hold time of a continuous loop: plant and controller exchange their signals
 /// every h and hold them in between, as in co-simulation or with a discretised controller.
 ///
-/// Returns the h below which the loop is stable: zero if it diverges with a hold of 1e-9 of its
-/// shortest time constant already, infinite if it is stable at all tested h up to 100 times its longest one.
+/// Returns the h below which the loop is stable: zero if the loop is unstable already at 1e-9 of its shortest time
+/// constant, infinite if it is stable at all tested h up to 100 times its longest time constant.
 /// Method: stability at h in ratios of 1.25 (of 8 below 1e-2 of the shortest time constant), then regula
 /// falsi. The eigenvalues of (Phi - I) / h decide, Phi the dynamics from sample to sample; they are precise at a
-/// short h. An unstable interval between two steps is missed.
+/// short h. An unstable interval between two tested h is missed.
 ///
 /// # Errors
 ///
@@ -47,7 +47,7 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
             [&(&b_k * &plant.c), &a_k],
         );
         if plant.d.amax() > 0.0 {
-            // The previous commands are further states v: C x + D v contains the command that was held until then.
+            // The previous commands v are further states: y = C x + D v.
             let (n, m) = plant.b.shape();
             let of_held = stacked(&DMatrix::zeros(n, m), &(b_k * &plant.d));
             let of_states = beside(&DMatrix::zeros(m, n), &(&controller.c / h));
@@ -64,8 +64,8 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
     search(value, [SHORTEST / fastest, SHORT / fastest, LONGEST / slowest])
 }
 
-/// Computes the longest sample time at which the loop of the continuous `plant` and the sampled
-/// `controller` is stable, the matrices of the controller unchanged: the effect of a clock that is too slow.
+/// Computes the longest sample time at which the loop of the continuous `plant` and the sampled `controller` is
+/// stable. The matrices of the controller do not change: the effect of a clock that is too slow.
 ///
 /// The search starts at the period of the controller and ends at 1000 times the period. The result is zero if
 /// the loop is unstable at the period, and infinite if it is stable to the end. Method: stability at sample times
@@ -91,7 +91,7 @@ pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64
 }
 
 /// The first time between `from` and `to` at which the value is no longer negative; zero if it is not negative at
-/// `from`, infinite if it is negative at all tested times. Up to `short` the steps are long.
+/// `from`, infinite if it is negative at all tested times. Below `short` fewer times are tested.
 fn search(
     value: impl Fn(f64) -> Result<f64, Error>,
     [from, short, to]: [f64; 3],
@@ -110,7 +110,7 @@ fn search(
 mod tests {
     use super::*;
 
-    /// For a mode slower than 1e-306 the search ends above the range of double precision.
+    /// For a mode slower than 1e-306 the search would end above the range of double precision.
     #[test]
     fn a_search_ends_with_the_largest_double() {
         let value = |h: f64| Ok(if h.is_finite() { -1.0 } else { f64::NAN });

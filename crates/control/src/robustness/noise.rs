@@ -7,9 +7,9 @@ use nalgebra::DMatrix;
 /// Computes the root-mean-square value of each output under white noise at each input, p x m: H2 norms.
 ///
 /// In continuous time the noise has the spectral density 1 (a variance of one unit
-/// squared times the unit of time), in sampled time each sample has the variance 1. Independent
-/// noises add their squares. Method: a Lyapunov equation for each input, or for each output if these are
-/// fewer (the transposed system has the same norms), see [`energy`].
+/// squared times the unit of time), in sampled time each sample has the variance 1. The squares of
+/// independent noises add up. Method: a Lyapunov equation for each input, or for each output if there are
+/// fewer outputs (the transposed system has the same norms), see [`energy`].
 ///
 /// # Errors
 ///

@@ -11,8 +11,8 @@ use crate::{Error, StateSpace};
 /// A loop opened at one point, with its eigenvalues and the responses S and T on a sweep of frequencies.
 ///
 /// The two peaks are norms of S and T, with the errors of [`crate::response::h_infinity`]; each other method returns
-/// the value of the function of the same name, with its errors and panics. All share one sweep of 60 frequencies for
-/// each decade and the resonances, which needs 4 n^2 (1 + m) multiplications for each frequency.
+/// the value of the function of the same name, with its errors and panics. All methods share one sweep of 60
+/// frequencies for each decade and the resonances. It costs 4 n^2 (1 + m) multiplications for each frequency.
 pub struct OpenedLoop {
     sensitivity: KnownResponse,
     complementary: KnownResponse,

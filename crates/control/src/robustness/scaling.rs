@@ -26,12 +26,12 @@ pub struct ScaledPeak {
     pub certified: f64,
 }
 
-/// The least largest singular value of D M D^-1 over the positive diagonal matrices D: an upper
+/// Minimises the largest singular value of D M D^-1 over the positive diagonal matrices D: an upper
 /// bound of the structured singular value, equal to it up to three channels.
 ///
 /// Returns the bound and the logarithms of D. ln(bound) is a convex function of ln D with the
 /// gradient |u|^2 - |v|^2, u and v the singular vectors. Method: Osborne's balancing, then the
-/// ellipsoid method, whose lower bound ends it at a relative width of 1e-5.
+/// ellipsoid method until its lower bound is relatively within 1e-5.
 ///
 /// Source: J. C. Doyle, Analysis of feedback systems with structured uncertainties, IEE Proc. D 129
 /// (1982).
@@ -91,7 +91,7 @@ pub(super) fn balanced_norm(m: &DMatrix<Complex<f64>>) -> Result<f64, Error> {
     Ok(Scaled::new(m, &balancing_exponents(m))?.norm)
 }
 
-/// ln D, the last one 0, for about equal norms of rows and columns of D M D^-1 (Osborne 1960).
+/// The diagonal of ln D, its last entry 0, for about equal norms of rows and columns of D M D^-1 (Osborne 1960).
 fn balancing_exponents(m: &DMatrix<Complex<f64>>) -> DVector<f64> {
     let k = m.nrows();
     let mut exponents = DVector::<f64>::zeros(k);
@@ -136,8 +136,8 @@ impl Scaled {
     }
 }
 
-/// The largest singular value of M and its right singular vector, from the eigenvalues of M' M: precise
-/// for the largest one, and much faster than all singular values.
+/// The largest singular value of M and its right singular vector, from the eigenvalues of M* M: precise
+/// for the largest one, and much faster than a singular value decomposition.
 fn largest_singular(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<Complex<f64>>), Error> {
     let unit = m.iter().map(|entry| entry.re.abs().max(entry.im.abs())).fold(0.0, f64::max);
     if unit <= 0.0 {
@@ -156,8 +156,8 @@ fn largest_singular(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<Complex<f
 mod tests {
     use super::*;
 
-    /// For two channels the bound is the structured singular value: with equal moduli of the
-    /// products the closed form of a matrix with rank one, mu = |a1 b1| + |a2 b2|.
+    /// Up to three channels the bound is the structured singular value; for a matrix a b' of rank one
+    /// this is the sum of all |`a_i` `b_i`|.
     #[test]
     fn a_matrix_of_rank_one_has_the_sum_of_the_moduli_of_its_diagonal() {
         let (a, b) = ([1.0, 200.0, 0.03], [5.0, -0.002, 7.0]);
@@ -187,8 +187,8 @@ mod tests {
         assert!((scaled_norm_above(&m, 0.9 * least).unwrap().0 / least - 1.0).abs() < 2e-5);
     }
 
-    /// The structured singular value of a triangular matrix is its largest diagonal entry; D tends
-    /// to infinity, so that the bound reaches it up to the range of the search.
+    /// The structured singular value of a triangular matrix is its largest diagonal entry. The best D is
+    /// infinite; within the range of the search the bound comes close.
     #[test]
     fn coupling_in_one_direction_does_not_count() {
         let m = DMatrix::from_row_slice(2, 2, &[2.0, 100.0, 0.0, 1.0]).map(Complex::from);

@@ -9,29 +9,29 @@ use nalgebra::DMatrix;
 const STEPS: usize = 60;
 /// Relative difference of the speeds at which the search ends.
 const CLOSE: f64 = 1e-3;
-/// Range of the weight of the states, as powers of ten.
+/// Range of the weight of the states, as exponents of ten.
 const POWERS: [f64; 2] = [-12.0, 16.0];
 
 /// An end of the interval in which the weight is searched.
 struct End {
-    /// The weight as a power of ten.
+    /// The decimal logarithm of the weight.
     power: f64,
-    /// The logarithm of the speed relative to the required one; NaN if it is not known.
+    /// ln(speed / required speed); NaN if the speed is not known.
     excess: f64,
 }
 
-/// Computes the linear-quadratic regulator of the same speed as the feedback u = K x: its
-/// eigenvalues have the same sum of decay rates.
+/// Computes the linear-quadratic regulator of the same speed as the feedback u = K x: the
+/// eigenvalues of both closed loops have the same sum of decay rates.
 ///
 /// ```text
 /// trace(A + B K_lq) = trace(A + B K)               continuous
 /// det(A + B K_lq)   = det(A + B K) in modulus      sampled
 /// ```
 ///
-/// `a`: n x n; `b`: n x m; `gain`: K, m x n. The regulator weighs the states, in units that balance
-/// A, by q and the inputs, in units for which the columns of B in these coordinates have length one,
-/// by 1. The speed grows with q, which is found by regula falsi between logarithms of q and speed,
-/// with a bisection in every third step. Returns None if no q from 1e-12 to 1e16 gives this speed to 1e-3.
+/// `a`: n x n; `b`: n x m; `gain`: K, m x n. The weight of the states is q, in units that balance A; the
+/// weight of the inputs is 1, in units in which the columns of the balanced B have length one.
+/// The speed grows with q. Regula falsi between logarithms of q and speed, with a bisection in every
+/// third step, finds q. Returns None if no q from 1e-12 to 1e16 gives this speed to 1e-3.
 ///
 /// # Errors
 ///

@@ -36,7 +36,7 @@ pub struct StructuredBound {
     pub upper: f64,
     /// The frequency that determines the bound, in rad per unit of time.
     pub frequency: f64,
-    /// Number of intervals, each with its own scales, that cover the frequencies.
+    /// Number of intervals, each with its own D and G, that cover the frequencies.
     pub intervals: usize,
 }
 
@@ -48,19 +48,19 @@ pub struct StructuredBound {
 /// beta^2 D - M* D M - j (G M - M* G) > 0
 /// ```
 ///
-/// G acts on the real blocks; without it they would be bounded as complex ones. `blocks`: the structure, with as many
+/// G acts on the real blocks; without G they would be bounded as complex ones. `blocks`: the structure, with as many
 /// channels as M. `enough`: a bound that need not be improved, above zero. `ending`: called at each interval; the
-/// result is None if it returns true before the end.
+/// result is None if `ending` returns true before the end.
 ///
-/// D and G of one frequency hold up to the next imaginary eigenvalues of a Hamiltonian matrix on both sides; the
-/// frequencies outside these intervals are treated in the same way, with a bound that rises by 0.5 % where it is
-/// exceeded, until the intervals cover all frequencies. So `upper` is about 1 % above the largest of the least bounds;
-/// more where these need a G above 1000 times D and M, in loops with less than about 1 % of damping. The least bounds
+/// D and G of one frequency prove the bound up to the next imaginary eigenvalue of a Hamiltonian matrix on each side.
+/// Frequencies outside this interval are treated in the same way, with a bound that rises by 0.5 % where it is
+/// exceeded, until intervals cover all frequencies. So `upper` is about 1 % above the largest of the least bounds, or
+/// more if these need a G above 1000 times D and M, in loops with less than about 1 % of damping. The least bounds
 /// equal mu for up to three full blocks or one real one; otherwise mu may be smaller.
 ///
-/// Method for one frequency: method of centres with Newton's method. Cost, for r channels with v scales, 2 r if no
-/// real block is repeated, and n states: r^3 + v^3 in a Newton step, some hundred of them and 200 (2 n)^3 for each of
-/// some 1 to 100 intervals.
+/// Method for one frequency: method of centres with Newton's method. Cost for r channels, n states and v unknowns in D
+/// and G (2 r if no real block is repeated): 200 (2 n)^3 multiplications and some hundred Newton steps of r^3 + v^3
+/// for each of some 1 to 100 intervals.
 ///
 /// In sampled time z = (1 + s) / (1 - s) makes the system continuous.
 ///

@@ -6,9 +6,9 @@ use crate::response::{KnownResponse, resonances};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 
-/// The modulus of the eigenvalues of T at which a sweep ends: those of L are below 1 from 1/2 down.
+/// A sweep ends when the eigenvalues of T have moduli below this; below 1/2 the eigenvalues of L have moduli below 1.
 const SMALL: f64 = 0.25;
-/// Ratio of the frequencies above the grid, about 60 for each decade.
+/// Ratio of successive frequencies above the grid, about 60 for each decade.
 const STEP: f64 = 1.04;
 
 /// A frequency response on a grid that includes the resonances of the system.
@@ -21,14 +21,14 @@ pub(super) struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// At [`KnownResponse::frequencies`].
+    /// The sweep at [`KnownResponse::frequencies`].
     pub(super) fn new(response: &'a KnownResponse) -> Result<Self, Error> {
         Self::at(response, response.frequencies())
     }
 
-    /// The sweep of T = `complementary` for L = T (I - T)^-1: also at the frequencies of the poles of L, the
-    /// eigenvalues of A + B C, where L may have narrow peaks, and in continuous time up to a T for which the
-    /// eigenvalues of L are below 1.
+    /// The sweep of T = `complementary` for L = T (I - T)^-1. It includes the frequencies of the poles of L, the
+    /// eigenvalues of A + B C, where L may have narrow peaks. In continuous time it ends where the eigenvalues of L
+    /// have moduli below 1.
     pub(super) fn of_loop(complementary: &'a KnownResponse) -> Result<Self, Error> {
         let StateSpace { a, b, c, domain, .. } = &complementary.system;
         let mut frequencies = complementary.frequencies();

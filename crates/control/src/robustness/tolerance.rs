@@ -5,13 +5,13 @@ use super::worst_case::climb;
 use crate::{Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// A factor this near to 1 is the 1 of a structural row: a linearisation rounds it.
+/// An entry this near to 1 counts as the 1 of a structural row, because linearisations round.
 const ROUNDING: f64 = 1e-9;
 
 /// An entry of A, B, C or D.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlantEntry {
-    /// 0 to 3: A, B, C, D.
+    /// The matrix: 0 to 3 for A, B, C, D.
     pub matrix: usize,
     /// The row, from 0.
     pub row: usize,
@@ -29,7 +29,7 @@ pub struct Tolerances {
 }
 
 impl Tolerances {
-    /// The tolerances `relative` of A, B, C and D for all entries but zeros and those of structural rows.
+    /// The tolerances `relative` of A, B, C and D for all entries except zeros and entries of structural rows.
     ///
     /// A row is structural if its only entry other than 0 is 1 and the equation is a definition:
     ///
@@ -71,8 +71,8 @@ impl Tolerances {
     }
 }
 
-/// Whether the equation of `row` equates its left side to one state, which is not `excluded`: a single 1 in the row of
-/// `states` (A or C), zeros elsewhere and in that of `commands` (B or D).
+/// Whether the equation of `row` equates its left side to one state, which is not `excluded`: the row of `states` (A or
+/// C) has a single 1 and zeros, the row of `commands` (B or D) only zeros.
 fn is_signal(
     states: &DMatrix<f64>,
     commands: &DMatrix<f64>,
@@ -115,8 +115,8 @@ pub struct ToleranceTest {
 /// For a sampled controller each plant is discretised with its period. The deviations of the random
 /// cases are uniform in -1 to 1 and independent, drawn by the generator `SplitMix64` from `seed`. The
 /// worst case is searched among the vertices of the tolerances: from the nominal plant and from the
-/// worst random cases, in the directions that the derivatives of the eigenvalues state. It is a lower
-/// bound of what the tolerances can do: a stable loop may be unstable in a case that was not tried.
+/// worst random cases, along the derivatives of the eigenvalues. This is a test, not a proof: a stable
+/// loop may be unstable in a case that was not tried.
 ///
 /// # Errors
 ///

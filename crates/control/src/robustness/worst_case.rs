@@ -12,8 +12,8 @@ type Vector = DVector<Complex<f64>>;
 const ROUNDS: usize = 12;
 /// Number of eigenvalues whose directions are tried from each start.
 const MODES: usize = 6;
-/// After a trial that fails, the next one moves the number of parameters divided by this; with a controller of more
-/// than `LARGE` states divided by `FEWER_IF_LARGE`, as each trial costs the eigenvalues of the loop.
+/// After a failed trial the number of parameters to move is divided by `FEWER`; with a controller of more than `LARGE`
+/// states by `FEWER_IF_LARGE`, because each trial costs the eigenvalues of the loop.
 const FEWER: usize = 2;
 const FEWER_IF_LARGE: usize = 8;
 const LARGE: usize = 50;
@@ -133,9 +133,9 @@ fn gradients<F: PlantFamily>(
     Ok(slopes)
 }
 
-/// Left and right eigenvector (row and column) with the product one, by inverse iteration; None if the iteration fails
-/// or the product of the two at length one is exactly zero. For a defective eigenvalue that product is about `SHIFT`,
-/// and the left vector is large.
+/// Left and right eigenvector (row and column) with the product 1, by inverse iteration; None if the iteration fails
+/// or the product of the unit vectors is exactly zero. For a defective eigenvalue that product is about `SHIFT`, so
+/// that the left vector is large.
 fn eigenvectors(m: &DMatrix<f64>, mode: Complex<f64>) -> Option<(Vector, Vector)> {
     let n = m.nrows();
     let shift = mode + Complex::new(SHIFT, SHIFT) * mode.norm().max(m.amax() * f64::EPSILON);
