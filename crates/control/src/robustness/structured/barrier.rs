@@ -7,7 +7,7 @@ use crate::blocks::ComplexMatrix;
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 use std::iter::successors;
 
-/// The largest G, relative to D and M: a number whose angle to the real axis is below the inverse counts as real.
+/// The largest G, relative to D and M: a delta whose angle to the real axis is below 1 / `LARGEST_G` counts as real.
 const LARGEST_G: f64 = 1e3;
 const NEWTON_STEPS: usize = 40;
 /// The Newton decrement below which a point is near enough to the centre.
@@ -15,7 +15,7 @@ const NEAR: f64 = 0.3;
 const HALVINGS: usize = 20;
 const RIDGE: f64 = 1e-13;
 
-/// The scales of a matrix M, as coefficients of [`directions`].
+/// The barrier function of the scales of a matrix M; its variables are the coefficients of [`directions`].
 pub(super) struct Barrier<'a> {
     m: &'a ComplexMatrix,
     directions: Vec<Direction>,
@@ -68,7 +68,7 @@ impl<'a> Barrier<'a> {
         point
     }
 
-    /// The factors of [`form`], c D + G, c D - G and I - D, c the largest G; None unless all are above 0.
+    /// The Cholesky factors of [`form`], c D + G, c D - G and I - D, c the largest G; None unless all exist.
     fn factors(&self, at: &Point, bound: f64) -> Option<[ComplexMatrix; 4]> {
         let Point { d, g, .. } = at;
         if d.diagonal().iter().any(|x| x.re <= 0.0) {
@@ -85,7 +85,7 @@ impl<'a> Barrier<'a> {
         ])
     }
 
-    /// Minus the sum of the logarithms of the determinants.
+    /// The barrier: minus the sum of the logarithms of the determinants.
     fn value(factors: &[ComplexMatrix; 4]) -> f64 {
         let logarithm = |l: &ComplexMatrix| l.diagonal().iter().map(|x| x.re.ln()).sum::<f64>();
         -2.0 * factors.iter().map(logarithm).sum::<f64>()

@@ -72,7 +72,7 @@ pub(super) fn directions(blocks: &[Block]) -> Vec<Direction> {
     all
 }
 
-/// The logarithms of a diagonal scaling that commutes with the structure and for which rows and columns of D M D^-1
+/// The logarithms of a diagonal scaling D that commutes with the structure and for which rows and columns of D M D^-1
 /// have about equal norms (Osborne 1960).
 pub(super) fn balancing_exponents(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
     const ROUNDS: usize = 20;

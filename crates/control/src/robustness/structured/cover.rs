@@ -14,7 +14,7 @@ const PER_DECADE: u32 = 6;
 const RAISE: f64 = 5e-3;
 /// Relative width of an interval below which the bound is raised.
 const SHORT: f64 = 1e-3;
-/// Part of the slowest frequency below which scales for zero itself are searched.
+/// If the gap from zero ends below this fraction of the slowest frequency, scales for zero itself are searched.
 const NEAR_ZERO: f64 = 1e-4;
 const ROUNDS: usize = 3000;
 
@@ -35,7 +35,7 @@ pub(super) struct Cover<'a> {
 }
 
 impl<'a> Cover<'a> {
-    /// Nothing is covered yet; the bound is `enough`. `system`: in continuous time, stable.
+    /// Starts with the bound `enough` and no interval. `system`: in continuous time, stable.
     pub(super) fn new(
         system: &StateSpace,
         blocks: &'a [Block],

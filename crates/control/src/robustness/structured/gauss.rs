@@ -1,4 +1,4 @@
-//! The Gauss method, whose step for a plant whose entries vary is a linear fractional function of their deviations.
+//! The Gauss method. For a plant with varying entries its step is a linear fractional function of the deviations.
 
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
@@ -59,7 +59,7 @@ impl Gauss {
         let singular = Error::Overflow { what: "a step of the Gauss method" };
         let from_start = lu.solve(&from_start).ok_or(singular.clone())?;
         let from_w = lu.solve(&from_w).ok_or(singular)?;
-        // Stages xi + h (a x I) k, the end xi + h (b' x I) k.
+        // Stages xi + h (a x I) k, end xi + h (b' x I) k, with the derivatives k and the Kronecker product x.
         let inner = self.coefficients.kronecker(&identity) * time;
         let outer = self.weights.transpose().kronecker(&identity) * time;
         let read = each.kronecker(&right.transpose());

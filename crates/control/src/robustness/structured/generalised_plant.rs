@@ -36,7 +36,7 @@ impl GeneralisedPlant {
     }
 }
 
-/// The channels of all deviations: deviation i changes a matrix by `L_i R_i'`; all `L_i`, and `R_i`, side by side.
+/// The channels of all deviations: deviation i changes a matrix by `L_i R_i'`; `left` is all `L_i`, `right` all `R_i`.
 pub(super) struct Channels {
     pub(super) left: DMatrix<f64>,
     pub(super) right: DMatrix<f64>,
@@ -80,7 +80,7 @@ fn factors(p: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
                 *entry = 0.0;
             }
         });
-        // Both factors get the same share of the size, so that channels are of similar size.
+        // Both factors get equal norms, so that channels are of similar size.
         let share = (l.norm() / r.norm()).sqrt();
         left.push(l / share);
         right.push(r * share);

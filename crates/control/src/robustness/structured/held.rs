@@ -27,16 +27,16 @@ pub(super) struct HeldFamily<'a> {
     on_states: Channels,
     /// The changes of [C, D].
     on_outputs: Channels,
-    /// The sums of the sizes of the changes of [A, B; 0, 0].
+    /// The sum of the moduli of the changes of [A, B; 0, 0], entry by entry.
     size: DMatrix<f64>,
     /// The plant in sampled time.
     held: StateSpace,
-    /// The size of each state of the plant when the dynamics of the loop is balanced.
+    /// Units of the plant's states that balance the dynamics of the loop.
     units: DVector<f64>,
     states: usize,
 }
 
-/// The system M in feedback with the perturbation, and its blocks.
+/// The system M in feedback with the perturbation, and the blocks of the perturbation.
 pub(super) struct HeldLoop {
     pub(super) system: StateSpace,
     pub(super) blocks: Vec<Block>,
@@ -51,7 +51,7 @@ struct GaussError {
     stages: usize,
     fraction: f64,
     precise: bool,
-    /// Entry by entry for the states, relative to the fraction.
+    /// The bound of each entry in the rows of the states, divided by `fraction`.
     bound: DMatrix<f64>,
 }
 
@@ -87,7 +87,7 @@ impl<'a> HeldFamily<'a> {
     }
 
     /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which the error of
-    /// the Gauss method has a bound; None if there is none.
+    /// the Gauss method has a bound; None if there is no such fraction.
     pub(super) fn system(&self, assumed: f64) -> Result<Option<HeldLoop>, Error> {
         let Some(error) = self.error(assumed) else { return Ok(None) };
         let (n, inner) = (self.states, self.z.nrows());
@@ -95,14 +95,14 @@ impl<'a> HeldFamily<'a> {
         let Step { b, c, d } =
             Gauss::new(error.stages).step(&self.z, [left, right], self.period)?;
         let [error_input, error_output] = self.weights(&error)?;
-        // Channels: the stages of the changes of [A, B], the changes of [C, D], the error.
+        // Channels in this order: the stages of the changes of [A, B], the changes of [C, D], the error.
         let (staged, outputs) = (d.nrows(), self.on_outputs.left.ncols());
         let channels = staged + outputs + inner;
         let order = self.held.a.nrows();
         let mut b1 = DMatrix::zeros(order, channels);
         b1.view_mut((0, 0), (n, staged)).copy_from(&b.rows(0, n));
         b1.view_mut((0, staged + outputs), (n, n)).copy_from(&error_input);
-        // The states [x; v] of the held plant, and the command u of this sample, are parts of [x; u].
+        // [A, B] acts on [x; u], u the command of this sample, [C, D] on [x; v], v the previous command.
         let held = order.min(inner);
         let mut c1 = DMatrix::zeros(channels, order);
         let mut d12 = DMatrix::zeros(channels, inner - n);
@@ -133,7 +133,7 @@ impl<'a> HeldFamily<'a> {
     }
 
     /// The error of the Gauss method with the fewest stages that make it precise, or with the most stages that have a
-    /// bound. The fraction is `assumed`, halved until there is a bound; None if there is none above 1e-4.
+    /// bound. The fraction is `assumed`, halved until there is a bound; None if no fraction above 1e-4 has one.
     fn error(&self, assumed: f64) -> Option<GaussError> {
         let (x, y) = (self.z.abs() * self.period, &self.size * self.period);
         let mut fraction = assumed;
@@ -160,7 +160,7 @@ impl<'a> HeldFamily<'a> {
     }
 
     /// V and W such that every matrix within the bound of the error is V Delta W with a norm of Delta up to one: V from
-    /// the output of Delta to the states, W from [x; u] to its input.
+    /// the output of Delta to the states, W from [x; u] to the input of Delta.
     fn weights(&self, error: &GaussError) -> Result<[DMatrix<f64>; 2], Error> {
         let mut relative = error.bound.clone();
         for (mut row, unit) in relative.row_iter_mut().zip(&self.units) {

@@ -4,13 +4,13 @@ use crate::Error;
 use crate::blocks::ComplexMatrix;
 use nalgebra::{Complex, SymmetricEigen};
 
-/// A pivot below this part of its size in `scale` counts as not positive.
+/// A pivot counts as positive above this fraction of its entry in `scale`.
 const POSITIVE: f64 = 1e-13;
 const EIGEN_ITERATIONS: usize = 1000;
 
 /// L of H = L L*; None unless every pivot is above the rounding errors of a diagonal of the size `scale`.
 ///
-/// The Cholesky decomposition of nalgebra takes complex roots of negative pivots.
+/// The Cholesky decomposition of nalgebra does not fail: it takes complex roots of negative pivots.
 pub(super) fn factor(h: &ComplexMatrix, scale: &[f64]) -> Option<ComplexMatrix> {
     let n = h.nrows();
     let mut lower = ComplexMatrix::zeros(n, n);

@@ -40,10 +40,10 @@ impl Response {
     /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not hold there,
     /// or the Hamiltonian matrix does not exist.
     ///
-    /// F, see [`super::form::form`], is positive definite at `frequency` and singular at the imaginary eigenvalues
-    /// of a Hamiltonian matrix only, so that it is definite up to the first of them on each side. It need
-    /// not be decided which eigenvalues are imaginary: where F is positive definite at the imaginary part and
-    /// between it and the next one, the interval goes on.
+    /// F, see [`super::form::form`], is positive definite at `frequency` and singular only at the imaginary
+    /// eigenvalues of a Hamiltonian matrix, so that F is definite up to the first of them on each side. Which
+    /// eigenvalues are imaginary need not be decided: if F is positive definite at the imaginary part of an
+    /// eigenvalue and between this and the next one, the interval continues.
     pub(super) fn interval(
         &self,
         scales: &Scales,
@@ -61,7 +61,7 @@ impl Response {
         let above: Vec<f64> = places.iter().copied().filter(|place| *place > frequency).collect();
         let below: Vec<f64> =
             places.iter().rev().copied().filter(|place| *place <= frequency).collect();
-        // The first of `places` that is negative, or at or after which the scales do not hold; `last` is beyond all.
+        // The first of `places` that is negative, or at or after which the scales do not hold; `last` ends the search.
         let end = |places: &[f64], last: f64| {
             for (at, &place) in places.iter().enumerate() {
                 let middle = places.get(at + 1).map_or(last, |next| 0.5 * (place + next));
@@ -87,12 +87,12 @@ impl Response {
     /// Q = C' D C,  S = C' (D M_oo - j G),  W = (F at infinite frequency)^-1
     /// ```
     ///
-    /// None if F at infinite frequency is singular, or an entry is not finite.
+    /// `M_oo` is M at infinite frequency. None if F is singular there, or an entry is not finite.
     fn hamiltonian(&self, scales: &Scales) -> Option<ComplexMatrix> {
         let [a, b, c, direct] =
             [&self.system.a, &self.system.b, &self.system.c, &self.system.d].map(to_complex);
         let Scales { d, g, bound } = scales;
-        // The size of the scales is free: with one of about 1 / bound the blocks are of similar size.
+        // Scales may be multiplied by any number; a size of about 1 / bound gives blocks of similar size.
         let size = d.diagonal().iter().map(|x| x.re).fold(0.0, f64::max) * bound;
         let (d, g) = (d.unscale(size), g.unscale(size));
         let weight = super::form::form(&direct, &d, &g, *bound).try_inverse()?;

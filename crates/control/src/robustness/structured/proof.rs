@@ -11,9 +11,9 @@ use nalgebra::DMatrix;
 
 /// The largest number of channels of the perturbation, and of states of the loop.
 const LARGEST: usize = 100;
-/// The search ends at this part of the fraction for which the error of the Gauss method was bounded.
+/// The search ends if the proven fraction reaches this part of the fraction for which the Gauss error was bounded.
 const NEAR: f64 = 0.97;
-/// Otherwise the error is bounded again for the proven fraction times this.
+/// Otherwise the Gauss error is bounded again for the proven fraction times this.
 const FURTHER: f64 = 1.02;
 const ROUNDS: usize = 4;
 
@@ -56,16 +56,16 @@ pub enum Unproven {
 /// Proves that the loop of `controller` is stable for all plants of `family` within a fraction of the tolerances.
 ///
 /// Each deviation d adds d L R' to [A, B; C, D], so that the loop is M in feedback with the diagonal matrix of the
-/// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
+/// deviations. This is exact, also for products of B, C and the controller's D. The fraction is 1 /
+/// [`structured_bound`] of M.
 ///
-/// `most`: the largest fraction of interest, finite and above zero, for example one at which instability was found; no
-/// larger one is proven. `ending`: called at each interval; true ends the search. The inner result is the reason why
-/// nothing is proven.
+/// `most`: the largest fraction to prove, finite and above zero, for example one at which instability was found.
+/// `ending`: called at each interval; true ends the search. The inner error is the reason why nothing is proven.
 ///
-/// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that
-/// of the nominal plant plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
-/// channels for each, plus the change of the error of that method. This error is bounded entry by entry by its
-/// power series and is one more block, a full one; small for a sample time that is short beside the time constants.
+/// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h, h the
+/// sample time. It is the nominal exponential plus the change of a step of the Gauss method, linear fractional in the
+/// deviations with 1 to 3 channels each, plus the change of the error of that method. A power series bounds the error
+/// entry by entry; the error is one more, full block. It is small if h is short compared with the time constants.
 ///
 /// # Errors
 ///
@@ -94,7 +94,7 @@ pub fn proven_tolerance(
     }
 }
 
-/// A change of [A, B; C, D] of a sampled plant as the change of these matrices of `held`, its [`held_plant`].
+/// Converts a change of [A, B; C, D] of a sampled plant to the change of these matrices of `held`, its [`held_plant`].
 fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
     let (n, (p, m)) = (held.a.nrows(), held.d.shape());
     let states = change.nrows() - p;
@@ -172,7 +172,7 @@ impl PerturbedLoop<'_> {
         self.prove(&plant.with_controller(self.controller), &blocks, most, ending)
     }
 
-    /// The largest fraction for which the error of the Gauss method is as small as assumed.
+    /// The largest proven fraction up to the one for which the error of the Gauss method is bounded.
     fn sampled_fraction(
         &self,
         period: f64,

@@ -9,10 +9,10 @@ const NEGLIGIBLE: f64 = 1e-16;
 /// The relative increase of the bound that allows for rounding errors of the series.
 const ROUNDING: f64 = 1e-6;
 
-/// Bounds |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, E(Z) = e^Z - (its Padé approximation [k/k], k = `stages`).
+/// Bounds |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, E(Z) = e^Z - (its Padé approximation [s/s], s = `stages`).
 ///
-/// With E(x) = sum of c x^k from k = 2 `stages` + 1 on and X = |Z| it is the sum of |c| ((X + Y)^k - X^k). None if the
-/// series does not converge: the poles of the approximations have moduli of 2, 3.46 and 4.64.
+/// With E(x) = sum of `c_k` x^k, k from 2 s + 1 on, and X = |Z| the bound is the sum of |`c_k`| ((X + Y)^k - X^k). None
+/// if the series does not converge: the poles of the approximations have moduli of 2, 3.46 and 4.64.
 pub(super) fn remainder(x: &DMatrix<f64>, y: &DMatrix<f64>, stages: usize) -> Option<DMatrix<f64>> {
     let n = x.nrows();
     let both = x + y;
@@ -68,7 +68,7 @@ mod tests {
     use crate::robustness::structured::gauss::Gauss;
     use nalgebra::DVector;
 
-    /// The end of one step of the Gauss method is e^Z up to the error that the series bounds, for a changed Z too.
+    /// The end of a step of the Gauss method is e^Z up to an error; the bound holds for the change of this error.
     #[test]
     fn the_error_of_a_changed_step_is_within_its_bound() {
         let z = DMatrix::from_row_slice(3, 3, &[0.0, 0.7, 0.1, -0.9, -0.3, 0.4, 0.0, 0.0, 0.0]);
@@ -92,7 +92,7 @@ mod tests {
                 let error = (exact - &b * feedback).abs();
                 let within = error.zip_map(&bound, |error, bound| error <= bound + 1e-15);
                 assert!(within.iter().all(|within| *within), "{stages} {delta}: {error} {bound}");
-                // And not by a factor that makes the bound useless.
+                // The bound is not too large to be useful.
                 assert!(bound.amax() < 1e3 * error.amax().max(1e-12) || delta.abs() < 1.0);
             }
         }

@@ -7,7 +7,7 @@ use super::hermitian::{factor, forward, largest_eigenvalue, times};
 use crate::Error;
 use crate::blocks::ComplexMatrix;
 
-/// Part of the distance from the least bound of the present scales that a step leaves, so that the scales stay inside.
+/// Part of the distance from the least bound of the current scales that a step leaves, so that the scales stay inside.
 const DISTANCE: f64 = 0.1;
 const STEPS: usize = 60;
 /// Relative progress of a step below which the bound counts as the least one.
@@ -26,8 +26,8 @@ impl Scales {
     /// The scales of `m` for the bound `goal`, near their analytic centre; if there are none, those for the least
     /// bound that the method of centres reaches.
     ///
-    /// Each step moves the bound to near the least bound of the present scales, for which these are still inside, and
-    /// the scales to the centre for the new bound. Source: S. Boyd and L. El Ghaoui, Method of centers for minimizing
+    /// Each step lowers the bound to slightly above the least bound of the current scales, then moves the scales to
+    /// the centre for the new bound. Source: S. Boyd and L. El Ghaoui, Method of centers for minimizing
     /// generalized eigenvalues, Linear Algebra and its Applications 188 (1993).
     pub(super) fn search(m: &ComplexMatrix, blocks: &[Block], goal: f64) -> Result<Self, Error> {
         let exponents = balancing_exponents(m, blocks);
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
     use crate::check::as_number;
 
-    /// l r', complex.
+    /// A complex matrix l r' of rank one.
     fn of_rank_one(count: usize, seed: f64) -> ComplexMatrix {
         let entry = |at: usize, turn: f64| {
             let x = as_number(at) + seed;
