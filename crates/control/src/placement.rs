@@ -57,11 +57,11 @@ pub struct Quality {
     /// Condition number in the coordinates of A.
     pub condition: f64,
     /// Condition number in coordinates that balance A + B K for the eigenvectors of least condition
-    /// number, which hardly depends on the units of the states.
+    /// number. It hardly depends on the units of the states.
     pub balanced_condition: f64,
     /// Largest distance of an eigenvalue of A + B K from the requested one, relative to the modulus
     /// of the latter (to the largest modulus for a requested eigenvalue of zero, to the norm of A
-    /// if all are zero). In discrete time the same for A - I and the eigenvalues less one.
+    /// if all are zero). In discrete time A - I and the eigenvalues less one take their places.
     pub pole_error: f64,
 }
 
@@ -83,14 +83,14 @@ pub fn real_poles(poles: &[f64]) -> Vec<Complex<f64>> {
 /// 1. From several fixed starts, sweeps over the eigenvectors enlarge the determinant, as the
 ///    methods of Kautsky, Nichols and Van Dooren and of Tits and Yang do. The least condition number
 ///    and the least gain of the results, or up to 10 % less where step 2 reaches it, are references.
-/// 2. Up to 24 states a descent reduces the condition number itself. The result is returned if its
-///    condition number and gain are within 11 % of the references and its peak of S within 2 % of
-///    the third reference, the least one that descents find with condition number and gain within
-///    5 % of theirs.
+/// 2. For up to 24 states a descent reduces the condition number itself. The result is returned if
+///    its condition number and gain are within 11 % of the references and its peak of S within 2 %
+///    of a third reference: the least peak that descents find with condition number and gain within
+///    5 % of their references.
 /// 3. Otherwise descents minimise the largest of the three figures, each relative to its reference.
 ///
 /// On the systems of the tests each figure is at most 10 % above the better of scipy's two methods.
-/// For a loop with an observer [`alternatives`] returns more to choose from.
+/// [`alternatives`] returns more gains to choose from, for example for a loop with an observer.
 /// With dependent inputs K has the least norm, in units of the inputs for which the columns of B
 /// have length one. The result is deterministic.
 ///
@@ -159,8 +159,8 @@ pub fn place_balanced(
 /// The gain is computed as in [`place_balanced`], with the peak of S over the unit circle; only the
 /// tolerance differs. `poles`: n eigenvalues in the z plane, zero allowed, with the same rules.
 /// Tolerance: the distance of each eigenvalue from the requested p is at most 1e-2 |p - 1|, verified
-/// (p = 1: see [`Quality::pole_error`]). The decay of a slow eigenvalue is then accurate to 1e-2 of
-/// itself, a fast one to about 1e-2. The tolerance cannot be much smaller: k eigenvalues near zero
+/// (p = 1: see [`Quality::pole_error`]). So the decay rate of a slow eigenvalue is accurate to 1 % and a
+/// fast eigenvalue to about 1e-2. The tolerance cannot be much smaller: k eigenvalues near zero
 /// for each input move by the k-th root of a rounding error of A + B K, which hardly changes the
 /// samples.
 ///
@@ -202,7 +202,7 @@ pub(crate) enum Coordinates<'a> {
 /// Which placements are computed.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Extent {
-    /// The chosen one alone.
+    /// Only the chosen one.
     Chosen,
     /// The chosen one and alternatives to it.
     Alternatives,
@@ -326,7 +326,7 @@ impl Assignable {
         Ok(Self { a, b, basis, problem, units: units.clone() })
     }
 
-    /// The gain K for x of the given directions.
+    /// The gain K, in the coordinates x, for the given directions.
     fn gain(&self, directions: &[DVector<f64>]) -> Result<DMatrix<f64>, Error> {
         let gain = &self.basis * deflation::gain(&self.a, &self.b, &self.problem, directions)?;
         check::in_range("K", divide_columns(&gain, &self.units))

@@ -5,23 +5,23 @@ use crate::Error;
 use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
 
-/// The factor by which condition number and gain of a candidate for a pair may exceed the lower ones of
-/// the standard methods.
+/// The factor by which condition number and gain of a candidate for a pair of feedback and observer may exceed
+/// the lower ones of the standard methods.
 const NEAR: f64 = 1.09;
 
 /// Feedbacks that assign the same eigenvalues by different eigenvectors.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Alternatives {
-    /// The one that the placement chooses.
+    /// The result of [`super::place`], or of its variant.
     pub chosen: Placement,
     /// The other placements, the lowest peak of S first, at most 20, above 24 states at most 2. Condition number
     /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
     pub others: Vec<Placement>,
-    /// The results of two standard methods, up to 24 states, None if there is none: of method 0 of Kautsky, Nichols
-    /// and Van Dooren, which needs real eigenvalues, and of the method of Tits and Yang, each with start and end as
-    /// in scipy's `place_poles`. They are references for a choice, with figures that may be above those of the
-    /// others. With one independent input both are the chosen one.
+    /// The results, for up to 24 states, of two standard methods: first of method 0 of Kautsky, Nichols and Van
+    /// Dooren, which needs real eigenvalues, then of the method of Tits and Yang, each with start and end as in
+    /// scipy's `place_poles`. They are references for a choice; their figures may be above those of `others`.
+    /// With one independent input both are `chosen`. None for a method without a result.
     pub standard: [Option<Placement>; 2],
 }
 
@@ -35,8 +35,8 @@ impl Alternatives {
     /// of the standard methods that differ from the chosen one.
     ///
     /// Both lists have only placements whose condition number and gain are at most 9 % above the lower ones of the
-    /// standard methods, if there are such methods. If only the first list is empty, the second one takes its
-    /// place; if both are, the first list is that of all placements without the standard methods.
+    /// standard methods, if these have results. If only the first list is empty, the second one takes its
+    /// place; if both are empty, the first list has the chosen placement and all others.
     #[must_use]
     pub fn candidates(&self) -> [Vec<&Placement>; 2] {
         let figures = |placement: &Placement| {
@@ -83,9 +83,9 @@ impl Alternatives {
 
 /// Computes the gain of [`super::place`] and alternatives to it.
 ///
-/// The alternatives are what the search of [`super::place`] finds beside its result, and up to 24
-/// states what six further starts of its step 1 lead to. With one independent input there are none.
-/// Which of them is best depends on the loop that the gain is for: see
+/// The alternatives are further results of the search of [`super::place`] and, for up to 24 states, of
+/// six further starts of its step 1. With one independent input there are none.
+/// Which gain is best depends on the loop in which it is used: see
 /// [`crate::robustness::least_sensitive`].
 ///
 /// # Errors

@@ -9,8 +9,8 @@ use nalgebra::DVector;
 const ACCEPTABLE: Figures = [1.11, 1.11, 1.02];
 /// The same for condition number and gain of directions among which the least peak of S is searched.
 const LIMIT: f64 = 1.05;
-/// The references are below the figures of largest volume by this factor, where the candidates show
-/// that it is possible.
+/// A candidate with a figure below the least figure of largest volume lowers the reference, down to this fraction
+/// of that figure.
 const MARGIN: f64 = 0.9;
 /// Sharpness of the smooth maximum over the figures and of the smooth limits.
 const SHARPNESS: f64 = 40.0;
@@ -19,10 +19,10 @@ const PENALTY: f64 = 10.0;
 /// Relative decrease at which a descent ends.
 const TOLERANCE: f64 = 1e-3;
 
-/// The factor by which condition number and gain of an alternative may exceed the least ones of
+/// The factor by which condition number and gain of an alternative may exceed the least ones of directions of
 /// largest volume.
 const ALTERNATIVE: f64 = 1.09;
-/// Relative difference below which all figures of the same directions agree.
+/// Directions count as the same if all their figures agree to this relative difference.
 const SAME: f64 = 1e-4;
 /// Number of descents of the peak of S.
 const DESCENTS: usize = 5;
@@ -45,15 +45,15 @@ impl<'a> Search<'a> {
 
     /// Chooses directions.
     ///
-    /// `candidates`: those of least condition number, in the coordinates asked for and in those of A;
-    /// `widest`: those of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
-    /// Tits and Yang find. The references of condition number and gain are the least among `widest`, or
-    /// up to 10 % lower if a candidate is; that of S is the least peak that descents find with condition
-    /// number and gain within 5 % of their references, or as near as possible.
+    /// `candidates`: directions of least condition number, in the requested coordinates and in those of A;
+    /// `widest`: directions of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
+    /// Tits and Yang find. The references of condition number and gain are the least of `widest`, or
+    /// up to 10 % lower if a candidate is; the reference of S is the least peak that descents find with
+    /// condition number and gain within 5 % of their references, or as near as possible.
     ///
-    /// Returns None to keep the first candidate: if it is within 11 % in condition number and gain and within 2 % in
-    /// S, or if `widest` has no figures to refer to. Otherwise descents minimise a smooth maximum of the three relative
-    /// figures, and the directions of all searches whose largest relative figure is least are returned.
+    /// Returns None to keep the first candidate if its condition number and gain are within 11 % and its peak of S
+    /// within 2 % of the references, or if `widest` has no figures. Otherwise descents minimise a smooth maximum of the
+    /// three relative figures; returns the directions of all searches with the least largest relative figure.
     pub(crate) fn choose(
         &mut self,
         candidates: &[Directions],
@@ -101,8 +101,8 @@ impl<'a> Search<'a> {
         Ok(self.best(reference).cloned())
     }
 
-    /// Returns the directions of all searches, and those in `more`, which are of largest volume, that differ from
-    /// `chosen` and from each other, the lowest peak of S first.
+    /// Returns the directions of all searches, and of `more` (of largest volume), that differ from `chosen` and from
+    /// each other, the lowest peak of S first.
     ///
     /// Their condition number and gain are at most 9 % above the least ones of largest volume.
     pub(crate) fn others(
@@ -126,8 +126,8 @@ impl<'a> Search<'a> {
         Ok(self.results.into_iter().map(|(_, directions)| directions).collect())
     }
 
-    /// Adds directions; returns their least figures and the least logarithms of the smooth ones. Directions without
-    /// figures are left out.
+    /// Adds directions to the results; returns their least figures and the least logarithms of their smooth figures.
+    /// Directions without figures are left out.
     fn add(&mut self, all: &[Directions]) -> Result<(Figures, Figures), Error> {
         let (mut exact, mut smooth) = ([f64::INFINITY; COUNT], [f64::INFINITY; COUNT]);
         for directions in all {
@@ -182,8 +182,8 @@ fn ratio(figures: Figures, reference: Figures) -> f64 {
     figures.iter().zip(reference).map(|(figure, reference)| figure / reference).fold(0.0, f64::max)
 }
 
-/// ln(sum of e^(k x)) / k of the differences x from the reference, which is near the largest of them, and its partial
-/// derivatives.
+/// ln(sum of e^(k x)) / k of the differences x from the reference, which is near the largest of them, with
+/// k = `SHARPNESS`, and its partial derivatives.
 fn smooth_maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
     let excess: Figures = std::array::from_fn(|figure| figures[figure] - reference[figure]);
     let largest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -14,10 +14,10 @@ const DEPENDENT: f64 = 1e-14;
 /// Computes K such that A + B K has the requested eigenvalues, with eigenvectors as near to the
 /// chosen ones as rounding permits.
 ///
-/// K V = G alone loses as many digits of the eigenvalues as the condition number of V has. Here one
-/// eigenvalue, or pair, after the other is assigned in the part of the state space that is normal
-/// to the eigenvectors before it, so that in the orthonormal basis of these parts A + B K is block
-/// triangular to a few rounding errors of its norm: the deflation of Miminis and Paige, see [`super::place`].
+/// The solution of K V = G would lose as many digits of the eigenvalues as the condition number of V has.
+/// Instead, one eigenvalue or pair after the other is assigned in the part of the state space that is normal
+/// to the previous eigenvectors. In the orthonormal basis of these parts A + B K is block triangular to a few
+/// rounding errors of its norm. Source: deflation of Miminis and Paige, see [`super::place`].
 pub(crate) fn gain(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

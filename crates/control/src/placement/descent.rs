@@ -6,7 +6,7 @@ const ITERATIONS: usize = 300;
 const TRIALS: usize = 20;
 /// Fraction of the predicted decrease that a step must reach.
 const ENOUGH: f64 = 1e-4;
-/// Fraction of the slope that a step may leave.
+/// Largest fraction of the slope that may remain after a step.
 const FLATTER: f64 = 0.9;
 /// Relative rounding error of a value; within it a step is accepted if it reduces the slope.
 const NOISE: f64 = 1e-15;
@@ -25,7 +25,7 @@ struct Point {
 }
 
 /// Minimises a function from the starting point zero; returns the point and its value (infinite if
-/// the function is undefined at zero). `tolerance`: decrease in ten iterations at which it ends.
+/// the function is undefined at zero). It ends when ten iterations lower the value by less than `tolerance`.
 ///
 /// BFGS with a line search by bisection for the weak Wolfe conditions: Lewis and Overton (see [`super::place`]),
 /// algorithms 2.1, 2.6.

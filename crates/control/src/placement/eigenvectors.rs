@@ -8,20 +8,20 @@ use crate::check::as_number;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-/// Number of starts of the largest volume, and of those from which the condition number is minimised.
+/// Number of starts of the search for the largest volume, and of results from which the condition number is minimised.
 const STARTS: usize = 6;
 const DESCENTS: usize = 3;
 /// A later start is preferred only if it is better by more than rounding.
 const BETTER: f64 = 1.0 - 1e-5;
 const SWEEPS: usize = 20;
 const ROUNDS: usize = 5;
-/// Order up to which the condition number itself is minimised: each step is a singular value
+/// Order up to which the condition number itself is minimised, because each step costs a singular value
 /// decomposition by Jacobi rotations.
 pub(crate) const LARGEST_DESCENT: usize = 24;
 /// Decrease of ln(condition) at which the descent ends.
 const CONDITION_TOLERANCE: f64 = 1e-6;
 
-/// Directions w of length one, one for each eigenvalue or pair.
+/// Directions w of length one, one for each eigenvalue or pair, see [`AssignableSubspaces`].
 pub(crate) type Directions = Vec<DVector<f64>>;
 
 /// The directions of largest volume from each of several fixed starts.
@@ -64,7 +64,7 @@ pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(Svd::new(&eigenvectors.transpose())?.condition())
 }
 
-/// Quasi-random directions: the fractional parts of 1000 sqrt(k), another range of k for each start.
+/// Quasi-random directions: the fractional parts of 1000 sqrt(k), with a separate range of k for each start.
 fn start_directions(problem: &AssignableSubspaces, start: usize) -> Directions {
     let count = problem.scale.len() * problem.inputs();
     let mut seed = (2 + start * count..).map(|k| (1000.0 * as_number(k).sqrt()).fract() - 0.5);
@@ -79,9 +79,9 @@ fn start_directions(problem: &AssignableSubspaces, start: usize) -> Directions {
 /// Replaces each eigenvector, or pair, in turn by the one that spans the largest volume with the
 /// others, in 20 sweeps from a start; ends early if the eigenvectors become dependent.
 ///
-/// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
-/// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the
-/// others a volume in proportion to v1' (p q' - q p') v2 with two vectors p, q normal to them,
+/// For a real eigenvalue this is the normal of the plane that the others span, projected onto the
+/// subspace of the eigenvalue: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] and the
+/// others span a volume in proportion to v1' (p q' - q p') v2, p and q normal to the others. It is
 /// greatest at an eigenvector of a symmetric matrix: Tits and Yang. Sources: see [`super::place`].
 fn enlarge_volume(problem: &AssignableSubspaces, start: usize) -> Result<Directions, Error> {
     let mut directions = start_directions(problem, start);
@@ -165,7 +165,7 @@ pub(crate) fn descend(
     Ok(directions)
 }
 
-/// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
+/// ln(s1 / sn) of the singular values of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
 fn condition_slope(problem: &AssignableSubspaces, directions: &[DVector<f64>]) -> Option<Slope> {
     let v = Svd::new(&problem.eigenvectors(directions).transpose()).ok()?;
     let last = v.values.len() - 1;

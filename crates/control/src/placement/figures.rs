@@ -108,7 +108,7 @@ impl<'a> FeedbackLoop<'a> {
         Some(self.smooth_figures(&structure).map(|figure| figure.value))
     }
 
-    /// The objective that `weighting` makes of the values of [`Self::smooth`], and its gradients with respect to
+    /// The objective that `weighting` computes from the values of [`Self::smooth`], and its gradients with respect to
     /// V and to the responses of the problem; None where it is not finite or the eigenvectors are dependent.
     pub(crate) fn objective(
         &self,
@@ -194,7 +194,7 @@ impl<'a> FeedbackLoop<'a> {
             of_g += (&re * z.map(|entry| entry.re).transpose()
                 + &im * z.map(|entry| entry.im).transpose())
                 * share;
-            // The real part of (s I - M)^-H G' D, by the resolvent of M' for the conjugate of G' D.
+            // The real part of (s I - M)^-H G' D, D = `gradient`, by the resolvent of M' for the conjugate of G' D.
             let (re, im) = (&transposed * re, &transposed * im);
             let d = DMatrix::from_fn(n, m, |i, j| Complex::new(re[(i, j)], -im[(i, j)]));
             back += self.transposed_resolvent(point, &d).map(|entry| entry.re) * share;
@@ -203,7 +203,7 @@ impl<'a> FeedbackLoop<'a> {
         SmoothFigure { value: largest + total.ln() / EXPONENT, of_v, of_g }
     }
 
-    /// (s I - M')^-1 N: the rows of a pair change their roles.
+    /// (s I - M')^-1 N, by [`Self::resolvent`] with the rows of each pair exchanged.
     fn transposed_resolvent(&self, s: Complex<f64>, n: &ComplexMatrix) -> ComplexMatrix {
         let swapped = |m: &ComplexMatrix| {
             let mut m = m.clone();
@@ -241,8 +241,8 @@ impl Eigenstructure {
 }
 
 /// The logarithm of the Schatten norm of order 16, (trace (M M*)^8)^(1/16), and its gradient
-/// (M M*)^7 M / trace (M M*)^8. The norm is between the 2-norm and k^(1/16) times it, k the rank. For
-/// M = 0 it counts as the smallest positive number, with the gradient 0.
+/// (M M*)^7 M / trace (M M*)^8. The norm is between the 2-norm and k^(1/16) times the 2-norm, k the rank.
+/// For M = 0 the norm counts as the smallest positive number, with the gradient 0.
 fn schatten<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> (f64, DMatrix<T>) {
     if m.nrows() > m.ncols() {
         let (value, gradient) = schatten(&m.adjoint());

@@ -7,9 +7,9 @@ use nalgebra::{Complex, DMatrix};
 
 /// Largest relative error of an eigenvalue that is allowed.
 ///
-/// It is relative to the distance of the requested eigenvalue from the origin: 0, in sampled time 1, because 1 - z is
+/// The error is relative to the distance of the requested eigenvalue from 0, in sampled time from 1, because 1 - z is
 /// about -s times the sample time for slow eigenvalues. Rounding errors of A + B K move a cluster of k eigenvalues near
-/// zero by about their k-th root.
+/// zero by about the k-th root of these errors.
 const ALLOWED: f64 = 1e-2;
 
 impl PlacementProblem<'_> {
@@ -39,8 +39,8 @@ impl PlacementProblem<'_> {
         Ok(worst)
     }
 
-    /// For each requested eigenvalue its distance from the origin, 0 or in sampled time 1; for an eigenvalue
-    /// at the origin the largest of these distances, or if all are there the norm of A, in sampled time of A - I.
+    /// For each requested eigenvalue its distance from the origin, 0 or in sampled time 1. If this is zero: the largest
+    /// distance, or the norm of A (in sampled time of A - I) if all distances are zero.
     fn references(&self) -> Vec<f64> {
         let (a, origin) = (self.a, if self.sampled { 1.0 } else { 0.0 });
         let distances: Vec<f64> =

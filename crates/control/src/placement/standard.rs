@@ -11,8 +11,8 @@ use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 /// Sweeps over all eigenvectors, and the relative change of their determinant at which they end.
 const SWEEPS: usize = 30;
 const CHANGE: f64 = 1e-3;
-/// Relative and absolute difference of singular values that count as equal; entries below the latter
-/// count as zero.
+/// Relative and absolute difference of singular values that count as equal; entries up to `ZERO` count as
+/// zero.
 const EQUAL: f64 = 1e-5;
 const ZERO: f64 = 1e-8;
 const EIGEN_ITERATIONS: usize = 1000;
@@ -20,12 +20,12 @@ const EIGEN_ITERATIONS: usize = 1000;
 /// The directions of method 0 of Kautsky, Nichols and Van Dooren, and of the method of Tits and Yang.
 ///
 /// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues, otherwise it is None.
-/// Neither is computed above 24 states or with one input. With as many inputs as states both have the unit
+/// Both are None above 24 states or with one input. With as many inputs as states both give the unit
 /// vectors. A result that is not finite is None.
 ///
 /// Both methods enlarge the determinant of the eigenvectors of length one; the first changes one of them at a
-/// time, the second two. The result depends on the start. It is scipy's, for each eigenvalue the sum of the basis
-/// of its subspace from Householder reflections, so that the results are scipy's up to rounding. The error is
+/// time, the second two. The results are those of scipy up to rounding, because the start is the same: for each
+/// eigenvalue the sum of the basis vectors of its subspace, from Householder reflections. The error is
 /// [`Error::NotConverged`].
 ///
 /// Sources: see [`super::place`]; the start: scipy 1.17, `scipy.signal.place_poles`.
@@ -100,7 +100,7 @@ impl Iteration {
         start
     }
 
-    /// Improves pairs of columns in the given order, in at most 30 sweeps; the same column twice is a column alone.
+    /// Improves pairs of columns in the given order, in at most 30 sweeps; a pair (j, j) is column j alone.
     fn run(mut self, order: &[(usize, usize)]) -> Result<Self, Error> {
         let floor = f64::EPSILON.sqrt();
         for _ in 0..SWEEPS {
@@ -120,7 +120,7 @@ impl Iteration {
         Ok(self)
     }
 
-    /// Orthonormal columns normal to all vectors but those of the given columns.
+    /// Orthonormal columns normal to all vectors except the given columns.
     fn normals(&self, columns: &[usize]) -> DMatrix<f64> {
         let others = self.vectors.clone().remove_columns_at(columns);
         Reflections::new(others).last_columns(columns.len())

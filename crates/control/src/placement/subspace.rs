@@ -30,8 +30,8 @@ pub(crate) struct AssignableSubspaces {
 /// The eigenvectors that can be assigned to one eigenvalue or pair.
 pub(crate) struct AssignableSubspace {
     pub(crate) poles: PoleBlock,
-    /// X, its columns orthonormal in the given coordinates, times the root of the count: a w of
-    /// length one gives eigenvectors of length one.
+    /// X: orthonormal columns in the given coordinates, times the root of the number of eigenvalues, so that a w
+    /// of length one gives eigenvectors of length one.
     pub(crate) states: DMatrix<f64>,
     /// Y, in units of `response_scale`.
     pub(crate) responses: DMatrix<f64>,

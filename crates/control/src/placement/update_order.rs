@@ -4,7 +4,7 @@
 /// eigenvalues in ascending order and the others to conjugate pairs.
 ///
 /// Each real eigenvalue is combined with all other real ones; the conjugate pairs are repeated after each group of
-/// these combinations. A single real eigenvalue has the same column twice.
+/// these combinations. A single real eigenvalue gives (0, 0).
 ///
 /// Source: A. L. Tits and Y. Yang (see [`super::place`]), page 1442, as scipy reads it.
 pub(crate) fn update_order(reals: usize, n: usize) -> Vec<(usize, usize)> {
@@ -44,7 +44,7 @@ pub(crate) fn update_order(reals: usize, n: usize) -> Vec<(usize, usize)> {
 mod tests {
     use super::update_order;
 
-    /// Printed by the loop of scipy 1.17.
+    /// The expected orders are the output of scipy 1.17.
     #[test]
     fn the_order_is_that_of_scipy() {
         let with_a_pair = [
