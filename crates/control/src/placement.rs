@@ -221,7 +221,6 @@ pub(crate) struct PlacementProblem<'a> {
 }
 
 impl PlacementProblem<'_> {
-    /// Assigns the eigenvalues.
     fn place(&self, coordinates: &Coordinates<'_>) -> Result<Placement, Error> {
         Ok(self.alternatives(coordinates, Extent::Chosen)?.chosen)
     }

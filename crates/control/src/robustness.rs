@@ -169,7 +169,7 @@ impl Loop {
 
     /// The effects of signals that are added to the commands, and to the measurements, on the states of plant and
     /// controller: [B; `B_k` D] and [B `D_k`; `B_k`].
-    fn entries(&self) -> [DMatrix<f64>; 2] {
+    fn inputs(&self) -> [DMatrix<f64>; 2] {
         let (plant, controller) = (&self.plant, &self.controller);
         [
             stacked(&plant.b, &(&controller.b * &plant.d)),
@@ -183,7 +183,7 @@ impl Loop {
     pub fn system(&self) -> StateSpace {
         let (plant, controller) = (&self.plant, &self.controller);
         let ([to_commands, to_measurements], [commands, measurements]) =
-            (self.entries(), self.signals());
+            (self.inputs(), self.signals());
         let zeros = |size| DMatrix::zeros(size, size);
         let (p, m) = plant.d.shape();
         StateSpace {
@@ -213,7 +213,7 @@ impl Loop {
 
     /// S - I = -T.
     fn response(&self, at: Point) -> StateSpace {
-        let [b, c] = [self.entries(), self.signals()].map(|[input, output]| match at {
+        let [b, c] = [self.inputs(), self.signals()].map(|[input, output]| match at {
             Point::Input => input,
             Point::Output => output,
         });

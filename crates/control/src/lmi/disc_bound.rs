@@ -125,7 +125,7 @@ fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<
     let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();
     let by_trace = |sum: f64| (zeta - sum) / inverses;
     let by_points = |sum: f64| {
-        let at = |a: f64| {
+        let bound_at = |a: f64| {
             let of_zeros =
                 zeros.iter().fold(Complex::new(1.0, 0.0), |all, zero| all * (1.0 - a / zero));
             let log = of_zeros.re.max(0.0).ln() + eigenvalues.largest_log(sum, a);
@@ -133,7 +133,7 @@ fn by_zeros(eigenvalues: &InverseRange, zeros: &[Complex<f64>], sizes: &DVector<
         };
         let rate = 1.0 / eigenvalues.least.max(f64::MIN_POSITIVE);
         (-POINTS..=POINTS)
-            .map(|point| at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
+            .map(|point| bound_at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
             .fold(0.0, f64::max)
     };
     let [mut low, mut high] =

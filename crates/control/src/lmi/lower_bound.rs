@@ -182,9 +182,9 @@ impl HiddenDisturbance {
         problem.constrain(&(&Affine::identity(1, 1.0) - &product_trace(&covariance, &of_w)), 0.0);
         problem.minimise(&product_trace(&covariance, &(of_z * (-1.0 / size))));
         let Some((_, unknowns)) = problem.minimum() else { return Ok(None) };
-        let mut to = DMatrix::identity(order + free, order + free) * unit.sqrt();
-        to.view_mut((0, 0), (order, order)).copy_from(scale);
-        self.verified(&symmetric_part(&(&to * covariance.evaluate(&unknowns) * to.transpose())))
+        let mut map = DMatrix::identity(order + free, order + free) * unit.sqrt();
+        map.view_mut((0, 0), (order, order)).copy_from(scale);
+        self.verified(&symmetric_part(&(&map * covariance.evaluate(&unknowns) * map.transpose())))
     }
 
     /// The root of the ratio of the energies of z and w for a covariance of (x, d); None if its inequalities do not

@@ -89,11 +89,11 @@ pub fn common_reachable_set(
     coordinates.unit = time_unit(domain, coordinates.unit);
     let search = Search { matrices, mean, outputs, inequality: Reachability { b, rate, domain } };
     let (inequality, _) = search.scaled(&coordinates);
-    let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&search.mean))? else {
+    let Some(q_of_mean) = inequality.smallest(&coordinates.dynamics(&search.mean))? else {
         return Ok(Outcome::Infeasible { conflict: vec!["rate"] });
     };
-    let refined = if is_weak(&coordinates.output(outputs), &of_mean) {
-        let inverse = of_mean.cholesky().map(|factor| symmetric_part(&factor.inverse()));
+    let refined = if is_weak(&coordinates.output(outputs), &q_of_mean) {
+        let inverse = q_of_mean.cholesky().map(|factor| symmetric_part(&factor.inverse()));
         inverse.and_then(|p| coordinates.refined(&p))
     } else {
         None
@@ -108,8 +108,8 @@ pub fn common_reachable_set(
 }
 
 /// Whether Q in the direction of a row of `outputs` is not large compared with the margin of the inequalities.
-fn is_weak(outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> bool {
-    outputs.row_iter().any(|row| (row * of_mean * row.transpose())[0] < WEAK * row.norm_squared())
+fn is_weak(outputs: &DMatrix<f64>, q_of_mean: &DMatrix<f64>) -> bool {
+    outputs.row_iter().any(|row| (row * q_of_mean * row.transpose())[0] < WEAK * row.norm_squared())
 }
 
 /// The search of [`common_reachable_set`].
@@ -134,16 +134,16 @@ impl Search<'_> {
     /// The smallest Q, with the program solved in `coordinates`; None if no Q is proven.
     fn smallest(&self, coordinates: &Coordinates) -> Result<Option<ReachableSet>, Error> {
         let (inequality, size) = self.scaled(coordinates);
-        let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&self.mean))? else {
+        let Some(q_of_mean) = inequality.smallest(&coordinates.dynamics(&self.mean))? else {
             return Ok(None);
         };
         let mut problem = Problem::new();
-        let q = problem.symmetric(of_mean.nrows());
+        let q = problem.symmetric(q_of_mean.nrows());
         problem.constrain(&q, MARGIN);
         for a in self.matrices {
             problem.constrain(&inequality.matrix(&q, &coordinates.dynamics(a)), MARGIN);
         }
-        problem.minimise(&objective(&q, &coordinates.output(self.outputs), &of_mean));
+        problem.minimise(&objective(&q, &coordinates.output(self.outputs), &q_of_mean));
         let Outcome::Optimal(solution) = problem.solve()? else { return Ok(None) };
         let shape = coordinates.shape(&solution.value(&q)) * (size * size);
         for enlargement in ENLARGEMENTS {
@@ -216,13 +216,13 @@ impl Reachability {
     }
 }
 
-/// The sum of c Q c' over the rows c of `outputs`, each relative to its value for `of_mean`, and a little of
+/// The sum of c Q c' over the rows c of `outputs`, each relative to its value for `q_of_mean`, and a little of
 /// the trace of Q, which bounds the other directions.
-fn objective(q: &Affine, outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> Affine {
-    let n = of_mean.nrows();
-    let mut weight = DMatrix::from_diagonal_element(n, n, REGULARISATION / of_mean.trace());
+fn objective(q: &Affine, outputs: &DMatrix<f64>, q_of_mean: &DMatrix<f64>) -> Affine {
+    let n = q_of_mean.nrows();
+    let mut weight = DMatrix::from_diagonal_element(n, n, REGULARISATION / q_of_mean.trace());
     for row in outputs.row_iter() {
-        let size = (row * of_mean * row.transpose())[(0, 0)];
+        let size = (row * q_of_mean * row.transpose())[(0, 0)];
         if size > 0.0 {
             weight += row.tr_mul(&row) / size;
         }

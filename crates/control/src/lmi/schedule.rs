@@ -156,11 +156,11 @@ pub fn certify_schedule(
     }
     // In continuous time the unit of A~ is that of time, too.
     let scaled_change = change / coordinates.unit;
-    let claims = match domain {
+    let matrices = match domain {
         Domain::Continuous => decays(&scaled_intervals, &p, scaled_change),
         Domain::Sampled { .. } => inequalities(&scaled_intervals, &p, scaled_change, |p, a| p * a),
     };
-    for matrix in claims {
+    for matrix in matrices {
         problem.constrain(&matrix, MARGIN);
     }
     let Some(solution) = problem.solve()?.optimal() else { return Ok(None) };
@@ -310,7 +310,7 @@ fn verified(
     change: f64,
     domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
-    let claims = match domain {
+    let matrices = match domain {
         Domain::Continuous => accurate_decays(intervals, &p, change),
         Domain::Sampled { .. } => {
             let known: Vec<_> = p.iter().map(Affine::constant).collect();
@@ -322,7 +322,7 @@ fn verified(
         }
     };
     let mut smallest = f64::INFINITY;
-    for matrix in p.iter().chain(&claims) {
+    for matrix in p.iter().chain(&matrices) {
         smallest = smallest.min(margin(matrix)?);
     }
     Ok((smallest > 0.0).then_some(ScheduleCertificate { change, p, margin: smallest }))

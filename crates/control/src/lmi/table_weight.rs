@@ -115,10 +115,10 @@ fn coefficients(
             problem.constrain(coefficient, SMALLEST);
         }
         if let [b_0, b_1, b_2] = polynomial.as_slice() {
-            // b_1 >= -(2 - 4 zeta^2) sqrt(b_0 b_2): the matrix bounds b_1 - rest, which is at most b_1.
-            let rest = problem.scalar();
-            problem.constrain(&rest, 0.0);
-            let side = &(b_1 - &rest) * (0.5 / (1.0 - 2.0 * DAMPING * DAMPING));
+            // b_1 >= -(2 - 4 zeta^2) sqrt(b_0 b_2): the matrix bounds b_1 - slack, which is at most b_1.
+            let slack = problem.scalar();
+            problem.constrain(&slack, 0.0);
+            let side = &(b_1 - &slack) * (0.5 / (1.0 - 2.0 * DAMPING * DAMPING));
             problem.constrain(&Affine::blocks(&[&[b_0, &side], &[&side, b_2]]), 0.0);
         }
     }

@@ -133,14 +133,14 @@ pub(super) fn refine(
     // A mode that decays slowly without a delay, such as a resonance, grows slowly with one.
     let clear = CLEAR.min(RELATIVE * value(0.0)?.abs());
     // In samples: the first unstable tested delay, and the delay up to which sweeps show all tested ones to be stable.
-    let (mut unstable, mut least) = (f64::INFINITY, f64::INFINITY);
+    let (mut unstable, mut proven) = (f64::INFINITY, f64::INFINITY);
     for part in (0..parts).map(|at| f64::from(at) * step) {
         let stable = if part > 0.0 {
             stable_delay(plant, controller, period, part)?
         } else {
             (estimate / period).floor()
         };
-        least = least.min(stable);
+        proven = proven.min(stable);
         for delay in (0..=REFINED_SAMPLES).map(|samples| f64::from(samples) + part) {
             if delay >= unstable {
                 break;
@@ -156,7 +156,7 @@ pub(super) fn refine(
     }
     let mut start = unstable - step;
     // At shorter delays an unstable mode may grow more slowly than `clear`.
-    while start > least.max(0.0) && value(start)? > 0.0 {
+    while start > proven.max(0.0) && value(start)? > 0.0 {
         (start, unstable) = (start - step, start);
     }
     if parts == 1 {

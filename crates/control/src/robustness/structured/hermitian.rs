@@ -60,7 +60,6 @@ pub(super) fn times(a: &ComplexMatrix, b: &ComplexMatrix) -> ComplexMatrix {
     re.zip_map(&im, Complex::new)
 }
 
-/// The largest eigenvalue of a Hermitian matrix.
 pub(super) fn largest_eigenvalue(h: &ComplexMatrix) -> Result<f64, Error> {
     let h = (h + h.adjoint()).scale(0.5);
     let decomposition = SymmetricEigen::try_new(h, f64::EPSILON, EIGEN_ITERATIONS);
