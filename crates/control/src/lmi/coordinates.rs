@@ -119,7 +119,7 @@ impl Coordinates {
         Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }
     }
 
-    /// The coordinates x~ = `root` y, `inverse` the inverse of `root`, with x = S y and the diagonal S = `scale`.
+    /// The coordinates x~ = `root` y with x = S y, S the diagonal `scale`; `inverse` is the inverse of `root`.
     fn from_scaled(
         scale: &DVector<f64>,
         root: &DMatrix<f64>,

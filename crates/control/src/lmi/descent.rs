@@ -19,7 +19,7 @@ const FIRST: f64 = 0.1;
 /// Required decrease and curvature of a step (weak Wolfe conditions).
 const DECREASE: f64 = 1e-4;
 const CURVATURE: f64 = 0.5;
-/// Relative width of a norm.
+/// Relative distance between the computed lower and upper bound of a norm.
 const WIDTH: f64 = 1e-5;
 
 /// The error dynamics A - [L; 0] C, B - [L; 0] D, E with a gain on the first states.
@@ -65,13 +65,13 @@ impl GainNorm<'_> {
         Some((norm.upper, derivative))
     }
 
-    /// Lowers the norm from a gain that is stable and in the region. Returns the best gain when the time of this thread
-    /// is over, and `start` if its norm cannot be computed.
+    /// Lowers the norm from a gain that is stable and in the region. Ends early with the best gain so far when
+    /// [`limit::ending`] is true. Returns `start` if its norm cannot be computed.
     ///
-    /// Method: BFGS with a line search for the weak Wolfe conditions, which on functions that are not
-    /// smooth at their minimum converges in practice: A. S. Lewis and M. L. Overton, Nonsmooth optimization
-    /// via quasi-Newton methods, Math. Program. 141 (2013). The entries are scaled by the rows and columns
-    /// of the first gain.
+    /// Method: BFGS with a line search for the weak Wolfe conditions. It converges in practice also for functions
+    /// that are not smooth at their minimum: A. S. Lewis and M. L. Overton, Nonsmooth optimization
+    /// via quasi-Newton methods, Math. Program. 141 (2013). The entries are scaled by the norms of the rows and
+    /// columns of `start`.
     pub(super) fn descend(&self, start: &DMatrix<f64>) -> DMatrix<f64> {
         let (rows, cols) = start.shape();
         let size = start.norm().max(f64::MIN_POSITIVE);

@@ -201,7 +201,7 @@ mod tests {
         h_infinity(&strictly_proper(a, b, c, Domain::Continuous), 1e-4).unwrap().lower
     }
 
-    /// Random eigenvalues in a disc; the nearest norm is that of eigenvalues at the far end of the disc.
+    /// Random eigenvalues in a disc; the norm nearest to the bound is that of eigenvalues at the far end of the disc.
     #[test]
     fn no_gain_with_its_eigenvalues_in_the_disc_has_a_smaller_norm() {
         let (center, radius) = (-6.0, 4.0);
@@ -209,7 +209,7 @@ mod tests {
         cases.push(vec![1.0, 0.0, 0.999, 0.0]);
         // The near end -2, beside the zeros -2 and -3, and the far end -10.
         cases.push(vec![1.0, 1.0, 1.0, 0.0]);
-        // Beside zeros that are slow for the disc, -2 and -3, the bound is far below.
+        // With the zeros -2 and -3, slow beside the disc, the bound is far below the norms.
         for (numerator, gap) in
             [([1.0, 0.0, 0.0], 1.5), ([6.0, 5.0, 1.0], 5.0), ([1.0, -0.5, 0.0], 1.5)]
         {

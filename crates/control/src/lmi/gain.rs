@@ -9,7 +9,7 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Levels, relative to the smallest, that are tried in turn when the P of the smallest cannot be
+/// Levels, relative to the smallest, that are tried in turn when the P of the smallest level cannot be
 /// verified.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
@@ -24,8 +24,8 @@ const NO_P: &str = "no bound of the gain could be proven in double precision";
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Norm {
-    /// H-infinity: energy of the output over energy of the disturbance, the largest singular value
-    /// of the transfer matrix over all frequencies.
+    /// H-infinity: root of the energy of the output over the root of the energy of the disturbance, the
+    /// largest singular value of the transfer matrix over all frequencies.
     HInfinity,
     /// Generalised H2: peak of the Euclidean norm of the output over the root of the energy of the
     /// disturbance. In continuous time for D = 0 only.

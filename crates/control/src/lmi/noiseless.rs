@@ -40,15 +40,15 @@ const SETTLED: f64 = 1e-13;
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm and bound are
 /// not used. None if some w has no effect on y (with noise see [`super::observer_norm_lower_bound`]), if a zero is on
 /// the stability limit, if in sampled time an eigenvalue of A is -1, or if rounding errors hide the unstable zeros.
-/// The bound is lowered by 1e-6 for rounding errors; the remainder of the equation for X and S is at most 1e-9,
-/// relative.
+/// The bound is lowered by 1e-6 of itself for rounding errors; the relative residual of the equation for X and S is at
+/// most 1e-9.
 ///
 /// Source: the interpolation problem of Nevanlinna and Pick, as in B. A. Francis, A course in H-infinity control
 /// theory (1987); the form with S and Lyapunov equations is our own.
 ///
 /// # Example
 ///
-/// A fault f' = w passes (1 - s) / (s + 1)^2. No estimate has an error of f below the energy of w:
+/// A fault f' = w passes (1 - s) / (s + 1)^2. No estimate keeps the energy of the error of f below the energy of w:
 ///
 /// ```
 /// use control::Domain;

@@ -32,7 +32,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// K = -L' for the transposed system.
+    /// The candidate K = -L' for the transposed system.
     pub(super) fn transposed(&self) -> Self {
         Self { gain: -self.gain.transpose(), coordinates: self.coordinates.transposed() }
     }
@@ -127,7 +127,7 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Requires a norm of Z of at most a level; for None minimises it.
+    /// Requires that the norm of Z is at most `level`; for None minimises this norm.
     pub(super) fn with_norm(mut self, level: Option<f64>) -> Self {
         let level = self.problem.level(level);
         self.problem.constrain(&norm_below(&self.z, &level), MARGIN);
@@ -169,7 +169,7 @@ impl<'a> ObserverProgram<'a> {
         Self { requirements, coordinates, extended, units }
     }
 
-    /// The coordinates of the states of the norm.
+    /// The coordinates of the inequalities of the norm, with the states of the weights.
     fn norm_coordinates(&self) -> &Coordinates {
         self.extended.as_ref().unwrap_or(&self.coordinates)
     }

@@ -154,7 +154,7 @@ pub fn certify_schedule(
         problem.constrain(p, MARGIN);
         problem.constrain(&(&Affine::identity(n, 1.0) - p), MARGIN);
     }
-    // In continuous time the unit of A~ is that of time, too.
+    // In continuous time the unit of A~ is also the unit of a rate per s.
     let scaled_change = change / coordinates.unit;
     let matrices = match domain {
         Domain::Continuous => decays(&scaled_intervals, &p, scaled_change),

@@ -20,8 +20,8 @@ const NOT_PROVEN: &str = "a gain was found, but the requirements could not be pr
 /// ```
 ///
 /// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, `D_y` = `feedthrough`.
-/// For the augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e;
-/// eps], or `-F_0` from the fault to [e; `f_hat`].
+/// For an observer augmented by the fault, with (`A_0`, `C_0`): B = [0; -I] from the fault rate to the errors [e;
+/// eps] of state and fault, or B = `-F_0` from the fault to [e; `f_hat`], `f_hat` its estimate.
 ///
 /// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in common.
 /// P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside of all inequalities as

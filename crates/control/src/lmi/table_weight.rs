@@ -8,10 +8,10 @@ use crate::{Error, check};
 
 /// Points from one frequency of the table to the next, the first frequency included.
 const BETWEEN: usize = 6;
-/// Width of the logarithm of the largest deviation at which the search ends, relative to that of a constant weight.
+/// The search ends when ln alpha is known to this fraction of its value for a constant weight.
 const NARROW: f64 = 1e-3;
 /// Smallest value of the first and the last coefficient of the squared magnitude: magnitudes at frequency 0 and
-/// infinity are neither 0 nor infinite. Second-order poles and zeros at an end of four decades need 1e-8.
+/// infinity are neither 0 nor infinite. Second-order poles or zeros at an end of four decades give 1e-8.
 const SMALLEST: f64 = 1e-10;
 /// Least damping ratio of poles and zeros.
 const DAMPING: f64 = 0.2;
@@ -100,7 +100,7 @@ fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
     before_last.chain(table.last().copied()).collect()
 }
 
-/// Coefficients of numerator and denominator of a weight whose squared magnitude is within a factor of that of the
+/// Coefficients of numerator and denominator of a weight whose squared magnitude is within `factor` of the
 /// points (w^2, magnitude^2); None if the solver finds none.
 fn coefficients(
     points: &[(f64, f64)],

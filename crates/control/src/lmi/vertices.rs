@@ -49,7 +49,7 @@ pub struct CommonFeedback {
 ///
 /// Of all P <= I the one farthest inside of all inequalities is computed, in the coordinates that
 /// suit the first vertex, then up to three times in those in which the most interior P is the
-/// identity. It is verified for each vertex in the units of the data, as in
+/// identity. P is verified for each vertex in the units of the data, as in
 /// [`super::certify_region`]. [`Outcome::Infeasible`] has the indices of vertices whose
 /// eigenvalues are outside of the region, or else of vertices that have no common P, each of them
 /// necessary for the contradiction.
@@ -127,8 +127,8 @@ pub fn certify_common(
     contradiction(all, |members| decision(&coordinates, members).0)
 }
 
-/// Searches the certificate of [`certify_common`] in the coordinates of the mean of the vertices and of the first one
-/// only, and no contradiction. None if a vertex has an eigenvalue outside of the region, or if neither search succeeds,
+/// Like [`certify_common`], but searches only in the coordinates of the mean of the vertices and of the first one, and
+/// searches no contradiction. None if a vertex has an eigenvalue outside of the region, or if neither search succeeds,
 /// although a P may exist. There must be a vertex; the arguments are not checked.
 pub(crate) fn find_common(
     vertices: &[DMatrix<f64>],

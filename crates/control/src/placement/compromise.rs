@@ -47,8 +47,8 @@ impl<'a> Search<'a> {
     ///
     /// `candidates`: directions of least condition number, in the requested coordinates and in those of A;
     /// `widest`: directions of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
-    /// Tits and Yang find. The references of condition number and gain are the least of `widest`, or
-    /// up to 10 % lower if a candidate is; the reference of S is the least peak that descents find with
+    /// Tits and Yang find. The references of condition number and gain are the least of `widest`, or of
+    /// `candidates` if lower, by at most 10 %; the reference of S is the least peak that descents find with
     /// condition number and gain within 5 % of their references, or as near as possible.
     ///
     /// Returns None to keep the first candidate if its condition number and gain are within 11 % and its peak of S

@@ -138,8 +138,8 @@ pub(crate) struct Slope {
     pub(crate) of_g: Option<DMatrix<f64>>,
 }
 
-/// Minimises a function by descents in local coordinates around the end of the descent before, until one lowers the
-/// value by less than `tolerance`, at most five. The function is None where it is not defined.
+/// Minimises a function by up to five descents, each in local coordinates around the end of the previous one, until one
+/// lowers the value by less than `tolerance`. The function is None where it is not defined.
 pub(crate) fn descend(
     problem: &AssignableSubspaces,
     mut directions: Directions,

@@ -8,7 +8,7 @@ use crate::svd::Svd;
 use crate::{Error, reflections::Reflections};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
-/// Sweeps over all eigenvectors, and the relative change of their determinant at which they end.
+/// Number of sweeps over all eigenvectors, and the relative change of their determinant that ends them earlier.
 const SWEEPS: usize = 30;
 const CHANGE: f64 = 1e-3;
 /// Relative and absolute difference of singular values that count as equal; entries up to `ZERO` count as

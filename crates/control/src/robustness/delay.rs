@@ -16,7 +16,7 @@ use std::f64::consts::{PI, TAU};
 const REFINED_SAMPLES: u32 = 20;
 /// Number of delays per sample at which loops with a continuous plant are tested.
 const PARTS: u32 = 4;
-/// Instability above which a tested delay is unstable; less may be a rounding error of modes close to z = 1.
+/// Instability above which a delay counts as unstable; less may be a rounding error of modes close to z = 1.
 const CLEAR: f64 = 1e-6;
 /// The same, relative to the decay of the loop without a delay.
 const RELATIVE: f64 = 0.1;

@@ -31,7 +31,7 @@ pub struct SensitivityPeak {
     pub point: Point,
     /// The frequency of the peak, in rad/s.
     pub frequency: f64,
-    /// Whether it is the peak of D S D^-1 with the diagonal D that makes it least, see [`super::scaled_peak`].
+    /// Whether D S D^-1 takes the place of S, with the diagonal D of the lowest peak, see [`super::scaled_peak`].
     pub scaled: bool,
 }
 

@@ -31,7 +31,7 @@ pub struct ScaledPeak {
 ///
 /// Returns the bound and the logarithms of D. ln(bound) is a convex function of ln D with the
 /// gradient |u|^2 - |v|^2, u and v the singular vectors. Method: Osborne's balancing, then the
-/// ellipsoid method until its lower bound is relatively within 1e-5.
+/// ellipsoid method until lower and upper bound differ by at most 1e-5, relative.
 ///
 /// Source: J. C. Doyle, Analysis of feedback systems with structured uncertainties, IEE Proc. D 129
 /// (1982).

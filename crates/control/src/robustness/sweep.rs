@@ -16,7 +16,7 @@ pub(super) struct Sweep<'a> {
     pub(super) response: &'a KnownResponse,
     /// Ascending, in rad per unit of time.
     pub(super) frequencies: Vec<f64>,
-    /// G at each of them.
+    /// The response at each of these frequencies.
     pub(super) values: Vec<DMatrix<Complex<f64>>>,
 }
 
@@ -53,7 +53,7 @@ impl<'a> Sweep<'a> {
         Ok(Self { response, frequencies, values })
     }
 
-    /// The frequencies at which a real function of G changes its sign.
+    /// The frequencies at which a real function of the response changes its sign.
     pub(super) fn crossings(
         &self,
         function: impl Fn(&DMatrix<Complex<f64>>) -> f64,

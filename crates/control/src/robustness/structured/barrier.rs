@@ -35,6 +35,7 @@ pub(super) struct Point {
 struct Inequality {
     /// K = N F^-1 N*.
     k: ComplexMatrix,
+    /// Whether K has no entries between different blocks.
     diagonal: bool,
     /// The entries of W for each direction.
     weights: Vec<Vec<SparseEntry>>,

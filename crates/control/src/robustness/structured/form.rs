@@ -6,9 +6,9 @@ use nalgebra::Complex;
 
 /// F = beta^2 D - M* D M - j (G M - M* G).
 ///
-/// If F is positive definite, I - Delta M is regular for every Delta of the structure with a norm up to 1 / beta: with
-/// w = Delta M w and z = M w, w* F w = beta^2 w* D w - z* D z is at most zero, as D commutes with Delta and G Delta is
-/// Hermitian.
+/// If F is positive definite, I - Delta M is regular for every Delta of the structure with a norm up to 1 / beta. With
+/// a w = Delta M w other than 0 and z = M w, w* F w = beta^2 w* D w - z* D z would be at most zero, because D commutes
+/// with Delta and G Delta is Hermitian.
 pub(super) fn form(
     m: &ComplexMatrix,
     d: &ComplexMatrix,
