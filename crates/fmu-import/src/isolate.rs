@@ -1,8 +1,8 @@
 //! Isolation: each FMU instance runs in a separate process, so that a crash does not end the master.
 //!
-//! [`open`] starts a worker process: the same program with [`WORKER`] as its only argument, which calls [`worker()`]. It
-//! loads the FMU and executes the commands of the master's side, [`Isolated`]. Arguments, results and messages pass
-//! through shared memory; master and worker take turns.
+//! [`open`] starts a worker process: the same program with [`WORKER`] as its only argument, which calls [`worker()`].
+//! The worker loads the FMU and executes the commands of the master's side, [`Isolated`]. Arguments, results and
+//! messages pass through shared memory; master and worker take turns.
 //!
 //! Isolation works on Linux; on other systems [`open`] returns [`IsolateError::Platform`].
 
@@ -76,7 +76,7 @@ pub struct Options {
     pub memory_limit: Option<u64>,
     /// Libraries that the worker loads before the FMU, as [`crate::preload`] does.
     pub preload: Vec<OsString>,
-    /// Whether to refuse an FMU whose library has functions that no library defines.
+    /// Whether to refuse an FMU whose library calls functions that no library defines.
     pub strict_binding: bool,
     /// Whether the FMU gets copies of arrays, with canaries ([`Slave::guard_arrays`]).
     pub guard_arrays: bool,
@@ -93,14 +93,14 @@ pub struct Options {
 pub struct Integration {
     /// The options, as the [`Integrator`] of the worker reads them.
     pub options: String,
-    /// Returns the description of the slave that the integrator makes, from that of the instance.
+    /// Converts the description of the instance to that of the slave that the integrator makes.
     pub describe: fn(&ModelDescription) -> ModelDescription,
 }
 
 /// Makes a slave that integrates an instance for model exchange, with options as text.
 pub type Integrator = fn(Box<dyn ModelExchange>, &str) -> Box<dyn Slave>;
 
-/// Why an FMU cannot run in a process of its own.
+/// Why an FMU cannot run in a separate process.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IsolateError {
@@ -198,7 +198,7 @@ impl From<PackageError> for IsolateError {
 
 #[cfg(target_os = "linux")]
 impl IsolateError {
-    /// Adds the memory limit to the reason if the FMU did not load: the limit may be the cause.
+    /// Adds the memory limit to the reason why the FMU does not load: the limit may be the cause.
     fn with_limit(mut self, limit: Option<u64>) -> Self {
         use std::fmt::Write as _;
         if let (Self::Refused { reason, .. } | Self::Preload { reason }, Some(limit)) =
@@ -260,7 +260,7 @@ impl Package {
     }
 }
 
-/// Unpacks the FMU at `path` and creates the instance `name` in a process of its own.
+/// Unpacks the FMU at `path` and creates the instance `name` in a separate process.
 ///
 /// # Errors
 ///

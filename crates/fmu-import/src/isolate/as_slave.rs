@@ -13,7 +13,7 @@ use slave::{
     Background, CallError, CommunicationStep, EventInfo, Events, Slave, StepRequest, StepResult,
 };
 
-/// Writes references and one value for each. Panics if there is another number of values.
+/// Writes the references, then their values. Panics if the two lists have different lengths.
 #[inline]
 fn write_pairs<T: Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
@@ -71,7 +71,7 @@ macro_rules! numbers {
 }
 
 impl Isolated {
-    /// Requests one value for each element of `values`. Another number of values ends the worker.
+    /// Requests one value for each element of `values`. Kills the worker if it returns another number of values.
     fn request_all<T: DeserializeOwned>(
         &mut self,
         request: &Request<'_>,

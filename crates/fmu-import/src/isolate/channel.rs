@@ -19,7 +19,7 @@ const SPINS: u32 = 10;
 const YIELD_TIME: Duration = Duration::from_micros(60);
 /// A yield that takes this long shows that other programs use the processor.
 const CONTENDED: Duration = Duration::from_micros(500);
-/// Number of waits that do not yield after such a yield.
+/// Number of waits without yields after a yield of [`CONTENDED`].
 const WAITS_WITHOUT_YIELD: u32 = 50;
 
 /// A side of the channel.

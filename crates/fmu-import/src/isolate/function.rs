@@ -1,5 +1,5 @@
-//! The functions that a worker executes. The number of a function is the command of the master; its name is that of a
-//! crash between the calls of the FMU.
+//! The functions that a worker executes. The master sends the number of a function as its command. Errors use the
+//! name of the function if the worker fails while it executes no C function.
 
 use crate::library::function_names;
 use fmu_description::Version;
@@ -19,7 +19,7 @@ pub(super) fn known_name(name: &str) -> Option<&'static str> {
     table.chain(OTHERS).chain(function_names()).find(|known| *known == name)
 }
 
-/// Defines the functions, each with the names that its errors have: in FMI 2.0, 3.0 and 1.0.
+/// Defines the functions, each with its names in errors for FMI 2.0, 3.0 and 1.0.
 macro_rules! functions {
     ($($function:ident = $name:literal $name_3:literal $name_1:literal,)*) => {
         /// A function of a worker.
@@ -31,7 +31,7 @@ macro_rules! functions {
         impl Function {
             const ALL: &[Function] = &[$(Function::$function,)*];
 
-            /// Returns a static reference to the name, for the report of a crash of the master.
+            /// Returns a static reference to the name, for crash reports of the master's process.
             #[inline]
             pub(super) fn static_name(self, version: Version) -> &'static &'static str {
                 match (self, version) {
@@ -88,8 +88,8 @@ impl Function {
         self.static_name(version)
     }
 
-    /// Whether arguments and results pass as words without allocation, because the function runs in
-    /// every step. The other functions are requests.
+    /// Whether arguments and results pass as words without allocation, because the function runs in every step. All
+    /// other functions are requests.
     #[inline]
     pub(super) fn is_exchange(self) -> bool {
         use Function::{DoStep, GetBoolean, GetInteger, GetReal, SetBoolean, SetInteger, SetReal};
@@ -99,7 +99,6 @@ impl Function {
         )
     }
 
-    /// Returns the number of the function.
     pub(super) fn to_word(self) -> u64 {
         self as u64
     }

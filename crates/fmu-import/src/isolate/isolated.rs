@@ -33,10 +33,10 @@ const END_LIMIT: Duration = Duration::from_secs(2);
 const FREE_LIMIT: Duration = Duration::from_secs(10);
 /// Time limit for a new process to become a worker.
 const START_LIMIT: Duration = Duration::from_secs(20);
-/// Least number of variables that the shared memory is made for if structural parameters may enlarge arrays.
+/// Least number of variables for which the shared memory has room if structural parameters may enlarge arrays.
 const ROOM_FOR_ARRAYS: usize = 1 << 16;
 
-/// An instance in a process of its own.
+/// An instance in a separate process.
 ///
 /// After a call that ended the process, every further call returns the same failure.
 pub struct Isolated {
@@ -65,7 +65,7 @@ pub struct Isolated {
     pub(super) package: Arc<Unpacked>,
     /// The version of the FMU, for the names of functions.
     pub(super) version: Version,
-    /// The description as the instance has it; `None`: that of the package.
+    /// The description of the instance; `None`: that of the package.
     pub(super) description: Option<ModelDescription>,
     /// [`Integration::describe`](super::Integration::describe) of an instance for model exchange.
     pub(super) describe: Option<Describe>,
@@ -157,7 +157,7 @@ impl Isolated {
     /// Lets the worker load and instantiate the FMU.
     fn open(&mut self, name: &str, options: &Options) -> Result<Opening, CallError> {
         let package = self.package.clone();
-        // The process has usually become a worker by the first check, one slice from now.
+        // The time limit starts in one slice: the process has then usually become a worker.
         self.posted_at = Some(Instant::now() + self.slice);
         self.request(&Request::Open(Open {
             folder: package.folder().as_os_str().as_bytes(),
@@ -283,8 +283,8 @@ impl Isolated {
         }
     }
 
-    /// Checks after a wait without an answer whether one can still come; the error says why not. Sets `start` to the
-    /// start of the wait if it is unknown.
+    /// Checks after a wait without an answer whether an answer can still come; the error states why not. Sets `start`
+    /// to the start of the wait if it is `None`.
     #[cold]
     fn check_timeout(
         &mut self,
@@ -304,13 +304,13 @@ impl Isolated {
             return Err(failure);
         }
         if !self.is_attached() {
-            // The first call starts when the process has become a worker, at the latest at the next check.
+            // The time limit starts at the next check: the process may then have become a worker.
             *start = Some(Instant::now() + self.slice);
             let is_late = self.started.elapsed() > START_LIMIT;
             let late = Failure::TimedOut(START_LIMIT.as_secs_f64());
             return if is_late { Err(late) } else { Ok(()) };
         }
-        // The first check happens one slice after the start.
+        // Without `start` this is the first check, one slice after the start of the wait.
         let now = Instant::now();
         let start = *start.get_or_insert(now.checked_sub(self.slice).unwrap_or(now));
         match self.time_limit {
@@ -321,8 +321,8 @@ impl Isolated {
         }
     }
 
-    /// Kills the worker after a failure. Returns the error of the C function that the worker called, or if it called
-    /// none, of its command.
+    /// Kills the worker after a failure. Returns the error with the name of the C function that the worker called or,
+    /// if it called none, of the command.
     #[cold]
     pub(super) fn abandon(&mut self, function: Function, failure: Failure) -> CallError {
         self.process.kill();
@@ -378,7 +378,7 @@ impl Drop for Isolated {
     }
 }
 
-/// Converts the outcome of an instantiation to a result.
+/// Converts the answer to an instantiation to a result.
 fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), IsolateError> {
     let instance = name.to_owned();
     match answer {
@@ -392,7 +392,7 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
 /// Converts the description of an instance for model exchange to that of the slave that integrates it.
 pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 
-/// Returns the number of variables that the shared memory is made for. Pages that no call needs take no memory.
+/// Returns the number of variables for which the shared memory has room. Unused pages take no memory.
 fn room_of(description: &ModelDescription) -> usize {
     let (variables, structural) = (&description.variables, Causality::StructuralParameter);
     let resizes = variables.iter().any(|variable| variable.causality == structural);
@@ -426,7 +426,7 @@ mod tests {
         let stated = ModelDescription::parse(xml).unwrap();
         let described = |sizes| description_of_instance(&stated, &sizes, None).unwrap().unwrap();
         let (shared, _) = Shared::create(room_of(&described(HashMap::new()))).unwrap();
-        // Each element has its value reference and its value.
+        // Each element needs room for its value reference and its value.
         let all = described(HashMap::from([(1, 100_000)])).variables;
         let elements = all.iter().filter(|variable| variable.name.starts_with("a[")).count();
         assert_eq!(elements, 100_000);

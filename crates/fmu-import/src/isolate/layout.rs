@@ -19,8 +19,8 @@ const AREA: usize = 8 * SPACING;
 const RING: usize = 1 << 15;
 /// Minimum number of words for arguments and results: 64 KiB.
 const MIN_AREA: usize = 1 << 13;
-/// Words for arguments and results per variable. `advance` needs 2 + 3 n for an input with derivatives of n orders and
-/// 1 + 2 n for an output. A variable is either an input or an output, so that 16 words are enough for 4 orders.
+/// Words for arguments and results per variable. A step needs 2 + 3 n words for an input with derivatives of n orders
+/// and 1 + 2 n for an output. 16 words are enough for 4 orders, because no variable is both.
 const WORDS_PER_VARIABLE: usize = 16;
 /// The content of [`MAGIC`]: "fmu" and the version of this layout.
 const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0004;
@@ -47,7 +47,7 @@ fields! {
     worker_sleeps = 2 * SPACING;
     /// The command for the worker.
     command = 3 * SPACING;
-    /// The number of the command that the worker executes, or of the part of it that it executes now.
+    /// The number of the function that the worker executes: the command, or the present part of it.
     place = 4 * SPACING;
     /// Number of words written to the message ring.
     log_head = 5 * SPACING;

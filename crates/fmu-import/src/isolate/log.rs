@@ -1,6 +1,5 @@
-//! Passes the messages of an FMU to the master through a ring buffer in shared memory, which survives
-//! a crash of the worker. Messages that do not fit are dropped and counted. A message is a word with the number of
-//! its bytes, then its bytes.
+//! Passes the messages of an FMU to the master through a ring buffer in shared memory, which survives a crash of the
+//! worker. Messages that do not fit are dropped and counted. A message starts with a word for its number of bytes.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
@@ -31,7 +30,7 @@ const KEPT: usize = 10;
 const MESSAGES: u32 = 1000;
 /// Maximum number of bytes of messages logged per instance.
 const BYTES: usize = 16 << 20;
-/// Interval in which at most [`MESSAGES`] are logged, and between two reports of the number of lost ones.
+/// Interval in which at most [`MESSAGES`] are logged; also the interval of reports of the number of lost messages.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Maximum number of bytes of a message: category, text, and their lengths, level and time.
 const MESSAGE: usize = CATEGORY + TEXT + 32;
@@ -300,7 +299,7 @@ impl Inbox {
         tracing::warn!(target: "fmu", instance, "{error}");
     }
 
-    /// Discards the kept messages, before a new call.
+    /// Discards the messages that were kept for an error, before a new call.
     #[inline]
     pub(super) fn clear(&mut self) {
         if !self.recent.is_empty() {
@@ -343,7 +342,7 @@ mod tests {
             forward.send(Level::INFO, &message(&count.to_string()));
         }
         let dropped = shared.log_dropped().load(Ordering::Relaxed);
-        // The number of bytes; level, time, category and text, each with its length.
+        // The number of bytes; then level, time, category and text, the texts after their lengths.
         let words = 1 + (1 + 8 + 1 + 6 + 1 + 5_u64).div_ceil(8);
         assert_eq!(100_000 - dropped, shared.ring().len() as u64 / words);
         inbox.drain(&shared);

@@ -27,15 +27,15 @@ pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
     Ok(setrlimit(Resource::As, limit)?)
 }
 
-/// Records the crash if `errno` is ENOMEM. `malloc` sets it on failure and successful calls do not
-/// change it, so the FMU most likely used a null pointer from `malloc`.
+/// Records the crash if `errno` is ENOMEM. A failed `malloc` sets `errno`, and successful calls do not change it: the
+/// FMU most likely used a null pointer from `malloc`.
 extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     if io::Error::last_os_error().raw_os_error() == Some(libc::ENOMEM)
         && let Some(shared) = SHARED.get()
     {
         shared.no_memory().store(1, Ordering::Relaxed);
     }
-    // An invalid access is repeated on return, but a signal that was sent is not: raise it again.
+    // On return the processor repeats an invalid access, but a signal that a process sent is lost: raise it again.
     // SAFETY: no conditions.
     unsafe { libc::raise(signal) };
 }

@@ -1,5 +1,5 @@
-//! The answers of a worker and its errors, and how messages are encoded: by `postcard`. The other process may have
-//! written anything: messages are decoded from a copy, and [`decode`] returns `None` for other bytes.
+//! The answers of a worker and its errors, and how messages are encoded: by `postcard`. The FMU may have overwritten
+//! the shared memory: messages are decoded from a copy, and [`decode`] returns `None` for invalid bytes.
 
 use fmu_description::Version;
 use fmu_description::abi::Status;
@@ -53,7 +53,7 @@ impl From<CallError> for RemoteError {
             Failure::TimedOut(seconds) => RemoteFailure::TimedOut(*seconds),
             Failure::Panicked(text) => RemoteFailure::Panicked(clipped(text)),
             Failure::InvalidAnswer(text) => RemoteFailure::InvalidAnswer(clipped(text)),
-            // The others are ends of a process, which arise in the master only.
+            // All other failures are ends of a process, which only the master reports.
             other => RemoteFailure::InvalidAnswer(other.to_string()),
         };
         let messages = error.messages.iter().map(|text| clipped(text)).collect();
@@ -82,7 +82,7 @@ impl RemoteError {
 pub(super) fn encode(value: &impl Serialize, bytes: &mut Vec<u8>) {
     let mut buffer = std::mem::take(bytes);
     buffer.clear();
-    // Fails only for sequences of unknown length, which no message has; nobody decodes an empty one.
+    // Fails only for sequences of unknown length, which no message has; the empty result then fails to decode.
     *bytes = postcard::to_extend(value, buffer).unwrap_or_default();
 }
 

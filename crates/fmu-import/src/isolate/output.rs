@@ -37,8 +37,8 @@ impl Output {
     }
 }
 
-/// Copies the pipe to standard error. Bytes beyond the limit are read, so that the worker does not
-/// block, and only counted.
+/// Copies the pipe to standard error. Beyond the limit, bytes are still read, so that the worker does not block, but
+/// only counted.
 fn forward(mut reader: PipeReader, instance: &str) {
     let (mut room, mut lost) = (MAX_BYTES, 0_u64);
     let mut bytes = vec![0; 1 << 16];

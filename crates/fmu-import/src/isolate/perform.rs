@@ -12,9 +12,9 @@ use crate::error::refused;
 use crate::{Fmu, FmuError};
 use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult};
 
-/// First word of an answer that consists of words.
+/// First word of an answer whose results are encoded by the module `words`.
 pub(super) const VALUES: u64 = 0;
-/// First word of an encoded answer or error. The number of all its bytes and its first bytes follow.
+/// First word of an answer or error that `postcard` encoded. The number of its bytes and its first bytes follow.
 pub(super) const MESSAGE: u64 = 1;
 
 /// The end of a step: complete, at an event, partial, or partial at the request of the FMU.
@@ -87,7 +87,7 @@ struct Step {
 impl Executor {
     pub(super) fn new(mut instance: Box<dyn Slave>, maker: Maker, logging: bool) -> Self {
         if logging {
-            // An FMU without the function logs by its own rules.
+            // An FMU without `fmi2SetDebugLogging` logs by its own rules.
             let _ = instance.set_debug_logging(true);
         }
         let (references, reals, integers) = (Vec::new(), Vec::new(), Vec::new());
@@ -163,7 +163,6 @@ impl Step {
         }))
     }
 
-    /// Reads the arguments.
     fn read(&mut self, reader: &mut Reader<'_>) -> Option<CommunicationStep> {
         let (time, size) = (reader.take()?, reader.take()?);
         let never_back = reader.take::<u64>()? != 0;
@@ -209,7 +208,7 @@ fn set<T: Word>(
     Some(call(references, values))
 }
 
-/// Returns the error of a command whose arguments are invalid or that comes out of order.
+/// Returns the error of a command with invalid arguments or out of order.
 #[cold]
 pub(super) fn invalid_command(function: Function) -> CallError {
     invalid(function, "received an invalid command: the shared memory is corrupted")

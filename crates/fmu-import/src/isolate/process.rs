@@ -49,7 +49,6 @@ impl Process {
         Ok(Self { child, output, ended: None })
     }
 
-    /// Returns the process identifier.
     pub(super) fn id(&self) -> u32 {
         self.child.id()
     }
@@ -62,7 +61,7 @@ impl Process {
     pub(super) fn ended(&mut self) -> Option<Failure> {
         let pid = self.pid()?;
         if self.ended.is_none() {
-            // NOWAIT keeps the zombie, so that its identifier still names its process group only.
+            // NOWAIT keeps the zombie: no other process group can have its identifier until `end_group` has run.
             let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
             waitid(WaitId::Pid(pid), options).ok().flatten()?;
             self.end_group();

@@ -1,5 +1,5 @@
-//! The requests to a worker, and the call of its instance that answers each. The commands that run in every step are no
-//! requests: see `words`.
+//! The requests to a worker, and the call of the instance that answers each. The commands that run in every step are
+//! no requests; the module `words` encodes them.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use super::function::Function;
 use super::perform::{invalid_command, reply};
 use slave::{CallError, Events, Slave, absent};
 
-/// A list of the caller, or one that was received.
+/// A list that the master borrows from its caller, and that the worker receives as its own.
 type List<'a, T> = Cow<'a, [T]>;
 
 /// Defines the requests that the worker itself answers, and the requests in the table, which its instance answers. A

@@ -19,8 +19,8 @@ const MAX_ANSWER: u64 = u32::MAX as u64;
 const BUFFER: usize = 1 << 16;
 
 impl Isolated {
-    /// Sends `request`, in parts if it is longer than the shared memory; returns the answer. Panics if the caller passes
-    /// another number of values than references.
+    /// Sends `request`, in parts if it is longer than the shared memory; returns the answer. Panics if lists that
+    /// belong together, such as references and values, have different lengths.
     pub(super) fn request<T: DeserializeOwned>(
         &mut self,
         request: &Request<'_>,
@@ -85,7 +85,7 @@ impl Isolated {
             let before = message.len();
             self.post(Function::Download, |writer| writer.put(before as u64))?;
             self.wait_for_answer(Function::Download)?;
-            // An answer without more bytes would repeat for ever.
+            // An empty part would repeat for ever.
             if self.values(|reader| reader.take_bytes(message)).is_none() || message.len() == before
             {
                 return Ok(None);

@@ -1,7 +1,7 @@
-//! Encodes the values of a step as words of the shared memory, without allocation; `postcard` would
-//! decode them into new vectors in every step. The bytes of all other messages pass here as well.
+//! Encodes the values of a step as words of the shared memory, without allocation; `postcard` would decode them into
+//! new vectors in every step. All other messages are bytes, which are packed into words here.
 //!
-//! The other process may have written anything, so the reader loads each word once and checks it.
+//! The FMU may have overwritten the shared memory, so the reader loads each word once and checks it.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -35,7 +35,7 @@ use slave::CallError;
 /// Whether this process has become a worker.
 static IS_WORKER: AtomicBool = AtomicBool::new(false);
 
-/// Interval between two checks whether the master lives, if the connection has been closed locally.
+/// Interval between two checks whether the master lives, if the FMU has closed the connection.
 const PARENT_CHECK: Duration = Duration::from_millis(100);
 
 const NO_INTEGRATOR: &str = "this program cannot integrate model-exchange FMUs in separate processes: \
@@ -83,8 +83,8 @@ fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
     serve(&mut Channel::new(shared, socket, Side::Worker), integrator)
 }
 
-/// Returns an error if this process was started as a worker but did not become one. Without this check
-/// a program that ignores the argument would start itself again and again.
+/// Returns an error if this process was started as a worker but did not become one. Otherwise a program that ignores
+/// its argument would start itself again and again.
 pub(super) fn refuse_in_worker() -> Result<(), IsolateError> {
     let started_by = std::env::var(STARTED_BY).ok().and_then(|number| number.parse().ok());
     let parent = getppid().map(Pid::as_raw_pid);
@@ -152,11 +152,11 @@ struct Worker {
     executor: Option<Executor>,
     /// The bytes of the next request that have arrived so far.
     request: Vec<u8>,
-    /// The surroundings before the FMU was loaded.
+    /// The process-wide settings before the FMU was loaded.
     before: Surroundings,
     /// The bytes of the last answer.
     answer: Vec<u8>,
-    /// Whether the master has freed the instance for good.
+    /// Whether the master has ended the work of this process by [`Request::Free`].
     freed: bool,
 }
 
@@ -260,7 +260,7 @@ impl Worker {
         })
     }
 
-    /// Stores the part of a command that runs now, so that the master can name it after a crash between two calls.
+    /// Stores the present part of a command, so that the master can name it after a crash between two C calls.
     fn record(&self, function: Function) {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
     }
@@ -286,7 +286,7 @@ impl Worker {
     }
 }
 
-/// Reads an offset and writes the bytes of `answer` from there on, as many as fit; `None` beyond the end.
+/// Reads an offset and writes the bytes of `answer` from this offset on, as many as fit; `None` beyond the end.
 fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
     let offset = usize::try_from(reader.take::<u64>()?).ok()?;
     let rest = answer.get(offset..)?;
