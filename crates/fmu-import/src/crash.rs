@@ -1,4 +1,4 @@
-//! Crash reports: an FMU ends the process by a fatal signal, by `exit`, or blocks it in a call that
+//! Crash reports for an FMU that ends the process by a fatal signal or by `exit`, or that blocks it in a call that
 //! does not return.
 //!
 //! [`watch`] is for programs, not for libraries: it installs signal handlers. Afterwards a crash or an
@@ -47,8 +47,8 @@ static STATUS: AtomicI32 = AtomicI32::new(0);
 static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
-/// An activity besides functions of the standard. The dynamic linker is locked meanwhile: no other thread can start or
-/// register destructors of thread-local data.
+/// The name in reports of an activity that is no function of the standard. The dynamic linker is locked while it
+/// lasts: no other thread can start or register destructors of thread-local data.
 pub(crate) const LOADING: &str = "loading the library";
 /// Like [`LOADING`].
 pub(crate) const UNLOADING: &str = "unloading the library";
@@ -59,8 +59,8 @@ static REPORTER: OnceLock<Thread> = OnceLock::new();
 /// The last failure, for the case that the process crashes before the program reports it.
 static LAST_FAILURE: Mutex<Option<String>> = Mutex::new(None);
 
-/// Notes a failure that the program is about to report, for a crash report. Otherwise an FMU that crashes when it is
-/// freed would hide it.
+/// Records a failure that the program is about to report, so that a crash report includes it: an FMU that crashes
+/// when it is freed would otherwise hide the failure.
 pub fn note(failure: String) {
     *LAST_FAILURE.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
 }
@@ -88,7 +88,7 @@ pub enum Cause {
     Signal(i32),
     /// A call of `exit`, with its status if it is known.
     Exit(Option<i32>),
-    /// A call of [`give_up`], with the time for which a call had not returned after the signal, if there was a signal.
+    /// A call of [`give_up`], with the time since the ending signal, if there was one.
     GivenUp(Option<Duration>),
     /// The library of an FMU was not unloaded within its time limit.
     Overdue,
@@ -199,7 +199,7 @@ pub fn watch(
         #[cfg(unix)]
         signals::mark_reporter();
         prepare();
-        // Fails only if the thread of the program has ended.
+        // Fails only if `watch` has returned.
         let _ = ready.send(());
         while CAUSE.load(Ordering::Acquire) == 0 {
             std::thread::park();
@@ -210,7 +210,7 @@ pub fn watch(
     if REPORTER.set(reporter.thread().clone()).is_err() {
         return Ok(());
     }
-    // A library that crashes while it is loaded blocks the start of threads.
+    // Waits for the thread: none can start later, while a library that crashes is being loaded.
     let _ = started.recv();
     #[cfg(unix)]
     signals::install()?;
@@ -254,8 +254,8 @@ fn start_report(cause: i32, place: usize) {
     }
 }
 
-/// Ends the process as after a crash, because a call of an FMU does not return. `waited` is the time since the signal
-/// to end, if there was one. This function returns only if [`watch`] was not called.
+/// Ends the process as after a crash, because a call of an FMU does not return. `waited` is the time since the ending
+/// signal, if there was one. This function returns only if [`watch`] was not called.
 pub fn give_up(waited: Option<Duration>) {
     if REPORTER.get().is_some() {
         let waited = waited.map_or(0, |waited| waited.as_millis());
@@ -266,9 +266,9 @@ pub fn give_up(waited: Option<Duration>) {
     }
 }
 
-/// Ends the process if a call of the instance that is about to be dropped has not returned: an exception or the end of
-/// the thread left that call and unwinds the stack, so that the FMU may not be called any more. A panic of this program
-/// is no such case.
+/// Ends the process if a call of the instance that is about to be dropped has not returned. An exception or the end
+/// of the thread is then unwinding the stack through that call, and the FMU must not be called any more. Does nothing
+/// during a panic of this program.
 pub(crate) fn check_returned(slot: &Slot) {
     if !slot.is_entered() || std::thread::panicking() {
         return;
@@ -284,8 +284,8 @@ pub(crate) fn check_returned(slot: &Slot) {
     leave(1);
 }
 
-/// Marks the work of the program as finished, with this exit status: later signals and a later `exit` are not reported.
-/// Does nothing in a copy of the process that `fork` has made.
+/// Marks the work of the program as finished with the exit status `status`: later signals and a later `exit` are not
+/// reported. Does nothing in a copy of the process that `fork` has made.
 pub fn done(status: u8) {
     #[cfg(unix)]
     if signals::is_copy() {
@@ -300,7 +300,7 @@ pub fn done(status: u8) {
 #[cfg(target_os = "linux")]
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
-/// Sets the process that is told when the program has finished its work.
+/// Sets the process that gets a signal when the program has finished its work.
 #[cfg(target_os = "linux")]
 pub(crate) fn be_supervised(supervisor: i32) {
     SUPERVISOR.store(supervisor, Ordering::Relaxed);
@@ -335,7 +335,7 @@ pub fn calls() -> Vec<Call> {
 }
 
 /// Returns the call of an FMU that this thread executes. In a thread that executes none, for example one that an FMU
-/// started, returns the first call of any instance.
+/// started, returns the first unfinished call of any instance.
 #[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
 pub(crate) fn call_of_this_thread() -> Option<Call> {
     place::calls(last_of_this_thread()).next()

@@ -202,7 +202,7 @@ struct Watch {
     standstill: Option<Standstill>,
 }
 
-/// The calls of FMUs in which the process is, and since when.
+/// The FMU calls that have not returned, and since when they have been the same.
 struct Standstill {
     since: Instant,
     calls: Vec<Call>,
@@ -273,7 +273,7 @@ impl Watch {
         standstill.since.elapsed() > AFTER_SIGNAL
     }
 
-    /// Sends a signal to the process, which has not been waited for.
+    /// Sends a signal to the process, whose identifier is valid because it has not been reaped.
     fn send(&self, signal: Signal) {
         // Fails only if the process has ended.
         let _ = kill_process(self.child, signal);

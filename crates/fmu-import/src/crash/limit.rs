@@ -1,4 +1,4 @@
-//! A time limit for what runs under the lock of the dynamic linker.
+//! A time limit for code that runs under the lock of the dynamic linker.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,7 +34,7 @@ impl Limit {
             }
         };
         let thread = thread::Builder::new().name("limit".to_owned()).spawn(wait).ok()?;
-        // A thread takes the lock of the dynamic linker when it starts: before the caller does.
+        // A starting thread needs the lock of the dynamic linker, which the caller takes later.
         while !ready.load(Ordering::Acquire) {
             thread::yield_now();
         }

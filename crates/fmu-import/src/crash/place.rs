@@ -20,8 +20,8 @@ const SLOT_COUNT: usize = 4096;
 /// Bytes of an instance's name that reports show.
 const NAME_LENGTH: usize = 96;
 
-/// What is known of this process when it ends. It is static because an FMU may overwrite the heap before
-/// it crashes.
+/// The record of this process for a report of its end. It is static because an FMU may overwrite the heap before it
+/// crashes.
 pub(crate) static RECORD: Record = Record {
     slots: [const { Slot::new() }; SLOT_COUNT],
     used: AtomicUsize::new(0),
@@ -30,13 +30,13 @@ pub(crate) static RECORD: Record = Record {
     copies: AtomicUsize::new(0),
 };
 
-/// The calls of all instances and how far the program is. It fills whole pages, of at most 64 KiB each, which
-/// a supervisor shares with this process.
+/// The calls of all instances, and the progress of the program. It fills whole pages, of at most 64 KiB each, which a
+/// supervisor shares with this process.
 #[repr(C, align(65536))]
 pub(crate) struct Record {
     /// The slots of the instances. Those beyond [`SLOT_COUNT`] share the last slot.
     slots: [Slot; SLOT_COUNT],
-    /// The number of slots from the first one on that were ever taken.
+    /// The number of slots, counted from the first one, that were ever taken.
     used: AtomicUsize,
     /// Whether the first step has started.
     pub(super) started: AtomicBool,
@@ -55,8 +55,8 @@ impl Record {
 
 type Observer = dyn Fn(&str) + Send + Sync;
 
-/// Receives the name of each function that an instance enters, and an empty one when the instance leaves it. Only
-/// workers of isolation have it.
+/// Receives the name of each function that an instance enters, and an empty name when the instance leaves it. Set
+/// only in the worker processes of isolation.
 static OBSERVER: OnceLock<Box<Observer>> = OnceLock::new();
 
 /// Passes the functions of all instances of this process to `observer`: their names, and an empty name when an instance
@@ -107,7 +107,7 @@ pub(crate) struct Slot {
     /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
     /// Number of calls so far.
-    entered: AtomicU64,
+    calls: AtomicU64,
     /// Bits of the time of the instance, in s.
     time: AtomicU64,
     /// Name of the instance; `length` is its number of bytes.
@@ -138,18 +138,16 @@ impl Place {
         Arc::new(Self { slot, instance: instance.to_owned() })
     }
 
-    /// Returns the slot, which lives as long as the process.
+    /// Returns the slot, which is never freed.
     pub(crate) fn slot(&self) -> &'static Slot {
         self.slot
     }
 
-    /// Returns the name of the instance.
     pub(crate) fn instance(&self) -> &str {
         &self.instance
     }
 
-    /// Returns an error of the instance, and notes it for a crash report unless its status is `fmi2Discard` or
-    /// `fmi2Pending`.
+    /// Returns `error`, after noting it for a crash report unless its status is `fmi2Discard` or `fmi2Pending`.
     pub(crate) fn note_failure(&self, error: CallError) -> CallError {
         if !matches!(error.failure, Failure::Status(Status::Discard | Status::Pending)) {
             super::note(format!("{}: {error}", self.instance));
@@ -171,7 +169,7 @@ impl Slot {
         Self {
             is_used: AtomicBool::new(false),
             function: AtomicPtr::new(ptr::null_mut()),
-            entered: AtomicU64::new(0),
+            calls: AtomicU64::new(0),
             time: AtomicU64::new(0),
             name: [const { AtomicU8::new(0) }; NAME_LENGTH],
             length: AtomicUsize::new(0),
@@ -182,7 +180,7 @@ impl Slot {
     #[inline]
     pub(crate) fn enter(&self, function: &'static &'static str) {
         // One thread at a time calls an instance.
-        self.entered.store(self.entered.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        self.calls.store(self.calls.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         self.function.store(ptr::from_ref(function).cast_mut(), Ordering::Relaxed);
         LAST.set(ptr::from_ref(self).addr());
         if let Some(observer) = OBSERVER.get() {
@@ -205,7 +203,6 @@ impl Slot {
         self.time.store(time.to_bits(), Ordering::Relaxed);
     }
 
-    /// Returns the time of the instance, in s.
     pub(crate) fn time(&self) -> f64 {
         f64::from_bits(self.time.load(Ordering::Relaxed))
     }
@@ -225,7 +222,7 @@ impl Slot {
         let function = self.function.load(Ordering::Relaxed);
         // SAFETY: null, or the address of the static reference passed to `enter`.
         let function = *unsafe { function.as_ref() }?;
-        let number = self.entered.load(Ordering::Relaxed);
+        let number = self.calls.load(Ordering::Relaxed);
         Some(Call { instance: self.name(), function, time: self.time(), number })
     }
 

@@ -76,7 +76,7 @@ pub(crate) fn ignores_hangup() -> bool {
 /// Returns the present handler of a signal.
 fn handler_of(signal: c_int) -> io::Result<libc::sighandler_t> {
     let mut action = MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: asks only.
+    // SAFETY: with a null action the function only queries.
     check(unsafe { libc::sigaction(signal, null(), action.as_mut_ptr()) })?;
     // SAFETY: all zeros is a valid value of the structure.
     Ok(unsafe { action.assume_init() }.sa_sigaction)
@@ -129,7 +129,7 @@ pub(super) fn is_copy() -> bool {
     FORKED_BY.load(Ordering::Relaxed) != NOT_FORKED
 }
 
-/// Ends this process if it is a copy that an FMU made by `fork` and that goes on as the program.
+/// Ends this process if it is a copy that an FMU made by `fork` and that continues as the program.
 #[inline]
 pub fn end_copy() {
     if is_copy() {
@@ -206,7 +206,7 @@ pub(crate) unsafe fn handle(
     check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })
 }
 
-/// Lets `signal`, whose handler calls this function, act as by default.
+/// Restores the default action of `signal` and raises it again; its handler calls this function.
 fn act_as_by_default(signal: c_int) {
     // SAFETY: restores the default; the signal is delivered when the handler returns.
     unsafe {
@@ -280,7 +280,7 @@ fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
     line.write_str("; isolate=True runs each FMU in a process of its own")
 }
 
-/// Writes the message in place of the report of a crash function that crashes or does not return.
+/// Writes the message that replaces the report if the crash function crashes or does not return.
 fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;
     write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
@@ -294,9 +294,9 @@ fn write_fallback(line: &mut Line) -> fmt::Result {
 /// The path of the file of [`leave_file`].
 static CRASH_FILE: OnceLock<CString> = OnceLock::new();
 
-/// Lets a crash of this process write a file `aso-ftc-crash-PID.txt` in `folder` that names the FMU, function and time.
-/// It is for libraries in programs of others: the signal then ends the program as without this function. Signals that
-/// the program handles already are left to it. Only the first call has an effect, and none after [`super::watch`].
+/// Installs handlers that write a file `aso-ftc-crash-PID.txt` with FMU, function and time to `folder` if this
+/// process crashes; then the signal acts as by default. For libraries inside other programs: a signal that the
+/// program handles already keeps its handler. Only the first call has an effect, and none after [`super::watch`].
 ///
 /// # Errors
 ///
