@@ -115,8 +115,8 @@ unsafe fn copy_strings(pointers: &[*const c_char], values: &mut [String]) {
     }
 }
 
-/// Checks that the version of FMI that `get_version`, called `function`, returns starts with `expected` without
-/// trailing zeros: `2.1` passes as `2.0`. A library may lack the function.
+/// Checks the version of FMI that `get_version` returns; errors call it `function`. The version must start with
+/// `expected` without trailing zeros: `2.1` passes as `2.0`. A library may lack the function.
 fn check_version(
     path: &Path,
     get_version: Option<unsafe extern "C" fn() -> *const c_char>,
@@ -239,9 +239,9 @@ struct Hot {
 /// loaded until then.
 ///
 /// Each call returns a [`slave::CallError`] if the library lacks the function, if its status is neither `fmi2OK` nor
-/// `fmi2Warning`, or if it writes beside a guarded array ([`Base::guard_arrays`]).
+/// `fmi2Warning`, or if it writes outside a guarded array ([`Base::guard_arrays`]).
 pub(crate) struct Component {
-    /// The pointers that [`Component::pass`] needs, which takes no note of warnings and guards no arrays.
+    /// The pointers for [`Component::pass`], which does not record warnings and does not guard arrays.
     hot: Hot,
     pub(crate) base: Base<Functions>,
 }

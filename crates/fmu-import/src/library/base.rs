@@ -1,4 +1,4 @@
-//! What the libraries and the instances of all versions share.
+//! The parts that libraries and instances of all versions of FMI share.
 
 use std::cell::{Cell, RefCell};
 use std::ffi::{c_int, c_void};
@@ -40,8 +40,8 @@ pub(crate) struct Base<F> {
     pub(super) functions: F,
     /// The current function and time of the instance, for crash reports.
     pub(super) place: Arc<Place>,
-    /// Receives messages; the FMU holds its address. FMI 1.0 passes no such address: the logger finds the sink by the
-    /// thread or by the name of the instance.
+    /// Receives messages; the FMU holds its address. An FMU of FMI 1.0 does not return the address: the logger finds
+    /// the sink by the thread or by the name of the instance.
     sink: Arc<Sink>,
     /// The callbacks of FMI 2.0; the FMU holds their address.
     pub(super) callbacks: Option<Arc<fmi2CallbackFunctions>>,
@@ -49,7 +49,7 @@ pub(crate) struct Base<F> {
     pub(super) saved: Vec<*mut c_void>,
     /// How long a step that returned `fmi2Pending` may take; `None`: no limit.
     pub(crate) time_limit: Option<Duration>,
-    /// The instance still computes a step that could not be canceled, and must not be freed.
+    /// Whether the instance still computes a step that could not be canceled; then it must not be freed.
     pub(super) abandoned: bool,
     /// Whether a call has returned `fmi2Warning`.
     warned: Cell<bool>,
@@ -98,8 +98,8 @@ impl<F: Copy> Base<F> {
         })
     }
 
-    /// Returns whether the instance may be freed. Otherwise it may still use the library, the callbacks and the
-    /// sink: they are leaked. If a call of the instance has not returned, ends the process.
+    /// Returns whether the instance may be freed. If not, it may still use the library, the callbacks and the sink:
+    /// they are leaked. If a call of the instance has not returned, ends the process.
     pub(super) fn may_be_freed(&self) -> bool {
         crash::check_returned(&self.place);
         let is_lost = self.abandoned || self.library.corrupted.load(Ordering::Relaxed);
@@ -109,7 +109,7 @@ impl<F: Copy> Base<F> {
         !is_lost
     }
 
-    /// Warns of an answer of the FMU that is used although it is not allowed.
+    /// Logs a warning about an answer of the FMU that breaks the standard but is used.
     #[cold]
     pub(crate) fn warn(&self, text: &str) {
         tracing::warn!("{}: {text}", self.place.instance());
@@ -139,7 +139,7 @@ impl<F: Copy> Base<F> {
         self.check_results(function, status, String::new)
     }
 
-    /// Like [`Base::check`], and logs the status and the results of the call.
+    /// Like [`Base::check`], but also logs the results of the call.
     #[inline]
     pub(super) fn check_results(
         &self,
@@ -157,7 +157,7 @@ impl<F: Copy> Base<F> {
         self.check_status(function, status)
     }
 
-    /// Like [`Base::check_results`], for a call with guards: what it did beside its arrays is an error.
+    /// Like [`Base::check_results`], for a call with guards: its violation of an array, if any, is an error.
     #[inline]
     pub(super) fn check_guarded(
         &self,

@@ -1,7 +1,7 @@
 //! Canaries: copies of the arrays that an FMU gets, with a pattern before and after each.
 //!
 //! An FMU that writes past an array, or into a constant one, changes memory of the program without an error. With
-//! guards a call gets copies, which are compared after it; without guards it gets the arrays themselves.
+//! guards a call gets copies, which are checked afterwards; without guards it gets the arrays themselves.
 #![expect(unsafe_code, reason = "arrays as bytes")]
 
 use std::ffi::c_int;
@@ -10,11 +10,11 @@ use slave::Failure;
 
 /// Number of elements before and after a copy.
 const MARGIN: usize = 8;
-/// Every byte of these elements.
+/// The value of every byte of these elements.
 const PATTERN: u8 = 0xa5;
-/// Largest number of bytes of a state or a binary value, as a protection against wrong numbers.
+/// Largest number of bytes of a state or a binary value; an FMU may state a wrong number.
 const MOST_BYTES: usize = 1 << 30;
-/// Largest number of states or event indicators, as a protection against wrong numbers.
+/// Largest number of states or event indicators; an FMU may state a wrong number.
 const MOST_NUMBERS: usize = 1 << 20;
 
 /// Names of arrays in messages.
@@ -37,7 +37,7 @@ plain! { f32 f64 i8 u8 i16 u16 i32 u32 i64 u64 usize }
 // `*const c_char` and `*const u8` are one type on ARM.
 impl<T> Plain for *const T {}
 
-/// The status of a call, and what it did to its arrays against the standard.
+/// The status of a call, and a phrase for its violation of an array (a write outside it, or to a constant one).
 pub(super) type Guarded = (c_int, Option<String>);
 
 /// A copy of an array between two margins.
@@ -70,7 +70,7 @@ impl<T: Plain> Fence<T> {
         &self.memory[MARGIN..self.memory.len() - MARGIN]
     }
 
-    /// Returns what the call wrote beside the array; `None` for nothing.
+    /// Returns a phrase for a write outside the array; `None` if there was none.
     fn escaped(&self) -> Option<String> {
         let is_clean = |part: &[T]| bytes(part).iter().all(|byte| *byte == PATTERN);
         let end = self.memory.len() - MARGIN;
@@ -82,7 +82,7 @@ impl<T: Plain> Fence<T> {
         Some(format!("wrote {place} of its array of {}", self.what))
     }
 
-    /// Returns what the call changed in the array, whose values are constant, or beside it; `None` for nothing.
+    /// Returns a phrase for a write to the array, whose values are constant, or outside it; `None` if there was none.
     fn changed(&self, values: &[T]) -> Option<String> {
         let is_same = bytes(self.values()) == bytes(values);
         let changed = (!is_same).then(|| format!("changed its constant array of {}", self.what));
@@ -95,7 +95,7 @@ fn bytes<T: Plain>(values: &[T]) -> &[u8] {
     unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
 }
 
-/// Makes a call with an array that it fills, besides the arrays that `call` has already.
+/// Performs `call` with an array that it fills; `call` may hold further guarded arrays.
 #[inline]
 pub(super) fn filled<T: Plain>(
     guards: bool,
@@ -112,7 +112,7 @@ pub(super) fn filled<T: Plain>(
     (status, violation.or_else(|| array.escaped()))
 }
 
-/// Makes a call with a constant array, besides the arrays that `call` has already.
+/// Performs `call` with a constant array; `call` may hold further guarded arrays.
 #[inline]
 pub(super) fn constant<T: Plain>(
     guards: bool,
@@ -128,7 +128,7 @@ pub(super) fn constant<T: Plain>(
     (status, violation.or_else(|| array.changed(values)))
 }
 
-/// Makes a call with a constant array of pointers to constant bytes.
+/// Performs `call` with a constant array of pointers to constant bytes.
 pub(super) fn constants(
     guards: bool,
     what: &'static str,
@@ -146,7 +146,7 @@ pub(super) fn constants(
     (status, violation.or_else(changed))
 }
 
-/// Makes a call that reads variables: with constant references, and values that it fills.
+/// Performs `call` with constant value references and an array of values that it fills.
 #[inline]
 pub(super) fn read<T: Plain>(
     guards: bool,
@@ -157,7 +157,7 @@ pub(super) fn read<T: Plain>(
     constant(guards, REFERENCES, references, |list| fill(guards, values, |array| call(list, array)))
 }
 
-/// Makes a call that sets variables: with constant references and constant values.
+/// Performs `call` with constant value references and constant values.
 #[inline]
 pub(super) fn write<T: Plain>(
     guards: bool,
@@ -168,7 +168,7 @@ pub(super) fn write<T: Plain>(
     constant(guards, REFERENCES, references, |list| send(guards, values, |array| call(list, array)))
 }
 
-/// Makes a call that fills an array of values.
+/// Performs `call` with an array of values that it fills.
 #[inline]
 pub(super) fn fill<T: Plain>(
     guards: bool,
@@ -178,7 +178,7 @@ pub(super) fn fill<T: Plain>(
     filled(guards, VALUES, values, |array| (call(array), None))
 }
 
-/// Makes a call with a constant array of values.
+/// Performs `call` with a constant array of values.
 #[inline]
 pub(super) fn send<T: Plain>(
     guards: bool,
@@ -188,7 +188,7 @@ pub(super) fn send<T: Plain>(
     constant(guards, VALUES, values, |array| (call(array), None))
 }
 
-/// Returns `size` zero bytes for a state of the size that the FMU states; an error if this is too large.
+/// Returns a buffer of `size` zero bytes for a state whose size the FMU states; an error if this is too large.
 pub(super) fn bytes_of_state(size: usize) -> Result<Vec<u8>, Failure> {
     check_size(size, "state")?;
     let mut bytes = Vec::new();

@@ -13,7 +13,7 @@ use super::python;
 use crate::crash::{LOADING, Limit, Place, UNLOADING};
 use crate::error::LoadError;
 
-/// What happens to a library with functions that no library defines.
+/// How to treat a library that calls functions that no library defines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Binding {
     /// It is loaded with a warning if the system can bind functions at their first call. A call of such
@@ -38,15 +38,15 @@ pub(crate) struct Loading<'a> {
 }
 
 impl Loading<'_> {
-    /// Loads the library. If it lacks a symbol of Python, loads the library of Python and tries again. If it lacks
-    /// another function, loads it with a warning where [`Binding::Lenient`] allows this.
+    /// Loads the library. If it lacks a symbol of Python, loads the library of Python and tries again. If another
+    /// function is undefined, loads the library with a warning where [`Binding::Lenient`] allows it.
     pub(super) fn load(&self) -> Result<Handle, LoadError> {
         let place = Place::new(self.fmu);
         let open = || {
             place.enter(&LOADING);
             let opened = open(self.path);
             place.leave();
-            // The linker repeats the path.
+            // The message of the linker repeats the path.
             let prefix = format!("{}: ", self.path.display());
             opened.map_err(|error| reason(&error).replacen(&prefix, "", 1))
         };
@@ -79,8 +79,8 @@ impl Loading<'_> {
         }
     }
 
-    /// Opens a library that lacks the function `symbol`, and warns; `None` if the binding is strict, if the system
-    /// refuses the library, or if another library of the FMU lacks the function.
+    /// Opens a library that calls the undefined function `symbol`, and warns; `None` if the binding is strict, if the
+    /// system refuses the library, or if another library of the FMU calls `symbol`.
     #[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
     fn open_leniently(&self, symbol: &str) -> Option<Library> {
         use libloading::os::unix::{Library, RTLD_LAZY, RTLD_LOCAL};
@@ -93,7 +93,7 @@ impl Loading<'_> {
         // SAFETY: the handle of an open library.
         let (names, library) =
             unsafe { (super::unresolved::replace(handle), Library::from_raw(handle)) };
-        // Otherwise another library of the FMU lacks it.
+        // Otherwise another library of the FMU calls `symbol`.
         if !names.iter().any(|name| name == symbol) {
             return None;
         }
@@ -148,7 +148,7 @@ impl Drop for Handle {
     }
 }
 
-/// Returns the message of the operating system, without that of `libloading` before it.
+/// Returns the message of the operating system, without the text that `libloading` puts before it.
 fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }

@@ -14,7 +14,7 @@ use crate::crash::{Place, last_of_this_thread};
 /// Maximum number of messages kept for an error.
 const KEPT: usize = 10;
 
-/// The receivers of all instances of this process.
+/// The message receivers of all instances of this process.
 static SINKS: RwLock<Vec<Weak<Sink>>> = RwLock::new(Vec::new());
 
 unsafe extern "C" {
@@ -184,9 +184,9 @@ pub(super) unsafe extern "C" fn receive_message(
     sink.receive(status, &category, &text.map(CStr::to_string_lossy).unwrap_or_default());
 }
 
-/// Returns the callback that `logger.c` defines.
+/// Returns the logger callback that `logger.c` defines.
 pub(super) fn logger() -> fmi2CallbackLogger {
-    // SAFETY: both are pointers to functions; C calls it with the logger's signature.
+    // SAFETY: both types are pointers to functions; C calls the function with the signature of the logger.
     unsafe { std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger) }
 }
 

@@ -6,10 +6,10 @@ use std::process::Command;
 
 use super::preload;
 
-/// The program that is asked for its library.
+/// The Python interpreter that is asked for its shared libraries.
 const PYTHON: &str = "python3";
 
-/// Prints the shared libraries of the Python that runs it, the likeliest first.
+/// The Python program that prints the shared libraries of its interpreter, the likeliest first.
 const QUESTION: &str = r#"
 import os, sys, sysconfig
 get = sysconfig.get_config_var
@@ -24,13 +24,13 @@ for folder in folders:
             print(path)
 "#;
 
-/// Returns whether the name of a symbol is one of Python's.
+/// Returns whether the symbol belongs to the C interface of Python.
 pub(super) fn defines(symbol: &str) -> bool {
     symbol.trim_start_matches('_').starts_with("Py")
 }
 
-/// Loads the library of Python, visible to all libraries loaded later, and warns which one. On failure returns why none
-/// can be loaded.
+/// Loads the library of Python, visible to all libraries loaded later, and logs its path as a warning. On failure
+/// returns why none can be loaded.
 pub(super) fn provide(fmu: &str) -> Result<(), String> {
     if is_visible() {
         return Err("the Python in the process lacks it".to_owned());
@@ -67,7 +67,7 @@ fn is_visible() -> bool {
     visible
 }
 
-/// Returns the library of Python that is in the process already, without being visible to others.
+/// Returns the path of a library of Python that this process has loaded without making it visible to others.
 fn loaded() -> Option<PathBuf> {
     let maps = std::fs::read_to_string("/proc/self/maps").ok()?;
     let paths = maps.lines().filter_map(|line| line.find('/').map(|start| &line[start..]));

@@ -88,7 +88,7 @@ impl Component {
         Ok(StepResult::Whole)
     }
 
-    /// Returns the error of a call in [`Component::pass`]. A separate function keeps the pass small.
+    /// Returns the error of a call in [`Component::pass`]; a separate function keeps the code of `pass` small.
     #[cold]
     fn refuse(&mut self, function: &'static str, status: c_int) -> Result<StepResult, CallError> {
         self.base.check(function, status).map(|()| StepResult::Whole)
@@ -115,7 +115,7 @@ impl Component {
 type Query<T> = unsafe extern "C" fn(*mut c_void, c_int, *mut T) -> c_int;
 
 impl<F: Copy> Base<F> {
-    /// Asks for a property of the last step by `function`, called `name`. Returns `value` if the FMU writes none.
+    /// Asks for a property of the last step by `function`, called `name`; returns `value` if the FMU writes none.
     pub(super) fn ask<T>(
         &self,
         function: Option<Query<T>>,
@@ -132,8 +132,8 @@ impl<F: Copy> Base<F> {
     }
 }
 
-/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. Only FMI 2.0 has a request of the FMU to end the
-/// simulation, `get_boolean_status`.
+/// Defines the evaluation of the status of a step, for FMI 1.0 and 2.0. Only in FMI 2.0 can the FMU request the end
+/// of the simulation (`get_boolean_status`).
 macro_rules! finish_step {
     (
         do_step = $do_step:literal, discard = $discard:literal;
@@ -144,7 +144,7 @@ macro_rules! finish_step {
     ) => {
         impl Component {
             /// Evaluates a step whose status is not OK: waits while it is pending, up to the time limit, and asks for
-            /// the time reached if it was discarded. Cancels a step about which the FMU does not answer.
+            /// the time reached if it was discarded. Cancels a pending step if a status query fails.
             #[cold]
             fn finish_step(
                 &mut self,
@@ -182,7 +182,7 @@ macro_rules! finish_step {
                     let failure = Failure::Status(Status::Discard);
                     CallError { function: $do_step, failure, ..error }
                 })?;
-                // An FMU that does not answer does not request the end.
+                // A failed query counts as no request.
                 let terminated = false $(|| {
                     let function = self.base.functions.$get_boolean_status;
                     let answer = self.base.ask(function, &$terminated, StatusKind::Terminated, 0);

@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use rustix::process::getpgrp;
 
-/// The surroundings of all libraries of a process.
+/// Process-wide settings, which all libraries of a process share.
 pub(crate) struct Surroundings {
     environment: BTreeMap<OsString, OsString>,
     /// The other properties: names and values.
@@ -16,7 +16,7 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Returns the present surroundings of this process.
+    /// Returns the present settings of this process.
     pub(crate) fn now() -> Self {
         let folder = std::env::current_dir();
         let folder =
@@ -36,7 +36,7 @@ impl Surroundings {
         }
     }
 
-    /// Returns what differs in `later`, a phrase each.
+    /// Returns a phrase for each setting that differs in `later`.
     pub(crate) fn changes(&self, later: &Self) -> Vec<String> {
         let others =
             self.others.iter().zip(&later.others).filter(|(earlier, later)| earlier != later);

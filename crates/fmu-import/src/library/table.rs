@@ -8,7 +8,7 @@ macro_rules! functions {
         $($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*
     ) => {
         /// The functions of a library. The standard requires every function in every library. Here a library may lack
-        /// those that [`Functions::open`] does not check: they fail when they are called.
+        /// functions that [`Functions::open`] does not check: calling one returns an error.
         #[derive(Clone, Copy)]
         pub(crate) struct Functions {
             $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*

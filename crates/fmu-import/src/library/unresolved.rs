@@ -55,7 +55,7 @@ const DT_PLTREL: i64 = 20;
 const DT_JMPREL: i64 = 23;
 const DT_VERSYM: i64 = 0x6fff_fff0;
 const STB_GLOBAL: u8 = 1;
-/// The type of a relocation of a function that is bound at its first call.
+/// The type of a relocation for a function that is bound at its first call.
 const JUMP_SLOT: u64 = if cfg!(target_arch = "x86_64") { 7 } else { 1026 };
 
 /// The names of all functions replaced in this process.
@@ -86,7 +86,7 @@ pub(super) unsafe fn replace(handle: *mut c_void) -> Vec<String> {
         }
         ((*at).tag == tag).then(|| (*at).value)
     };
-    // The dynamic linker of these processors has replaced addresses in the file by addresses in memory.
+    // On these processors the dynamic linker has replaced offsets in the file by addresses in memory.
     let (Some(table), Some(bytes), Some(DT_RELA)) =
         (entry(DT_JMPREL), entry(DT_PLTRELSZ), entry(DT_PLTREL))
     else {
@@ -107,7 +107,7 @@ pub(super) unsafe fn replace(handle: *mut c_void) -> Vec<String> {
             let relocation = &*table.add(index);
             let number = (relocation.info >> 32) as usize;
             let symbol = &*symbols.add(number);
-            // A function of a known version of a library is defined there.
+            // A symbol with a version is defined in the library that states the version.
             let versioned = versions.is_some_and(|versions| *versions.add(number) & 0x7fff > 1);
             let open = symbol.section == 0 && symbol.info >> 4 == STB_GLOBAL && !versioned;
             if !open || relocation.info & 0xffff_ffff != JUMP_SLOT {

@@ -206,7 +206,7 @@ impl From<functions::EventInfo> for EventInfo {
         Self {
             discrete_states_need_update: info.iteration_converged == 0,
             terminate_simulation: info.terminate_simulation != 0,
-            // The states are other variables, so their nominal values have changed, too.
+            // After such a change the states are other variables, with other nominal values.
             nominals_changed: info.state_value_references_changed != 0,
             values_changed: info.state_values_changed != 0,
             next_event_time: (info.upcoming_time_event != 0).then_some(info.next_event_time),

@@ -79,14 +79,14 @@ states! {
     free_state = "fmi3FreeFMUState";
 }
 
-/// Returns the number of references. Variables may be arrays: there may be more values.
+/// Returns the number of references, which may be less than the number of values: variables may be arrays.
 #[inline]
 fn reference_count<T>(references: &[u32], _values: &[T]) -> usize {
     references.len()
 }
 
 impl Component {
-    /// Calls `fmi3SetDebugLogging` for these categories; none means all, and a null list (FMI 3.0.2, section 2.3.1).
+    /// Calls `fmi3SetDebugLogging` for `categories`; an empty list means all (FMI 3.0.2, section 2.3.1).
     pub(crate) fn set_debug_logging(
         &mut self,
         on: bool,
@@ -122,7 +122,7 @@ impl Component {
         self.base.check(NAME, status)
     }
 
-    /// Calls `fmi3GetClock`: 0 is inactive.
+    /// Calls `fmi3GetClock`; a value of 0 means inactive.
     pub(crate) fn get_clock(
         &mut self,
         references: &[u32],
@@ -195,8 +195,8 @@ impl Component {
         Ok(shift)
     }
 
-    /// Calls `fmi3GetDirectionalDerivative`. `seed` and `changes` have as many values as the elements of
-    /// the knowns and unknowns together.
+    /// Calls `fmi3GetDirectionalDerivative`. `seed` has a value for each element of the knowns, `changes` for each
+    /// element of the unknowns.
     pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -224,8 +224,7 @@ impl Component {
         self.base.check_guarded(NAME, done, || format!(" {changes:?}"))
     }
 
-    /// Calls `fmi3GetOutputDerivatives`. `values` has as many values as the elements of the outputs
-    /// together.
+    /// Calls `fmi3GetOutputDerivatives`. `values` has a value for each element of the outputs.
     pub(crate) fn get_output_derivatives(
         &mut self,
         references: &[u32],

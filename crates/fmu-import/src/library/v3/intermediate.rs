@@ -38,7 +38,7 @@ pub(super) struct Inputs {
     pub(super) is_set: bool,
     /// Start of the step in s.
     pub(super) start: f64,
-    /// The last time for which the FMU asked, in s.
+    /// The last time for which the FMU asked for inputs, in s.
     asked_time: Option<f64>,
     /// The whole inputs that have had derivatives in this or an earlier step.
     pub(super) references: Vec<u32>,
@@ -82,7 +82,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// Runs a part of the step of the instance `target`, which may ask for the inputs meanwhile; returns its status.
+    /// Runs `step`, a part of the step of the instance `target`, which may ask for its inputs; returns the status.
     pub(super) fn during(
         &mut self,
         target: (Instance, SetFloat64),
@@ -95,8 +95,8 @@ impl Inputs {
         status
     }
 
-    /// Sets the inputs to their values at `time`, in s. Returns the status of the FMU, or 0 (OK) if the FMU has asked
-    /// for these values last.
+    /// Sets the inputs to their values at `time`, in s, unless the FMU asked for the values at this time last.
+    /// Returns the status of the FMU, or 0 (OK).
     pub(super) fn settle(&mut self, time: f64) -> c_int {
         if self.asked_time == Some(time) { 0 } else { self.apply(time) }
     }
@@ -116,7 +116,7 @@ impl Inputs {
     }
 }
 
-/// Returns `value + sum(derivatives[k] s^(k + 1) / (k + 1)!)`.
+/// Returns `value + first s + second s^2 / 2 + third s^3 / 6`, where `s` is the time since the start of the step.
 fn value_at(value: f64, [first, second, third]: &[f64; ORDERS], s: f64) -> f64 {
     value + s * (first + s / 2.0 * (second + s / 3.0 * third))
 }

@@ -92,7 +92,7 @@ impl Component {
         self.base.check_status(SET, status)
     }
 
-    /// Forgets the derivatives of the inputs: they hold for one step.
+    /// Forgets the derivatives of the inputs, which hold for one step only.
     pub(crate) fn forget_input_derivatives(&mut self) {
         self.inputs.is_set = false;
     }
