@@ -60,7 +60,7 @@ fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {
     negated
 }
 
-/// Returns the value references in the FMU of the variables in `list`. `buffer` holds them if some are `negated`.
+/// Returns the value references in the FMU of the variables in `list`; stores them in `buffer` if some are `negated`.
 fn references_in_fmu<'a>(
     negated: &HashMap<u32, u32>,
     list: &'a [u32],
@@ -103,8 +103,8 @@ impl Instance {
     }
 
     /// Returns whether to pass values to the FMU: in initialization mode only if all of them are values of inputs.
-    /// The master repeats its settings there; the FMU has them already. After a value is passed, the result of
-    /// `fmiInitialize` is out of date.
+    /// The master then sets start values and parameters again, which the FMU has already. Passing a value makes the
+    /// result of `fmiInitialize` out of date.
     fn accepts(&mut self, kind: ValueType, references: &[u32]) -> bool {
         let accepted = !self.in_initialization_mode
             || references.iter().all(|reference| self.inputs.contains(&(kind, *reference)));
@@ -269,7 +269,7 @@ impl Instance {
         self.component.set_string(list, values)
     }
 
-    // FMI 1.0 has no modes in model exchange: `fmiEventUpdate` is an event as a whole.
+    // FMI 1.0 has no modes in model exchange: `fmiEventUpdate` handles a whole event.
     pub(crate) fn completed_integrator_step(
         &mut self,
         _never_back: bool,
@@ -297,7 +297,7 @@ impl Instance {
     }
 }
 
-/// Returns the Integer of the FMU for a value; an error beyond 32 bits. That of a negated alias has the opposite sign.
+/// Converts a value to an Integer of the FMU, with the opposite sign if `negated`; an error beyond 32 bits.
 fn integer_for_fmu(value: i64, negated: bool) -> Result<c_int, CallError> {
     // The smallest i64 has no opposite and is beyond 32 bits in any case.
     let value = if negated { value.wrapping_neg() } else { value };

@@ -129,7 +129,7 @@ impl Instance {
             |name: &&str| description.log_categories.iter().any(|category| category.name == *name);
         let categories: Vec<&str> = STATUS_CATEGORIES.into_iter().filter(known).collect();
         if !categories.is_empty() {
-            // An FMU that refuses this logs no messages.
+            // An FMU that refuses this call logs no messages.
             let _ = component.set_debug_logging(true, &categories);
         }
         let state = State {
@@ -184,7 +184,7 @@ impl Instance {
         let configures = set.as_ref().err().is_none_or(keeps_mode);
         let exited = if configures { self.component.exit_configuration_mode() } else { Ok(()) };
         set.and(exited)?;
-        // The elements have new positions.
+        // Saved states refer to the old positions of the elements.
         self.component.free_states();
         self.component.forget_inputs();
         self.slots.clear();

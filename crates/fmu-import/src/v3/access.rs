@@ -11,7 +11,7 @@ use crate::error::refused;
 use slave::CallError;
 
 impl Instance {
-    /// Performs `action` for the runs of the plan of a list; an error if no variable has one of the references.
+    /// Performs `action` for each run (C call) of the plan of a list; an error if a reference belongs to no variable.
     fn for_runs(
         &mut self,
         function: &'static str,
@@ -26,8 +26,8 @@ impl Instance {
         done
     }
 
-    /// Reads values. `fill` copies one value of a buffer, a text without an allocation if there is room; `None` is an
-    /// error.
+    /// Reads values. `fill` copies one value from a buffer, a text without allocation if there is room; it returns
+    /// `None` on failure.
     pub(super) fn read<T>(
         &mut self,
         function: &'static str,
@@ -61,7 +61,7 @@ impl Instance {
         })
     }
 
-    /// Passes values. `put` stores one value in a buffer; `None` is an error.
+    /// Passes values. `put` stores one value in a buffer; it returns `None` on failure.
     pub(super) fn write<T: Clone + std::fmt::Debug>(
         &mut self,
         function: &'static str,
@@ -93,7 +93,7 @@ impl Instance {
                 instance.remember(run);
             }
             if silent {
-                // Set when one of its clocks ticks.
+                // The values are passed when a clock of the run ticks.
                 return Ok(());
             }
             if instance.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {

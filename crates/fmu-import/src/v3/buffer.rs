@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// A value that outlives its call.
+/// A value that is kept after its C call.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum ElementValue {
     /// The bits of a number.
@@ -17,29 +17,29 @@ pub(super) enum ElementValue {
     Bytes(Vec<u8>),
 }
 
-/// A value of the C interface. The default methods are for types that are no numbers.
+/// A value of the C interface. The default methods are for types that are not numeric.
 trait Element: Clone + Default {
-    /// NaN for an integer beyond 64 bits with a sign; `None` if the value is no number.
+    /// Returns NaN for an integer beyond the range of `i64`; `None` if the type is not numeric.
     fn real(&self) -> Option<f64> {
         None
     }
 
-    /// `None` if the type is no floating-point type or the number is beyond its range.
+    /// Returns `None` if the type is no floating-point type or the number is beyond its range.
     fn from_real(_: f64) -> Option<Self> {
         None
     }
 
-    /// `None` if the type is no integer type, and beyond 64 bits with a sign.
+    /// Returns `None` if the type is no integer type or the value is beyond the range of `i64`.
     fn integer(&self) -> Option<i64> {
         None
     }
 
-    /// `None` if the type is no type of numbers, and beyond its range.
+    /// Returns `None` if the type is not numeric or the number is beyond its range.
     fn from_integer(_: i64) -> Option<Self> {
         None
     }
 
-    /// Returns bits that tell a number from all others of its type; of a String or a binary, a hash.
+    /// Returns bits that identify a number among all numbers of its type; for a String or a binary a hash.
     fn bits(&self) -> u64;
 
     fn to_value(&self) -> ElementValue {
@@ -133,7 +133,7 @@ impl Element for f32 {
     }
 }
 
-/// Implements [`Element`] for the types that are no numbers. A row has the type, its variants in [`Buffer`] and
+/// Implements [`Element`] for the types that are not numeric. A row has the type, its variants in [`Buffer`] and
 /// [`ElementValue`], and the methods of a buffer that get and store a value.
 macro_rules! others {
     ($($type:ty: $variant:ident, $value:ident, $get:ident, $put:ident;)*) => {
@@ -231,8 +231,8 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns value number `position` as an Integer; `None` if it is no integer, or beyond 64 bits with a
-            /// sign.
+            /// Returns value number `position` as an Integer; `None` if it is no integer or beyond the range of
+            /// `i64`.
             pub(super) fn integer(&self, position: usize) -> Option<i64> {
                 match self {
                     $(Buffer::$variant(values) => values[position].integer(),)*
@@ -247,7 +247,7 @@ macro_rules! buffer {
                 Some(())
             }
 
-            /// Returns bits of value number `position`, which tell a number from all others; of a String or a binary,
+            /// Returns the bits of value number `position`, by which its change is detected; for a String or a binary
             /// a hash.
             pub(super) fn bits(&self, position: usize) -> u64 {
                 match self {
@@ -262,8 +262,8 @@ macro_rules! buffer {
                 }
             }
 
-            /// Stores a value; 0, an empty text or no bytes if there is none, or one of another type. Returns whether the
-            /// value was stored.
+            /// Stores `value` and returns true. If it is absent or of another type, stores 0, an empty text or no
+            /// bytes, and returns false.
             pub(super) fn put_value(&mut self, position: usize, value: Option<&ElementValue>) -> bool {
                 match self {
                     $(Buffer::$variant(values) => {

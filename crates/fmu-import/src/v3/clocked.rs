@@ -38,7 +38,7 @@ impl ClockedRuns {
 
 impl Instance {
     /// Returns whether the variables of a run can be neither read nor set now: the initialization has ended, they are
-    /// clocked, and none of their clocks ticks. In scheduled execution they always can.
+    /// clocked, and none of their clocks ticks. False in scheduled execution.
     pub(super) fn is_silent(&self, run: &Run) -> bool {
         let is_clocked = !run.clocks.is_empty() && !self.is_scheduled();
         let ticks = || self.state.mode == Mode::Event && self.state.clocks.is_active(&run.clocks);
@@ -52,8 +52,8 @@ impl Instance {
         }
     }
 
-    /// Puts the remembered values into the buffer of a run; elements without one are 0 or empty. Returns whether all have
-    /// one.
+    /// Copies the remembered values into the buffer of a run; an element without a remembered value becomes 0 or
+    /// empty. Returns whether every element had one.
     pub(super) fn recall(&self, run: &mut Run) -> bool {
         let mut all = true;
         for (place, shadow) in run.shadows.iter().enumerate() {

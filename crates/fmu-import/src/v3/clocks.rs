@@ -1,5 +1,5 @@
-//! Clocks: input clocks based on time tick in the slave, triggered ones when the master says so; ticks are kept for
-//! the results until the next step (FMI 3.0.2, section 2.2.8).
+//! Clocks (FMI 3.0.2, section 2.2.8). The slave ticks the input clocks that are based on time; the master triggers
+//! the other ones. The ticks of a step are kept for the results until the next step.
 
 use std::collections::HashMap;
 
@@ -14,24 +14,24 @@ use crate::error::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 
-/// A difference of times below this fraction of the interval, or of the time, is rounding, up to [`MOST`].
+/// A clock is due already when its tick is nearer than this fraction of the interval or of the time.
 const ROUNDING: f64 = 1e-9;
-/// Largest difference in s that is rounding, besides half of the interval, unless the times have larger units in the
-/// last place.
+/// Upper limit of this tolerance in s, besides half of the interval; the tolerance is never below four units in the
+/// last place of the time.
 const MOST: f64 = 1e-6;
-/// Largest number of ticks of an aperiodic clock in one event; further ones come with the next step.
+/// Largest number of ticks of an aperiodic clock in one event; further ticks occur in the next step.
 const TICKS: usize = 100;
 /// `fmi3IntervalChanged`.
 const CHANGED: i32 = 2;
 
-/// An input clock that ticks at known times. A serialised state has only what changes with time.
+/// An input clock that ticks at known times. A serialised state has only the fields that change with time.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct TimedClock {
     #[serde(skip)]
     reference: u32,
     #[serde(skip)]
     attributes: ClockType,
-    /// Interval in s; that of an aperiodic clock is the last one.
+    /// Interval in s; for an aperiodic clock the last one.
     interval: f64,
     /// The interval as numerator and denominator, so that many ticks do not drift.
     #[serde(skip)]
@@ -42,7 +42,7 @@ struct TimedClock {
     ticks: u64,
     /// Time of the next tick in s, if it is known.
     next: Option<f64>,
-    /// Whether an interval that is not allowed was a warning.
+    /// Whether a warning about a forbidden interval was logged.
     #[serde(skip)]
     warned: bool,
 }
@@ -85,7 +85,7 @@ fn seconds(decimal: Option<f64>, counter: Option<u64>, resolution: Option<u64>) 
     decimal.or(counter.zip(resolution).map(fraction))
 }
 
-/// Returns a positive decimal number as numerator and denominator; `None` for one of too many digits.
+/// Returns a positive decimal number as numerator and denominator; `None` if it has too many digits.
 fn fraction(decimal: f64) -> Option<(u64, u64)> {
     let text = decimal.to_string();
     let (whole, part) = text.split_once('.').unwrap_or((&text, ""));
@@ -94,7 +94,7 @@ fn fraction(decimal: f64) -> Option<(u64, u64)> {
 }
 
 impl TimedClock {
-    /// Returns the time in s of the tick number `ticks`, from 0. The rounding does not grow with the number.
+    /// Returns the time in s of the tick number `ticks`, from 0. The rounding error does not grow with `ticks`.
     #[expect(clippy::cast_precision_loss, reason = "the nearest number")]
     fn tick(&self, ticks: u64) -> f64 {
         let elapsed = match self.fraction {
@@ -125,8 +125,8 @@ impl TimedClock {
         seconds(attributes.interval_decimal, attributes.interval_counter, attributes.resolution)
     }
 
-    /// Returns whether the FMU is asked for the interval in an event, in which the clock `has_ticked` or not. The
-    /// importer alone changes a stated interval.
+    /// Returns whether to ask the FMU for the interval in an event; `has_ticked`: whether the clock ticked in it.
+    /// Only the importer changes an interval that the description states.
     fn is_asked(&self, has_ticked: bool) -> bool {
         match self.attributes.interval_variability {
             IntervalVariability::Countdown => true,
@@ -136,8 +136,8 @@ impl TimedClock {
         }
     }
 
-    /// Returns whether the clock has to tick at `time` although it is among the clocks `ticks` that ticked in the
-    /// present event: a periodic clock ticks once in an event, another one at most [`TICKS`] times.
+    /// Returns whether the clock has to tick at `time`. `ticks` are the clocks that ticked in the present event, in
+    /// which a periodic clock ticks once, an aperiodic one at most [`TICKS`] times.
     fn is_due(&self, time: f64, ticks: &[u32]) -> bool {
         let largest = if self.interval > 0.0 { MOST.min(0.5 * self.interval) } else { MOST };
         let rounding = (ROUNDING * self.interval.max(time.abs())).min(largest);
@@ -246,7 +246,7 @@ impl Clocks {
         for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time, ticks)) {
             due.push(clock.reference);
             clock.ticks += 1;
-            // From the count, so that rounding does not add up.
+            // Computed from the number of ticks, so that rounding errors do not add up.
             clock.next = clock.is_periodic().then(|| clock.tick(clock.ticks));
         }
         due
@@ -303,8 +303,8 @@ impl Clocks {
         Ok(())
     }
 
-    /// Asks for the intervals that an event at `time`, in s, may have changed, and moves the next ticks. The first
-    /// interval of a clock that is not allowed is a warning.
+    /// Asks for the intervals that an event at `time`, in s, may have changed, and moves the next ticks. Warns of the
+    /// first forbidden interval of each clock.
     pub(super) fn ask_intervals(
         &mut self,
         component: &mut Component,
@@ -316,7 +316,7 @@ impl Clocks {
                 if qualifier != CHANGED {
                     continue;
                 }
-                // A countdown of 0 s ends at once, but not for ever.
+                // A countdown of 0 s ends at once, at most `TICKS` times in an event.
                 let periodic = clock.is_periodic();
                 let positive = periodic || clock.count_in(&self.event_ticks) >= TICKS;
                 let is_allowed = if positive { interval > 0.0 } else { interval >= 0.0 };
@@ -451,7 +451,7 @@ mod tests {
         TimedClock { reference: 1, attributes, interval, fraction, ..TimedClock::default() }
     }
 
-    /// The products of the rounded intervals are 333333.3333333333 and 700000.0000000001.
+    /// With intervals rounded to `f64`, the times would be 333333.3333333333 s and 700000.0000000001 s.
     #[test]
     fn ten_million_ticks_do_not_drift() {
         let third = clock(1.0 / 30.0, Some((1, 30)));
@@ -473,7 +473,7 @@ mod tests {
         assert!(!clock.is_due(tick - 1e-4, &[]) && !clock.is_due(1.7e9, &[]));
     }
 
-    /// The intervals are 1 us, which is rounding from 1000 s on, and 0 s, again and again.
+    /// The intervals are 1 us, which is 1e-9 of the time, and 0 s.
     #[test]
     fn an_event_ends_although_intervals_are_tiny_or_zero() {
         use IntervalVariability::{Constant, Countdown, Tunable};

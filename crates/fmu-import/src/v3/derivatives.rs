@@ -74,8 +74,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets the derivatives of inputs for the next step, at whose start they have their present values. An
-    /// input for which the FMU does not ask within a step is held.
+    /// Sets the derivatives of inputs for the next step, which starts with their present values. An input for which
+    /// the FMU does not ask within a step is held constant.
     pub(crate) fn set_input_derivatives(
         &mut self,
         list: &[u32],
@@ -103,7 +103,7 @@ impl Instance {
         if self.are_scalars(list) {
             return self.component.get_output_derivatives(list, orders, values);
         }
-        // One call for each run of equal orders.
+        // One call for each sequence of equal orders.
         let mut start = 0;
         for equal in orders.chunk_by(i32::eq) {
             let end = start + equal.len();

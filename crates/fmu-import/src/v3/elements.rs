@@ -32,7 +32,7 @@ pub(super) struct Variable {
     pub(super) intermediate: bool,
     /// Value references of the clocks of the variable.
     pub(super) clocks: Vec<u32>,
-    /// Position of its first element among all elements of variables with `event`; without meaning without `event`.
+    /// For a variable with `event`, the position of its first element among all elements of such variables.
     pub(super) shadow: usize,
 }
 
@@ -43,9 +43,9 @@ pub(crate) struct ElementView {
     pub(crate) description: ModelDescription,
     pub(super) variables: Vec<Variable>,
     by_reference: HashMap<u32, usize>,
-    /// The value reference of the first cell.
+    /// The value reference of the first array element.
     base: u32,
-    /// Positions of variable and element of each reference from `base` on.
+    /// For each value reference from `base` on, the position of its variable and its position in the array.
     cells: Vec<(usize, usize)>,
     /// Whether all floating-point variables are scalars of type `Float64` without clocks.
     pub(super) plain: bool,
@@ -54,8 +54,8 @@ pub(crate) struct ElementView {
 }
 
 impl ElementView {
-    /// Creates the view of an FMU whose structural parameters have the values `sizes`, by value
-    /// reference; others have their start values. On failure returns the reason.
+    /// Creates the view of an FMU whose structural parameters have the values `sizes`, by value reference; missing
+    /// ones have their start values. On failure returns the reason.
     pub(crate) fn new(
         description: &ModelDescription,
         sizes: &HashMap<u32, u64>,
@@ -73,7 +73,7 @@ impl ElementView {
                 description: ModelDescription {
                     variables: Vec::new(),
                     co_simulation: description.stepped(),
-                    // Only of an FMU that runs by it.
+                    // Kept only if the FMU has no co-simulation, so that it runs in scheduled execution.
                     scheduled_execution: description
                         .scheduled_execution
                         .clone()
@@ -130,7 +130,7 @@ impl ElementView {
     }
 }
 
-/// Returns the extents of a variable; none for a scalar. `sizes` take precedence over `starts`.
+/// Returns the extents of a variable; none for a scalar. `sizes` take precedence over the start values `starts`.
 fn extents(
     variable: &ScalarVariable,
     starts: &HashMap<u32, u64>,
@@ -213,7 +213,7 @@ fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
 
 struct Builder {
     view: ElementView,
-    /// For each array, by value reference, its first cell.
+    /// Position in `cells` of the first element of each array, by value reference.
     first_cell: HashMap<u32, usize>,
     /// For each variable of the FMU, the position of its first element in the new description and their number.
     ranges: Vec<(usize, usize)>,
@@ -314,7 +314,7 @@ impl Builder {
         }
     }
 
-    /// Converts the indices between variables. On failure returns the reason: two variables with one name.
+    /// Converts the indices by which variables refer to each other. Fails if two have one name.
     fn finish(mut self, description: &ModelDescription) -> Result<ElementView, String> {
         let mut names = HashSet::new();
         let variables = &self.view.description.variables;
@@ -337,7 +337,7 @@ impl Builder {
             }
         }
         if let Some(flags) = &mut self.view.description.co_simulation {
-            // Replaces the input derivatives of FMI 2.0.
+            // Intermediate update replaces the input derivatives of FMI 2.0.
             flags.can_interpolate_inputs =
                 self.view.variables.iter().any(|variable| variable.intermediate);
         }
@@ -366,12 +366,12 @@ impl Builder {
         if size == 0 {
             return None;
         }
-        // A scalar belongs to every element.
+        // If the other variable is a scalar, every element refers to it.
         u32::try_from(start + element.min(size - 1) + 1).ok()
     }
 
-    /// Returns the rows of all elements. Each depends on all elements of the dependencies; beyond [`MOST_DEPENDENCIES`]
-    /// its dependencies are not stated.
+    /// Expands the rows to all elements. Each element depends on all elements of the dependencies; beyond
+    /// [`MOST_DEPENDENCIES`] its dependencies are not stated.
     fn rows(&self, rows: &[Unknown]) -> Vec<Unknown> {
         let mut all = Vec::new();
         let mut left = MOST_DEPENDENCIES;
@@ -454,7 +454,7 @@ mod tests {
         };
         let same = of_view("2", "4").unwrap();
         assert_eq!(reference(&same, "w[2]"), reference(&same, "v[2]"));
-        // The second one is of a scalar.
+        // The value reference 2 belongs to a scalar.
         for (extent, number) in [("3", "4"), ("1", "2")] {
             let reason = of_view(extent, number).unwrap_err();
             assert!(

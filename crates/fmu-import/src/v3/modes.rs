@@ -14,7 +14,7 @@ const STANDSTILLS: u32 = 1000;
 /// Largest difference, as a fraction of the step, between the time of an FMU that adds it up itself and that of its
 /// importer.
 const DEVIATION: f64 = 1e-3;
-/// After `fmi3Discard` a part of a step is halved if it is larger than this fraction of the step.
+/// After `fmi3Discard` a part of a step is tried with half its size if it is larger than this fraction of the step.
 const SMALLEST: f64 = 1e-6;
 
 /// The mode of the FMU.
@@ -108,7 +108,7 @@ impl Instance {
         done
     }
 
-    /// Steps in parts, each up to an event or an early return of the FMU; of a part that it discards, tries half.
+    /// Steps in parts, each up to an event or an early return of the FMU; tries half of a discarded part.
     fn step_in_parts(
         &mut self,
         time: f64,
@@ -194,7 +194,7 @@ impl Instance {
         self.leave_event_mode()
     }
 
-    /// Returns the largest step from `now` of at most `left` s that crosses no event.
+    /// Returns the largest step from `now` of at most `left`, both in s, that crosses no event.
     fn limited(&self, now: f64, left: f64, rounding: f64) -> f64 {
         if !self.event_mode {
             return left;
@@ -202,7 +202,7 @@ impl Instance {
         let events = [self.state.next_event, self.state.clocks.next()].into_iter().flatten();
         let sizes = events.map(|event| event - now).filter(|size| *size > rounding);
         let least = sizes.fold(f64::INFINITY, f64::min);
-        // An event shortly before the end counts as one at the end: the rest of the step would only be rounding.
+        // An event within rounding of the end counts as an event at the end.
         if least < left - rounding { least } else { left }
     }
 
@@ -264,8 +264,8 @@ impl Events for Instance {
         self.tick()
     }
 
-    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it. Clocks to which
-    /// the event gives an interval of 0 s then tick for the next update, at most 100 times in an event.
+    /// Updates the discrete states once. Input clocks that are due tick before the update; all ticks end after it. A
+    /// clock to which the event gives an interval of 0 s ticks for the next update, at most 100 times in an event.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         self.tick()?;
         if self.is_scheduled() {

@@ -28,11 +28,11 @@ pub(super) struct Run {
     pub(super) clocks: Vec<u32>,
     /// Value references of whole variables, for the C function.
     pub(super) references: Vec<u32>,
-    /// For each value of the list: its position in the list, its position among the values of the call.
+    /// For each value of the list: its position in the list, and its position among the values of the call.
     pub(super) places: Vec<(usize, usize)>,
-    /// For each value of the call, its position among the shadows.
+    /// For each value of the call, its position among all elements that may change in Event Mode only.
     pub(super) shadows: Vec<usize>,
-    /// Whether the list lacks elements of an array, which keep their values.
+    /// Whether the list lacks elements of an array; these keep their values.
     pub(super) partial: bool,
     pub(super) buffer: Buffer,
 }
@@ -62,7 +62,7 @@ impl Plan {
     }
 }
 
-/// Returns the position of the run that calls the function for `variable`, which may be a new one.
+/// Returns the position of the run for `variable`; adds a run if none fits.
 fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
     let (kind, event, clocks) = (variable.kind, variable.event, &variable.clocks);
     let same = |run: &Run| (run.kind, run.event, &run.clocks) == (kind, event, clocks);
@@ -113,8 +113,8 @@ pub(super) struct Plans {
 }
 
 impl Plans {
-    /// Returns the position of the plan for a list, which may be a new one. On failure returns the reference that no
-    /// variable has.
+    /// Returns the position of the plan for a list; makes the plan if there is none. On failure returns the reference
+    /// that no variable has.
     pub(super) fn find(&mut self, view: &ElementView, list: &[u32]) -> Result<usize, u32> {
         if let Some(position) = self.plans.iter().position(|plan| plan.references == list) {
             return Ok(position);
