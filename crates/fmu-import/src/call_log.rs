@@ -26,22 +26,22 @@ pub struct CallLog {
 #[derive(Debug)]
 struct Output {
     file: File,
-    /// Whether the file still has its earlier content.
-    is_earlier: bool,
-    /// The first error, after which nothing is written until [`CallLog::check`] returns it.
+    /// Whether the file still has the content of an earlier run.
+    holds_earlier_run: bool,
+    /// The first write error; nothing is written until [`CallLog::check`] returns it.
     failed: Option<io::Error>,
 }
 
 impl CallLog {
-    /// Opens the file at `path`, or creates it. The first call replaces the content of an existing file, so that a run
-    /// without any keeps the log of an earlier one.
+    /// Opens or creates the file at `path`. The first logged call replaces the content of an existing file: a run
+    /// without calls keeps the log of an earlier run.
     ///
     /// # Errors
     ///
     /// [`io::Error`] if the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = File::options().write(true).create(true).truncate(false).open(path)?;
-        let output = Output { is_earlier: file.metadata()?.len() > 0, file, failed: None };
+        let output = Output { holds_earlier_run: file.metadata()?.len() > 0, file, failed: None };
         Ok(Self { output: Arc::new(Mutex::new(output)) })
     }
 
@@ -97,8 +97,8 @@ impl CallLog {
     fn write(&self, text: &str) {
         let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
         if output.failed.is_none() {
-            let is_earlier = std::mem::take(&mut output.is_earlier);
-            let emptied = if is_earlier { output.file.set_len(0) } else { Ok(()) };
+            let holds_earlier_run = std::mem::take(&mut output.holds_earlier_run);
+            let emptied = if holds_earlier_run { output.file.set_len(0) } else { Ok(()) };
             output.failed = emptied.and_then(|()| output.file.write_all(text.as_bytes())).err();
         }
     }
@@ -150,7 +150,7 @@ const NAMES: &[(&str, &str, &str)] = &[
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
-/// Functions of FMI 2.0 and of FMI 1.0 for model exchange, where the latter differ from [`NAMES`].
+/// Functions of FMI 2.0, each with its name in FMI 1.0 for model exchange if that differs from [`NAMES`].
 const MODEL_EXCHANGE_NAMES: &[(&str, &str)] = &[
     ("fmi2Terminate", "fmiTerminate"),
     ("fmi2FreeInstance", "fmiFreeModelInstance"),
@@ -159,8 +159,8 @@ const MODEL_EXCHANGE_NAMES: &[(&str, &str)] = &[
 ];
 
 impl<S: Slave + ?Sized> LoggedSlave<S> {
-    /// Logs the creation of the instance. `functions` has, for FMI 1.0, 2.0 and 3.0, the C function and its argument
-    /// for the interface.
+    /// Logs the creation of the instance. `functions` has a pair for FMI 1.0, 2.0 and 3.0: the C function, and its
+    /// argument that selects the interface (empty if it has none).
     fn log_creation(&self, functions: [(&str, &str); 3]) {
         let (function, kind) = self.of_version(functions);
         let (instance, guid) = (&self.instance, &self.slave.description().guid);
@@ -183,7 +183,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         self.of_version(["fmi", "fmi2", "fmi3"])
     }
 
-    /// Returns the name of a function of FMI 2.0 in the version of the FMU.
+    /// Translates the name of a function of FMI 2.0 to the version of the FMU.
     fn name(&self, function: &str) -> String {
         if self.version == Version::V1 && self.slave.description().model_exchange.is_some() {
             let known = MODEL_EXCHANGE_NAMES.iter().find(|(name, _)| *name == function);
@@ -222,7 +222,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         done
     }
 
-    /// Writes the start of a line: instance, function of FMI 2.0 in the version of the FMU, and arguments.
+    /// Writes the start of a line: instance, function and arguments. `function` is a name of FMI 2.0.
     fn begin(&self, function: &str, arguments: Arguments<'_>) {
         let function = self.name(function);
         self.write(&format!("{} {function}({arguments})", self.instance));
@@ -276,14 +276,14 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
 
 impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     fn drop(&mut self) {
-        // The instance is freed after this.
+        // Logged here, because the instance is freed next, when the field `slave` is dropped.
         let function = self.name("fmi2FreeInstance");
         self.log.write(&format!("{} {function}()\n", self.instance));
     }
 }
 
-/// Defines methods without results. A row has the signature, the function of FMI 2.0 that is logged (or of FMI 3.0 if
-/// only that has it), and its arguments as text.
+/// Defines methods without results. A row has the signature, the function of FMI 2.0 (of FMI 3.0 if FMI 2.0 lacks it)
+/// that is logged, and its arguments as text.
 macro_rules! calls {
     ($(fn $method:ident($($argument:ident: $type:ty),*) = $function:literal, $($text:expr),+;)*) => {
         $(fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
@@ -346,7 +346,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         if self.version != Version::V2 {
-            // No function of the FMU.
+            // FMI 1.0 and 3.0 pass the experiment with the initialization: there is no C call to log.
             return self.slave.setup_experiment(experiment);
         }
         let Experiment { start_time, stop_time, tolerance } = experiment;
@@ -385,7 +385,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         values: &[f64],
     ) -> Result<(), CallError> {
         if self.version == Version::V3 {
-            // No function of the FMU: it asks for its inputs within the step.
+            // FMI 3.0 has no such function: the FMU asks for its inputs within the step.
             return self.slave.set_input_derivatives(references, orders, values);
         }
         let arguments = format_args!("{references:?}, orders {orders:?}, {values:?}");

@@ -14,7 +14,7 @@ use fmu_description::{ModelDescription, Version, package};
 
 use description::{BuildConfiguration, SourceFileSet};
 
-/// The header files of the standard, which FMUs leave out.
+/// The header files of the standard, which the sources of an FMU include but need not contain.
 const HEADERS: [(&str, &str); 6] = [
     ("fmi2FunctionTypes.h", include_str!("../headers/fmi2FunctionTypes.h")),
     ("fmi2Functions.h", include_str!("../headers/fmi2Functions.h")),
@@ -23,11 +23,11 @@ const HEADERS: [(&str, &str); 6] = [
     ("fmi3Functions.h", include_str!("../headers/fmi3Functions.h")),
     ("fmi3PlatformTypes.h", include_str!("../headers/fmi3PlatformTypes.h")),
 ];
-/// The parts of an FMU that a built one has, apart from its model description.
+/// The folders that are copied from an FMU to the FMU that is built from it.
 const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
-/// The version of the way in which libraries are built here. Change it with this way: built FMUs are cached by it.
+/// Version of the build procedure, a part of the cache key. Change it whenever the procedure changes.
 const RECIPE: u32 = 3;
-/// Largest number of characters of the output of a compiler that an error quotes.
+/// Largest number of characters of compiler output that an error quotes.
 const OUTPUT: usize = 4000;
 
 /// Why the library of an FMU cannot be built.
@@ -45,7 +45,7 @@ pub enum CompileError {
         /// What is missing or wrong.
         reason: String,
     },
-    /// No compiler runs.
+    /// None of the compilers that were tried runs.
     #[error("{}: no compiler for {language} here: tried {tried}; the variable {variable} names one", path.display())]
     NoCompiler {
         /// The FMU.
@@ -64,7 +64,7 @@ pub enum CompileError {
         path: PathBuf,
         /// The program and the file, or "linking".
         command: String,
-        /// The start of its messages.
+        /// The start of the program's output.
         output: String,
     },
     /// A file or folder cannot be read or written, or a program cannot be started.
@@ -90,12 +90,12 @@ fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Co
     move |source| CompileError::File { action, path, source }
 }
 
-/// Returns an FMU with the content of the FMU at `path` and a library for this platform.
+/// Returns the path of an FMU with the content of the FMU at `path` and a library for this platform.
 ///
-/// If the FMU has the libraries of its interfaces for this platform, returns `path`. Otherwise the libraries are built
-/// from the folder `sources` of the FMU, as its `buildDescription.xml` states or, in FMI 2.0, the elements
-/// `SourceFiles`, by the compiler in the variable `CC` (C++: `CXX`) or the first one that runs. The built FMU is stored
-/// in the user's cache folder and used again for the same content and compiler.
+/// If the FMU has the libraries of its interfaces for this platform, returns `path`. Otherwise builds them from the
+/// folder `sources`, as `buildDescription.xml` or, in FMI 2.0, the elements `SourceFiles` state, with the compiler in
+/// the variable `CC` (C++: `CXX`) or the first common one that runs. The built FMU is stored in the user's cache
+/// folder and used again for the same content and compiler.
 ///
 /// # Errors
 ///
@@ -135,7 +135,7 @@ fn identifiers(description: &ModelDescription) -> Vec<String> {
     identifiers
 }
 
-/// Returns the name of the built FMU.
+/// Returns the file name of the built FMU.
 fn file_name(path: &Path) -> OsString {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let mut name = path.file_stem().unwrap_or_default().to_owned();
@@ -252,7 +252,7 @@ struct Build<'a> {
     configurations: Vec<BuildConfiguration>,
     /// The compiler for C.
     c: Compiler,
-    /// The compiler for C++, if there are such files.
+    /// The compiler for C++, if a source file needs it.
     cpp: Option<Compiler>,
 }
 
@@ -292,7 +292,7 @@ impl<'a> Build<'a> {
         let is_called =
             |configuration: &&BuildConfiguration| configuration.model_identifier == identifier;
         let configuration = self.configurations.iter().find(is_called);
-        // Some FMUs state a former identifier: the only configuration is used for any.
+        // Some FMUs state an outdated identifier: a single configuration is used for every library.
         let only = || self.configurations.first().filter(|_| self.configurations.len() == 1);
         let configuration = configuration.or_else(only).ok_or_else(|| {
             let reason = format!("no source files of {identifier} are stated");
@@ -340,7 +340,7 @@ impl<'a> Build<'a> {
         for folder in &set.include_folders {
             command.arg("-I").arg(self.sources.join(folder));
         }
-        // The headers of the FMU come first.
+        // Searched last: headers that the FMU contains have priority.
         command.arg("-I").arg(headers);
         // The functions of a shared library have no prefix.
         command.arg(match self.version {
@@ -355,7 +355,7 @@ impl<'a> Build<'a> {
         self.run(&mut command, file)
     }
 
-    /// Runs a command; `what` says in the error what it was for.
+    /// Runs a command; an error names its purpose, `what`.
     fn run(&self, command: &mut Command, what: &str) -> Result<(), CompileError> {
         let program = command.get_program().to_string_lossy().into_owned();
         let output = command.output().map_err(file_error("start", Path::new(&program)))?;
@@ -372,7 +372,7 @@ impl<'a> Build<'a> {
     }
 }
 
-/// Returns the path of a stated source file. Some exporters include the folder `sources` in its name.
+/// Returns the path of a source file. Some exporters start its stated name with `sources/`.
 fn source_file(sources: &Path, file: &str) -> PathBuf {
     let stated = sources.join(file);
     let without = file.strip_prefix("sources/").map(|file| sources.join(file));

@@ -93,7 +93,7 @@ pub(crate) struct Content {
     /// The name of its file or folder, for messages.
     name: String,
     binding: Binding,
-    /// Whether an FMU that allows one instance only has that instance.
+    /// For an FMU that allows one instance only: whether that instance exists.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled at the first message that needs one.
     names: OnceLock<HashMap<(char, u32), usize>>,
@@ -131,7 +131,7 @@ impl Fmu {
         Self::load(path, unpack(path)?, Binding::Lenient)
     }
 
-    /// Opens an unpacked FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library defines.
+    /// Like [`Fmu::open_quietly`], for a `folder`; refuses a library that calls functions that no library defines.
     #[cfg(target_os = "linux")]
     pub(crate) fn open_strictly(folder: &Path) -> Result<Self, FmuError> {
         Self::load(folder, Unpacked::in_folder(folder)?, Binding::Strict)
@@ -195,8 +195,8 @@ impl Fmu {
         Ok(scalar.unwrap_or_else(|| description.clone()))
     }
 
-    /// Returns the library for `interface`; the library for model exchange is loaded by this call. The error of an FMU
-    /// without the interface has the name of its file, as its folder may be temporary.
+    /// Returns the library for `interface`; the library for model exchange is loaded by this call. The error for a
+    /// missing interface states the file name of the FMU, because its folder may be temporary.
     pub(crate) fn library(&self, interface: Interface) -> Result<AnyLibrary, FmuError> {
         let Content { library, unpacked, name, binding, .. } = &*self.content;
         let description = &unpacked.description;
@@ -218,7 +218,7 @@ impl Fmu {
         }
     }
 
-    /// Reserves an FMU that allows one instance only for the instance `name`; [`FmuError::OnlyOnce`] if it has one.
+    /// Reserves an FMU that allows one instance only for `name`; [`FmuError::OnlyOnce`] if it is reserved.
     pub(crate) fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
         if self.content.instantiated.swap(true, Ordering::Relaxed) {
             let (instance, model) = (name.to_owned(), self.description().model_name.clone());
@@ -246,9 +246,9 @@ impl Fmu {
     }
 }
 
-/// Returns the description of an instance without integration if it is not the description of its FMU: with a scalar
-/// variable for each element of an array, whose structural parameters have the values `sizes`. On failure returns the
-/// reason.
+/// Returns the description of an instance without integrator. In FMI 3.0 each element of an array is a scalar
+/// variable, at the values `sizes` of structural parameters; in FMI 1.0 negated aliases have value references of
+/// their own. `None` in FMI 2.0: the description of the FMU. On failure returns the reason.
 pub(crate) fn scalar_description(
     description: &ModelDescription,
     sizes: &HashMap<u32, u64>,
@@ -288,7 +288,7 @@ fn open_library(
     library.map_err(|error| with_tool_hint(description, error))
 }
 
-/// Returns the interface of FMI 3.0: scheduled execution in place of co-simulation for an FMU without it.
+/// Converts `interface` to FMI 3.0. An FMU without co-simulation gets scheduled execution instead.
 pub(crate) fn interface_of_3(
     description: &ModelDescription,
     interface: Interface,
@@ -313,7 +313,7 @@ pub(crate) fn warnings(unpacked: &Unpacked) -> impl Iterator<Item = String> {
     unpacked.archive_warnings.iter().cloned().chain(description)
 }
 
-/// Converts `error`, with the tool that the FMU declares to need (`needsExecutionTool`), if any.
+/// Converts `error`; adds the tool that the FMU declares to need (`needsExecutionTool`), if any.
 pub(crate) fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
     let stepped = description.stepped().is_some_and(|flags| flags.needs_execution_tool);
     let exchange = description.model_exchange.as_ref();

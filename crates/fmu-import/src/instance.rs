@@ -16,7 +16,7 @@ use slave::{
 /// An instance of an FMU in this process, for any interface.
 pub struct Instance {
     pub(crate) inner: Inner,
-    /// Dropped after `inner`.
+    /// The reservation of an FMU that allows one instance only; dropped after `inner`, which frees the instance.
     _only: Option<OnlyInstance>,
     fmu: Fmu,
 }

@@ -4,8 +4,8 @@
 //! returns an [`Instance`], which implements [`slave::Slave`]; [`Fmu::instantiate_equations`] returns an instance for
 //! model exchange. [`isolate`] runs each instance in a separate process: a crash of the FMU ends only that process.
 //!
-//! [`crash`] reports a crash of an FMU that runs in the process of the program. On Linux, the module `supervise` has
-//! a second process watch the program.
+//! [`crash`] reports a crash of an FMU that runs in the process of the program. On Linux, the module `supervise` runs
+//! the program under the supervision of a second process.
 #![deny(unsafe_code)]
 
 mod call_log;

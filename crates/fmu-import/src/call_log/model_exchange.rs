@@ -4,7 +4,6 @@ use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
 use super::{LoggedSlave, calls, reads};
 
-/// The instances whose calls are logged here.
 type Equations = dyn ModelExchange;
 
 impl ModelExchange for LoggedSlave<Equations> {

@@ -21,7 +21,7 @@ pub(super) struct SourceFileSet {
     language: Option<String>,
     /// Paths of the files to compile, below `sources`.
     pub(super) files: Vec<String>,
-    /// `PreprocessorDefinition`: names and values, without optional ones.
+    /// `PreprocessorDefinition`: names and values. Optional definitions are left out.
     pub(super) definitions: Vec<(String, Option<String>)>,
     /// Paths of folders of headers, below `sources`.
     pub(super) include_folders: Vec<String>,
@@ -42,8 +42,8 @@ impl SourceFileSet {
         self.files.iter().any(|file| self.is_cpp(file))
     }
 
-    /// Returns the value of the compiler's option `-std`; `None` if the language states no year. `C99` becomes `gnu99`,
-    /// as extensions of a compiler are common.
+    /// Returns the value of the compiler's option `-std`; `None` if the language states no year. `C99` becomes
+    /// `gnu99`, because sources often use extensions of the compiler.
     pub(super) fn standard(&self) -> Option<String> {
         let language = self.language.as_deref()?.to_ascii_lowercase();
         let year = language.strip_prefix('c')?;
@@ -97,7 +97,7 @@ fn attribute(element: &Element, name: &str) -> Option<String> {
     attribute.map(|(_, value)| value.clone())
 }
 
-/// Returns the attribute `name`, a path below `sources`. On failure returns what is wrong with it.
+/// Returns the attribute `name`, a path below `sources`. On failure returns the defect of the path.
 fn path(element: &Element) -> Result<String, String> {
     let path = attribute(element, "name").unwrap_or_default();
     let mut parts = Path::new(&path).components();
@@ -107,7 +107,7 @@ fn path(element: &Element) -> Result<String, String> {
     is_inside.then_some(path.clone()).ok_or(format!("{}: found {path:?}, {expected}", element.name))
 }
 
-/// Returns the paths of the files to compile: without headers.
+/// Returns the paths of the files to compile, without headers.
 fn sources<'a>(files: impl Iterator<Item = &'a Element>) -> Result<Vec<String>, String> {
     let paths = files.map(path).collect::<Result<Vec<_>, _>>()?;
     Ok(paths.into_iter().filter(is_source).collect())

@@ -38,7 +38,7 @@ impl Fmu {
         Ok(Box::new(self.create(Interface::ModelExchange, once, name)?))
     }
 
-    /// Creates an instance with the C interface of the FMU's version; `once`: a process may have only one.
+    /// Creates an instance with the C interface of the FMU's version; `once`: the FMU allows one instance only.
     fn create(&self, interface: Interface, once: bool, name: &str) -> Result<Instance, FmuError> {
         let only = once.then(|| self.occupy(name)).transpose()?;
         let (unpacked, description) = (&self.content.unpacked, self.description());

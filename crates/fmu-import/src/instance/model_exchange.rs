@@ -5,7 +5,7 @@ use slave::{CallError, CompletedStep, EventInfo, Events as _, ModelExchange};
 use super::{Inner, Instance, methods, of_version};
 use crate::library::check_number;
 
-/// Returns the number in an attribute of the description; an error if it is too large for a vector.
+/// Converts a number that the description states in `attribute`; an error if it is too large for a vector.
 fn stated_number(attribute: &'static str, count: u32) -> Result<usize, CallError> {
     let error = |failure| CallError { function: attribute, failure, messages: Vec::new() };
     check_number(count as usize).map_err(error)
