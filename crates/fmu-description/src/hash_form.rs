@@ -1,8 +1,8 @@
 //! The serialised form of fields that FMI 2.0 does not have, and of `relativeQuantity`.
 //!
-//! The GUID is a hash of the serialised description. Such a field that has its default is absent from the
-//! form, so that it does not change the GUID of a description without it. Otherwise a number precedes it, so
-//! that two fields with the same value differ in the form.
+//! The GUID is a hash of the serialised description. A field with its default value is absent from the form, so that
+//! the GUID of a description without the field does not change. Any other value follows a number, so that two fields
+//! with the same value differ in the form.
 
 use serde::{Serialize, Serializer};
 

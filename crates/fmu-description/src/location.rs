@@ -45,7 +45,7 @@ pub enum LocationError {
 ///
 /// # Errors
 ///
-/// [`LocationError`] for a relative path, and on other systems than Unix for one that is not Unicode.
+/// [`LocationError`] for a relative path, and on systems other than Unix for a path that is not Unicode.
 ///
 /// ```
 /// # #[cfg(unix)] {
@@ -157,7 +157,7 @@ fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
     Ok(bytes)
 }
 
-/// Returns the bytes of a path, on other systems than Unix only of one in Unicode.
+/// Returns the bytes of a path; an error on systems other than Unix if the path is not Unicode.
 fn bytes_of(path: &Path) -> Result<&[u8], LocationError> {
     if cfg!(not(unix)) && path.to_str().is_none() {
         return Err(LocationError::NotUnicode { path: path.to_owned() });

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Significant digits of a time; the rounding errors of a sum of steps are smaller.
+/// Significant digits of a time; the rounding error of a sum of steps is smaller than the last of them.
 const TIME: usize = 12;
 
 /// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros after the decimal
@@ -21,7 +21,7 @@ fn write_rounded(out: &mut impl fmt::Write, value: f64, digits: usize) -> fmt::R
     if value == 0.0 || !value.is_finite() {
         return write!(out, "{value}");
     }
-    // With integers, because formatting with a precision and parsing need tables that are large in WebAssembly.
+    // Uses integers, because formatting with a precision and parsing need tables that are large in WebAssembly.
     let (mut mantissa, exponent) = scaled(value.abs(), digits);
     while mantissa > 9 && mantissa.is_multiple_of(10) {
         mantissa /= 10;
@@ -29,7 +29,7 @@ fn write_rounded(out: &mut impl fmt::Write, value: f64, digits: usize) -> fmt::R
     let sign = if value < 0.0 { "-" } else { "" };
     let longest = i32::try_from(digits.max(6)).unwrap_or(i32::MAX);
     let has_exponent = !(-4..longest).contains(&exponent);
-    // The number of digits after the decimal point; below 0, of zeros before it.
+    // Number of digits after the decimal point; if negative, of zeros before it.
     let decimals = mantissa.ilog10().cast_signed() - if has_exponent { 0 } else { exponent };
     let unit = 10_u64.pow(decimals.unsigned_abs());
     if decimals > 0 {
@@ -43,7 +43,7 @@ fn write_rounded(out: &mut impl fmt::Write, value: f64, digits: usize) -> fmt::R
 }
 
 /// Returns the first `digits` (at least 1, at most 15) significant digits of a positive number, rounded, as an
-/// integer, and the exponent of the first digit.
+/// integer, and the power of ten of the first digit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 15 digits")]
 fn scaled(value: f64, digits: usize) -> (u64, i32) {
     let digits = i32::try_from(digits.clamp(1, 15)).unwrap_or(15);
@@ -51,7 +51,7 @@ fn scaled(value: f64, digits: usize) -> (u64, i32) {
     let mut exponent = value.log10().floor() as i32;
     loop {
         let shift = digits - 1 - exponent;
-        // Two factors, because a single one could overflow.
+        // Two factors, because a single power of ten could overflow.
         let first = shift.clamp(-300, 300);
         let mantissa = (value * 10f64.powi(first) * 10f64.powi(shift - first)).round();
         if mantissa >= largest {
@@ -115,7 +115,7 @@ mod tests {
                 let decimals = digits - 1;
                 let expected: f64 = format!("{value:.decimals$e}").parse().unwrap();
                 let result: f64 = rounded(value, digits).parse().unwrap();
-                // They differ only for values in the middle between two numbers of so many digits.
+                // They differ only if `value` is halfway between two numbers with so many digits.
                 let (error, least) = ((result - value).abs(), (expected - value).abs());
                 assert!(error <= 1.001 * least, "{value:e} {digits}: {result:e}, {expected:e}");
             }

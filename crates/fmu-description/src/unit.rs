@@ -79,7 +79,7 @@ impl BaseUnit {
 }
 
 /// `DisplayUnit`: `display = factor * unit + offset`, without the offset for a
-/// [difference](crate::RealType::is_relative). The conversion of a [`BaseUnit`] starts from the unit, too.
+/// [difference](crate::RealType::is_relative). As for a [`BaseUnit`], `unit` is a value in the [`Unit`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// `name`, unique within its unit.

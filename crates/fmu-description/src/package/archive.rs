@@ -21,7 +21,7 @@ const ENTRIES: usize = 100_000;
 const DIRECTORY: u64 = 32 << 20;
 /// Maximum unpacked size of any archive in bytes.
 const CAPACITY: u64 = 4 << 30;
-/// Unpacked bytes allowed for even the smallest archive.
+/// Unpacked bytes allowed for every archive, however small.
 const BASE: u64 = 64 << 20;
 /// Unpacked bytes allowed in addition for each byte of the archive. FMUs have ratios of 2 to 10;
 /// deflate reaches 1032.
@@ -138,7 +138,7 @@ impl Archive {
         &self.names
     }
 
-    /// Returns a sentence for each rule for paths that entries break and that is tolerated.
+    /// Returns a sentence for each tolerated rule on paths that entries break.
     pub(super) fn warnings(&self) -> Vec<String> {
         let sentence = |Renamed { count, stated, read }: &Renamed| {
             let entries = if *count == 1 { "entry has" } else { "entries have" };

@@ -44,14 +44,13 @@ impl Unpacked {
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if the file is no ZIP archive, has paths that lead out of the folder, have control
-    /// characters, more than 1024 bytes or more than 64 levels, links, names that are equal only without
-    /// backslashes and parts `.`, a file and a folder of one name, overlapping or encrypted entries, needed
-    /// entries with a compression other than deflate, or no readable `modelDescription.xml` at its root. Also, unless
-    /// [`crate::limits`] are lifted, if it has more than 100,000 entries, more than 32 MiB in its list of
-    /// entries, or more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Names, kinds,
-    /// stated sizes and positions of entries are checked before anything is written; the compression of an entry is
-    /// checked before that entry is written.
+    /// [`PackageError`] if the file is no ZIP archive, or has no readable `modelDescription.xml` at its root; if a
+    /// path leads out of the folder, has control characters, more than 1024 bytes or more than 64 levels; if there
+    /// are links, overlapping or encrypted entries, a file and a folder of one name, or names that differ only in
+    /// backslashes and parts `.`; or if a needed entry has a compression other than deflate. Also, unless
+    /// [`crate::limits`] are lifted, if it has more than 100,000 entries, more than 32 MiB in its list of entries, or
+    /// more unpacked bytes than 4 GiB or than 64 MiB plus 100 times its own size. Names, kinds, stated sizes and
+    /// positions are checked before anything is written, the compression of an entry before that entry is written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, is_needed)
     }
@@ -149,9 +148,9 @@ impl Unpacked {
         resources.is_dir().then(|| folder_path(&resources)).transpose()
     }
 
-    /// The path of the shared library `model_identifier` for the platform of this program, in the first
-    /// folder of [`platforms_of`] that has it. Without it, the path of the only library in these folders;
-    /// [`Unpacked::archive_warnings`] names that one.
+    /// The path of the shared library `model_identifier` for the platform of this program, in the first folder of
+    /// [`platforms_of`] that has it. If none has it, the path of the only library in these folders, which
+    /// [`Unpacked::archive_warnings`] names.
     ///
     /// # Errors
     ///
@@ -282,7 +281,7 @@ fn is_platform(folder: &str) -> bool {
 
 /// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.
 ///
-/// Returns the folder, and a sentence for each rule for paths that entries break and that is tolerated.
+/// Returns the folder, and a sentence for each tolerated rule on paths that entries break.
 ///
 /// # Errors
 ///
@@ -343,7 +342,7 @@ fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<St
     }
 }
 
-/// Reads a file, of a longer one the first [`ModelDescription::MOST_BYTES`] + 1 bytes.
+/// Reads a file, but at most [`ModelDescription::MOST_BYTES`] + 1 bytes of it.
 fn read_limited(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let most = in_force(u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX));

@@ -27,7 +27,6 @@ impl Product {
         }
     }
 
-    /// Returns the conversion factor.
     fn factor(&self) -> f64 {
         let (mut numerator, mut denominator) = (self.numerator, self.denominator);
         if self.ten >= 0 {
@@ -187,7 +186,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// Parses `[ "^" ] [ "+" | "-" ] digit [ digit ]`, or nothing, which is 1.
+    /// Parses `[ "^" ] [ "+" | "-" ] digit [ digit ]`, or nothing, which means 1.
     fn exponent(&mut self) -> Result<i32, UnitError> {
         let caret = self.accept(&['^']);
         let negative = self.peek() == Some('-');

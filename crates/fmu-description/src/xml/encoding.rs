@@ -35,7 +35,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
     };
     match Encoding::for_label(declared.as_bytes()) {
         Some(encoding) if encoding == UTF_8 => Ok((utf8(bytes)?, None)),
-        // `for_label` reads ASCII as windows-1252, but it is a part of UTF-8.
+        // `for_label` reads ASCII as windows-1252, but ASCII is a part of UTF-8.
         _ if declared.eq_ignore_ascii_case("us-ascii")
             || declared.eq_ignore_ascii_case("ascii") =>
         {

@@ -1,8 +1,8 @@
 //! Builds a tree of elements from the events of quick-xml, with limits on depth and size.
 //!
-//! roxmltree builds trees too, but refuses defects that are tolerated here: prefixes without declaration
-//! (such as `xsi:`), control characters, `--` in comments, undefined entities in text. It does not limit
-//! the depth, and does not say where its limit on elements is exceeded.
+//! roxmltree builds trees too, but refuses defects that are tolerated here: prefixes without declaration (such as
+//! `xsi:`), control characters, `--` in comments, undefined entities in text. It does not limit the depth, and its
+//! error for too many elements has no position.
 
 use std::borrow::Cow;
 
@@ -95,7 +95,6 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
-    /// Closes the open element.
     fn end(&mut self) -> Result<(), ParseError> {
         // The reader has checked that there is a parent.
         self.open.pop().map_or(Ok(()), |element| self.add(element))
