@@ -3,7 +3,7 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// Declares an enumeration of a header: without `$prefix`, with which the names of its values start in C.
+/// Declares an enumeration of a C header. In C the names of its values start with `$prefix`.
 macro_rules! c_enumeration {
     ($(#[$meta:meta])* $name:ident: $type:ty, $prefix:literal { $($variant:ident = $value:literal,)* }) => {
         $(#[$meta])*
@@ -14,7 +14,7 @@ macro_rules! c_enumeration {
         }
 
         impl $name {
-            /// Converts a C value; `None` if no name of the header has it.
+            /// Converts a C value; `None` if the header does not define it.
             #[must_use]
             pub fn from_c(value: $type) -> Option<Self> {
                 match value {

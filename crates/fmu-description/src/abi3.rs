@@ -1,7 +1,7 @@
 //! The C types of `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h` (FMI 3.0.2).
 //!
-//! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here, because the other side may pass a byte that
-//! is neither 0 nor 1, which is no valid `bool`. The C ABIs of all platforms pass both types in the same way.
+//! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here, because an FMU or importer may pass a byte that is
+//! neither 0 nor 1, which is no valid `bool`. The C ABIs of all platforms pass both types in the same way.
 #![expect(non_camel_case_types, missing_docs, reason = "the names of the C headers")]
 
 use std::ffi::{c_char, c_int, c_void};

@@ -24,7 +24,7 @@ macro_rules! states {
             /// Every state, in the order of the tables.
             pub const EVERY: [State; [$(stringify!($name)),*].len()] = [$(State::$name),*];
 
-            /// Returns the set that contains only this state. The union of sets is `|`.
+            /// Returns the bit mask of this state. Masks joined by `|` are sets of states.
             pub const fn bit(self) -> u16 {
                 1 << self as u16
             }

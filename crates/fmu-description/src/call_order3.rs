@@ -10,18 +10,18 @@ use crate::{Causality, Initial, Variability};
 const G: u16 = State::ConfigurationMode.bit();
 const U: u16 = State::IntermediateUpdateMode.bit();
 const R: u16 = State::ReconfigurationMode.bit();
-/// The super state "FMU State Settable" in model exchange, and as `CS` in co-simulation.
+/// The states in the super state "FMU State Settable": `ME` in model exchange, `CS` in co-simulation.
 const ME: u16 = I | G | M | V | N | R | T;
 const CS: u16 = I | G | M | V | C | R | T;
-/// The states in which values of every type may be set in model exchange and in co-simulation. In one more
-/// state of each, floating-point values may be set.
+/// The states in which values of every type may be set in model exchange and in co-simulation. Each interface has one
+/// further state, in which only floating-point values may be set.
 const SET_ME: u16 = I | G | M | V | R;
 const SET_CS: u16 = I | G | M | V | C | R;
 /// The states in which values may be read in model exchange and in co-simulation.
 const GET_ME: u16 = I | M | V | N | T;
 const GET_CS: u16 = I | M | V | C | U | T;
-/// The states in which the number of states or event indicators may be read. Section 2.3 names
-/// `Instantiated` and Event Mode only; reading it in the others is harmless.
+/// The states in which the number of states or event indicators may be read. Section 2.3 names `Instantiated` and
+/// Event Mode only; reading in the other states is harmless.
 const COUNT: u16 = I | M | V | N | T;
 
 // A row: functions: states in model exchange, states in co-simulation.

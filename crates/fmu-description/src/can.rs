@@ -75,8 +75,8 @@ pub enum FrameKind {
 impl Operation {
     /// Reads the operations in `bytes`, in order.
     ///
-    /// An operation that this type does not have, or whose arguments are too short, is skipped. One that ends beyond
-    /// `bytes`, or states a length below 8, ends the sequence.
+    /// Skips an operation that this type does not have, or whose arguments are too short. An operation that ends
+    /// beyond `bytes`, or states a length below 8, ends the sequence.
     pub fn read(bytes: &[u8]) -> impl Iterator<Item = Operation> {
         let mut rest = bytes;
         let next = move || {

@@ -176,7 +176,8 @@ fn list(elements: &Elements) -> String {
 
 /// Returns the unit, and start, min and max, as texts; an absent value is an empty text.
 ///
-/// `types`, those of the description, name the items of enumerations. The start of a Clock is its interval in s.
+/// `types` are the types of the description; they name the items of enumerations. The start of a Clock is its
+/// interval in s.
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
@@ -250,14 +251,14 @@ fn interface(parts: &[&[(&str, String)]]) -> String {
     table(&[], parts.iter().copied().flatten().map(row))
 }
 
-/// The attributes of a table of [`attributes`] with their values as text.
+/// Expands a table of [`attributes`] to pairs of name and value as text.
 macro_rules! show_attributes {
     (($flags:ident) $($name:literal $field:ident,)*) => {
         &[$(($name, shown(&$flags.$field)),)*][..]
     };
 }
 
-/// The last flags of model exchange and of co-simulation in FMI 3.0.
+/// The flags that model exchange and co-simulation in FMI 3.0 have in common, shown last.
 macro_rules! common_3 {
     ($flags:ident) => {
         show_attributes! { ($flags)

@@ -39,8 +39,8 @@ impl Display for Guid {
 impl ModelDescription {
     /// Returns [`Guid::of`] the description as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
     ///
-    /// The crate postcard serialises the description, in a tenth of the time of XML, because each `fmi2Instantiate`
-    /// needs the result. Descriptions with different `modelDescription.xml`, apart from `guid`, have different results.
+    /// Uses the crate postcard, which takes a tenth of the time of XML, because each `fmi2Instantiate` needs the
+    /// result. Descriptions with different `modelDescription.xml`, apart from `guid`, have different results.
     #[must_use]
     pub fn content_guid(&self) -> String {
         Guid::of(self).to_string()

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::hash_form::{is_default, numbered};
 
-/// Passes a table of attributes of the interfaces to a macro: for each attribute its name and its field, in the order
-/// in which they are written. `modelIdentifier` is in none of the tables.
+/// Calls the macro `$apply` with a table of attributes of the interfaces: for each attribute its name in XML and its
+/// field, in the order of the file. `modelIdentifier` is in none of the tables.
 macro_rules! attributes {
     (COMMON_2, $apply:ident!($($argument:ident),*)) => {
         $apply! { ($($argument),*)

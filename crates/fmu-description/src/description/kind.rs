@@ -34,7 +34,7 @@ macro_rules! kinds {
         }
 
         impl Kind {
-            /// Returns the name of the XML element in FMI 2.0 (`Real`, `Integer`), or in FMI 3.0 for its other types.
+            /// Returns the name of the XML element in FMI 2.0 (`Real`) or, for a type that FMI 2.0 lacks, in FMI 3.0.
             #[must_use]
             pub fn element(&self) -> &'static str {
                 match self { $(Kind::$variant(_) => $element,)* }
@@ -46,7 +46,7 @@ macro_rules! kinds {
                 match self { $(Kind::$variant(_) => NativeType::$native,)* }
             }
 
-            /// Returns the kind of an element of FMI 3.0 without attributes; `None` if `name` is no type.
+            /// Returns the type of the element `name` of FMI 3.0, without attributes; `None` if there is none.
             pub(super) fn blank(name: &str) -> Option<Self> {
                 match name {
                     $($element_of_3 => Some(Kind::$variant(<$attributes>::default())),)*
@@ -62,11 +62,11 @@ kinds! {
     Real(RealType): "Real" "Float64" Float64;
     /// In FMI 3.0 `Int32`.
     Integer(IntegerType): "Integer" "Int32" Int32;
-    /// With its `start`.
+    /// Holds `start`.
     Boolean(Option<bool>): "Boolean" "Boolean" Boolean;
-    /// With its `start`.
+    /// Holds `start`.
     String(Option<String>): "String" "String" String;
-    /// An integer; the type `declared_type` names its items.
+    /// Its values are integers; the type `declared_type` names the items.
     Enumeration(IntegerType): "Enumeration" "Enumeration" Int64;
     /// Each number is an `f32`.
     Float32(RealType): "Float32" "Float32" Float32;
@@ -192,7 +192,7 @@ impl Kind {
         }
     }
 
-    /// Whether the type has a `start`: of a scalar, or one for all elements of an array. False for a list of starts.
+    /// Whether the type has a `start`, for a scalar or for all elements of an array. A list of them does not count.
     #[must_use]
     pub fn has_start(&self) -> bool {
         match self {
@@ -223,7 +223,7 @@ pub struct RealType {
     /// `reinit`: an event may change this continuous state.
     pub reinit: bool,
     /// `relativeQuantity`, see [`RealType::is_relative`]; `None` means false.
-    // The numbers up to 8 are those of `ScalarVariable`, whose fields follow in the form.
+    // The numbers 1 to 8 belong to `ScalarVariable`, whose fields come next in the serialised form.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<9, _, _>")]
     pub relative_quantity: Option<bool>,
 }

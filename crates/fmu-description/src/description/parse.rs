@@ -46,11 +46,12 @@ impl ModelDescription {
     /// and for a variable with `declaredType` the attributes of that type which it does not state
     /// itself. Skips annotations.
     ///
-    /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become
-    /// indices; each `Alias` becomes a variable after the one that contains it. FMI 1.0: `internal` and
-    /// `none` become local, the variability `parameter` becomes a parameter or, without start value, a
-    /// calculated parameter, but for an output, which stays one; `fixed` of an output or local variable
-    /// becomes `initial`, and `DirectDependency` the dependencies of an output.
+    /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become indices; each
+    /// `Alias` becomes a variable after the one that contains it.
+    ///
+    /// FMI 1.0: `internal` and `none` become local. A variable with variability `parameter` becomes a parameter or,
+    /// without start value, a calculated parameter; but an output stays an output. `fixed` of an output or local
+    /// variable becomes `initial`, and `DirectDependency` becomes the dependencies of an output.
     ///
     /// Content that breaks the standard gives a [`Warning`], which states the assumption made, if
     /// the meaning for a simulation is clear or other importers accept it: other encodings,

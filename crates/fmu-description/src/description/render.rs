@@ -22,12 +22,12 @@ macro_rules! write_attributes {
 use write_attributes;
 
 impl ModelDescription {
-    /// Renders `modelDescription.xml` in the order of the schema of its version, FMI 2.0.5 or 3.0.2.
-    /// Descriptions of FMI 1.0 are only read: the result is not one of FMI 1.0.
+    /// Renders `modelDescription.xml` in the order of the schema of its version, FMI 2.0.5 or 3.0.2. FMI 1.0 cannot
+    /// be rendered: the result for such a description is not valid.
     ///
-    /// UTF-8, two blanks of indentation, numbers in the shortest form that reads back to the same
-    /// bits, lists absent when empty, flags absent when false. All text is escaped; characters
-    /// that XML 1.0 cannot hold (control characters) become U+FFFD.
+    /// The text is UTF-8 with an indentation of two blanks. Numbers have the shortest form that reads back to the
+    /// same bits. Empty lists and flags that are false are absent. All text is escaped; characters that XML 1.0
+    /// cannot hold (control characters) become U+FFFD.
     ///
     /// Numbers must be finite: FMI has no infinity, and an importer would not accept its text.
     /// [`ModelDescription::problems`] reports such numbers. If a description has no problems, the

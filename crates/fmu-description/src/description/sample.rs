@@ -225,7 +225,7 @@ fn structure() -> ModelStructure {
     }
 }
 
-/// Such a description of FMI 3.0: `sample/fmi3.xml`.
+/// Like [`complete`], for FMI 3.0: `sample/fmi3.xml`.
 pub(crate) fn complete_3() -> ModelDescription {
     let (description, warnings) =
         ModelDescription::read(include_str!("sample/fmi3.xml")).expect("readable");

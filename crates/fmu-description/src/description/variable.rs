@@ -50,8 +50,8 @@ pub struct ScalarVariable {
     /// FMI 1.0). Both have the same value reference; an alias of FMI 3.0 has no start value of its own.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<7, _, _>")]
     pub alias_of: Option<String>,
-    /// `alias` is `negatedAlias` (FMI 1.0): the value of `alias_of` with the opposite sign, of a Boolean the opposite
-    /// value. A String has the same value.
+    /// `alias` is `negatedAlias` (FMI 1.0): the value is that of `alias_of` with the opposite sign, for a Boolean the
+    /// opposite value. A String has the same value.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<8, _, _>")]
     pub negated: bool,
 }

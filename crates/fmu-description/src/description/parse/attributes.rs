@@ -69,7 +69,7 @@ impl<'a> Node<'a> {
         self.warn_of(true, self.place(attribute), expected, actual, assumed);
     }
 
-    /// Returns the name of an attribute in a warning.
+    /// Returns the text that names an attribute in a warning.
     pub(super) fn place(&self, attribute: &str) -> String {
         format!("<{}>, attribute {attribute}", self.element.name)
     }
@@ -139,7 +139,7 @@ impl<'a> Node<'a> {
         Ok(text.to_owned())
     }
 
-    /// Returns the value of an attribute, unchanged and trimmed. An empty one gives a warning and counts as missing.
+    /// Returns the value of an attribute, unchanged and trimmed. Warns of an empty value, which counts as missing.
     fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);
@@ -381,7 +381,7 @@ macro_rules! read_attributes {
 }
 pub(super) use read_attributes;
 
-/// Parses an integer, also one with a point (`1.0`); such a one is rounded to an `f64`.
+/// Parses an integer. A text with a point, such as `1.0`, is rounded to an `f64`.
 pub(super) fn integer(text: &str) -> Option<i128> {
     let whole = || {
         let real = text.parse::<f64>().ok().filter(|real| real.fract() == 0.0)?;

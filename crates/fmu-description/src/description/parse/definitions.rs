@@ -30,7 +30,7 @@ pub(super) fn general(root: Node<'_>, model_name: String) -> ModelDescription {
 
 /// Reads what the root elements of FMI 2.0 and 3.0 have in common; `model_name` as for [`general`].
 pub(super) fn common(root: Node<'_>, model_name: String) -> Result<ModelDescription> {
-    // Before the lists below, because only the first warnings are kept.
+    // Read before the lists below, because only the first warnings are kept.
     let general = general(root, model_name);
     Ok(ModelDescription {
         copyright: root.text("copyright"),

@@ -24,7 +24,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription> {
             .unwrap_or(0),
         ..ModelExchange::default()
     });
-    // Before the units, because only the first warnings are kept.
+    // Read before the units, because only the first warnings are kept.
     let general = general(root, identifier);
     Ok(ModelDescription {
         guid: root.required("guid")?.to_owned(),

@@ -62,13 +62,13 @@ pub(super) fn check(root: Node<'_>, version: Version) {
     }
 }
 
-/// Warns of the attributes and children of `node`, a child of the element `parent`, and of everything below. Does
-/// nothing if `shapes` has no shape for it.
+/// Warns of the attributes and children of `node`, a child of the element `parent`, and of everything below `node`.
+/// Does nothing if `shapes` has no shape for `node`.
 fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<Shape>) {
     let element = node.element;
     let Some(shape) = shapes(parent, element.name) else { return };
     for (name, value) in &element.attributes {
-        // FMI defines no namespaces.
+        // Any attribute with a namespace is accepted: FMI defines no namespaces.
         let mut lists = shape.shared.iter().chain([&shape.attributes]);
         let known = lists.any(|list| list.contains(name)) || *name == "xmlns" || name.contains(':');
         if !known {

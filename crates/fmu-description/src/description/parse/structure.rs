@@ -9,9 +9,9 @@ pub(super) const ANYTHING: &str = "read as depending on anything";
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
-/// If a list has an index that belongs to no variable, all of its rows are read as depending on
-/// anything, and a row with such an index is skipped. Outputs that are missing from `Outputs` are read as
-/// depending on anything. Such an index of a row in `Derivatives` is an error.
+/// If a list has an index that belongs to no variable, all of its rows are read as depending on all knowns, and a row
+/// with such an index of its own is skipped; in `Derivatives` such a row is an error. Outputs that are missing from
+/// `Outputs` are read as depending on all knowns.
 pub(super) fn read(root: Node<'_>, variables: &[ScalarVariable]) -> Result<ModelStructure> {
     let Some(element) = model_structure(root)? else {
         let missing = missing_outputs(&[], variables).map(|(row, _)| row);
@@ -39,8 +39,8 @@ pub(super) fn model_structure(root: Node<'_>) -> Result<Option<Node<'_>>> {
     Ok(element)
 }
 
-/// Adds the rows in `missing`, each with the name of its output, and warns of them: `expected` content, and
-/// `none_for` before the names.
+/// Adds the rows in `missing`, each with the name of its output, to `outputs`. A warning states the `expected`
+/// content and, after the words `none_for`, the names.
 pub(super) fn add_outputs(
     element: Node<'_>,
     outputs: &mut Vec<Unknown>,
@@ -118,7 +118,7 @@ pub(super) fn index(text: &str, count: usize) -> Option<u32> {
     (index > 0 && usize::try_from(index).is_ok_and(|position| position <= count)).then_some(index)
 }
 
-/// Returns the expectation of an index in a message.
+/// Returns the text for the expected index in a message.
 pub(super) fn indices(count: usize) -> String {
     format!("the index of a variable, 1 to {count}")
 }

@@ -275,7 +275,6 @@ fn a_variable_that_would_mislead_a_simulation_is_refused() {
     }
 }
 
-/// A variable called `name` with that value reference.
 fn variable(name: &str, reference: u32, causality: &str) -> String {
     format!(
         "<ScalarVariable name='{name}' valueReference='{reference}' causality='{causality}'>\

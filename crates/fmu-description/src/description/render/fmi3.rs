@@ -6,7 +6,7 @@ use super::tag::Tag;
 use super::{Output, integer_limits, kinds, number, real_limits, write_attributes};
 use crate::description::{Kind, ModelDescription, SimpleType, Unknown, Version, attributes};
 
-/// Returns the tag of an interface with the attributes that all three have.
+/// Returns the tag of an interface with the attributes that all three interfaces have.
 macro_rules! interface {
     ($name:literal, $flags:ident) => {{
         let tag = Tag::new($name).with("modelIdentifier", &$flags.model_identifier);

@@ -1,5 +1,5 @@
-//! A start tag of quick-xml, with attributes of typed values and optional attributes. `BytesStart` accepts
-//! text only, and `Display` of an `f64` is not the text of a number in `modelDescription.xml`.
+//! A start tag of quick-xml with typed and optional attributes. `BytesStart` accepts text only, and `Display` of an
+//! `f64` is not the text of a number in `modelDescription.xml`.
 
 use std::borrow::Cow;
 

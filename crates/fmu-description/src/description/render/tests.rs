@@ -106,7 +106,7 @@ fn the_content_guid_depends_on_everything_but_the_guid() {
     assert_ne!(changed.content_guid(), guid);
 }
 
-/// The ten other attributes are absent: one zero each.
+/// The ten other attributes are absent; each is serialised as a zero.
 #[test]
 fn the_serialized_form_of_a_real_has_relative_quantity_only_if_it_is_stated() {
     let form = |relative_quantity| {

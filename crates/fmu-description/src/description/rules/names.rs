@@ -27,7 +27,7 @@ pub(super) fn check(problems: &mut Problems<'_>) {
             format!("variable {name} is named as a derivative and is not Real")
         });
     }
-    // Arrays of FMI 3.0 are variables, not names.
+    // In FMI 3.0 an array is one variable, and names with indices need no order.
     if problems.version == Version::V2 {
         for (_, text) in misplaced_elements(names()) {
             problems.add(section, text);

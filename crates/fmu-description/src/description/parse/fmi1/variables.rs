@@ -33,7 +33,7 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     let stated = element.one_of("variability", &VARIABILITIES);
     let continuous = kind.as_real().is_some();
     let (causality, variability) = match (element.one_of("causality", &CAUSALITIES), stated) {
-        // Its value does not change after the initialization, and it may be connected.
+        // Stays an output, because it may be connected, although its value does not change after the initialization.
         (Some("output"), Some("parameter")) => (Causality::Output, Variability::Discrete),
         (_, Some("parameter")) if kind.has_start() => (Causality::Parameter, Variability::Fixed),
         (_, Some("parameter")) => (Causality::CalculatedParameter, Variability::Fixed),
@@ -45,7 +45,7 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
             };
             let variability = match variability {
                 Some("constant") => Variability::Constant,
-                // The default for every type, although only a Real can be continuous.
+                // Continuous is the default for every type, although only a Real can be continuous.
                 Some("continuous") | None if continuous => Variability::Continuous,
                 _ => Variability::Discrete,
             };
@@ -69,8 +69,8 @@ fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Scalar
     })
 }
 
-/// Sets `alias_of` and `negated` by the attribute `alias`. Warns of an alias whose value reference no other
-/// variable of its base type has, and reads it as no alias.
+/// Sets `alias_of` and `negated` by the attribute `alias`. Warns of an alias whose value reference no other variable
+/// of its base type has, and ignores its attribute.
 fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
     const NAME: &str = "alias";
     let stated: Vec<_> = elements
@@ -118,7 +118,7 @@ fn outputs(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<Vec<Un
     Ok(rows)
 }
 
-/// Returns the sorted indices of the inputs that `DirectDependency` names; warns and returns `None` for others.
+/// Returns the sorted indices of the inputs in `DirectDependency`; `None`, with a warning, if one is no input.
 fn dependencies(element: Node<'_>, inputs: &HashMap<&str, u32>) -> Option<Vec<u32>> {
     let mut indices = Vec::new();
     for name in element.children_named("Name") {

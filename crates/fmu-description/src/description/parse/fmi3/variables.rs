@@ -63,7 +63,7 @@ pub(super) fn read(
     Ok((variables, references))
 }
 
-/// Maps value references to indices, without aliases. If several variables have one, warns and takes the first.
+/// Maps value references to indices, without aliases. Warns if several variables have one, and takes the first.
 fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References {
     let mut references = HashMap::with_capacity(variables.len());
     for ((index, variable), element) in (1..).zip(variables).zip(elements) {
@@ -196,7 +196,7 @@ fn clocks(element: Node<'_>) -> Result<Vec<u32>> {
     words(text).map(|word| word.parse().map_err(|_| wrong(word))).collect()
 }
 
-/// Removes the list of start values of a variable, with a warning, if there are more or fewer than elements.
+/// Removes, with a warning, each list of start values whose length is not the number of elements.
 ///
 /// # Errors
 ///
@@ -239,8 +239,8 @@ fn check_dimensions(
     Ok(())
 }
 
-/// Replaces value references by indices. One that belongs to no variable is an error; in `previous` it gives a warning
-/// and counts as missing.
+/// Replaces value references by indices. A value reference that belongs to no variable is an error; in `previous` it
+/// gives a warning and counts as missing.
 fn resolve(
     element: Node<'_>,
     variable: &mut ScalarVariable,

@@ -59,7 +59,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "LogCategories") => list(&["Category"]),
         (_, "Category") => leaf(&["name", "description"]),
         (_, "DefaultExperiment") => leaf(&["startTime", "stopTime", "tolerance", "stepSize"]),
-        // No `list`: `problems` reports an empty one.
+        // May be empty here: `problems` reports it.
         (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
         (_, "ScalarVariable") => VARIABLE,
         ("ScalarVariable", "Real") => {

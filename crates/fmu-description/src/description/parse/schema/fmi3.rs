@@ -15,7 +15,7 @@ const ROOT: Shape = branch(
     },
 );
 
-/// Declares the names of the elements of variables, and with `Type` at their end those of types.
+/// Declares the names of the elements of variables, and those of types, which end in `Type`.
 macro_rules! elements {
     ($($name:literal)*) => {
         const VARIABLES: [&str; 15] = [$($name),*];
@@ -72,7 +72,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "DefaultExperiment") => {
             branch(&["startTime", "stopTime", "tolerance", "stepSize"], ANNOTATED)
         }
-        // No `list`: `problems` reports an empty one.
+        // May be empty here: `problems` reports it.
         (_, "ModelVariables") => Shape { unordered: VARIABLES.len(), ..branch(&[], &VARIABLES) },
         ("ModelVariables", name) => of_variable(name)?,
         (_, "Dimension") => leaf(&["start", "valueReference"]),

@@ -21,7 +21,7 @@ fn errors_point_at_the_line_and_column_of_the_element() {
     }
 }
 
-/// Returns the model name, and the content that the only warning states.
+/// Returns the model name, and the actual content that the only warning states.
 fn named(bytes: &[u8]) -> (String, String) {
     let (description, warnings) = ModelDescription::read(bytes).unwrap();
     let [warning] = warnings.as_slice() else { panic!("{warnings:?}") };

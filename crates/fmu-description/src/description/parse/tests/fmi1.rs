@@ -83,7 +83,7 @@ fn an_alias_names_its_variable_and_whether_the_sign_differs() {
     assert_eq!(alias("tau1"), (None, false));
     assert_eq!(alias("tau2"), (Some("tau1"), true));
     assert_eq!(alias("y"), (Some("x"), false));
-    // The value reference 0 of another type is another variable.
+    // `on` has the value reference 0 too, but another type: it is another variable.
     assert_eq!(alias("on"), (None, false));
 }
 

@@ -72,7 +72,7 @@ fn each_type_has_its_own_range_of_start_values_and_limits() {
             );
             let expected = format!("expected integers from {low} to {high}, found \"{wrong}\"");
             assert!(error.contains(&expected), "{error}");
-            // Rounded to an `f64`, the integer below those of an `Int64` is the smallest `Int64`.
+            // As an `f64`, -2^63 - 1 is rounded to the smallest `Int64`.
             for limit in ["min", "max"] {
                 let text = format!(r#"<{element} name="i" valueReference="1" {limit}="{wrong}"/>"#);
                 let error = refused(&text, "");
@@ -308,7 +308,7 @@ fn a_float32_is_relative_by_its_declared_type_and_so_is_its_alias() {
     assert_eq!(relative, [false, true, true, false]);
 }
 
-/// `fmi3Type.xsd` extends a base with the annotations by the items.
+/// In `fmi3Type.xsd` the base type has the annotations, and the extended type adds the items.
 #[test]
 fn annotations_of_an_enumeration_precede_its_items() {
     let (item, annotations) = (r#"<Item name="a" value="1"/>"#, "<Annotations/>");

@@ -32,7 +32,7 @@ pub(in crate::description::rules) fn check(problems: &mut Problems<'_>) {
             || variable.causality == Causality::StructuralParameter
             || variable.variability == Variability::Constant
             || states.contains(&index)
-            // It may be a discrete-time state: the standard marks only the clocked ones.
+            // May be a discrete-time state: the standard marks only the clocked ones.
             || variable.variability == Variability::Discrete
     };
     for (list, rows) in [

@@ -269,7 +269,7 @@ fn the_structure_lists_what_it_must() {
     let actual =
         only_problem("2.4.8", |description| description.structure.event_indicators.push(row(6)));
     assert!(actual.contains("EventIndicator, i8"), "{actual}");
-    // Clocked variables may be there.
+    // Clocked variables are allowed in `InitialUnknown`, but not required.
     let mut description = sample::complete_3();
     let held = description.variables.iter().position(|variable| variable.name == "held").unwrap();
     description.structure.initial_unknowns.push(row(u32::try_from(held).unwrap() + 1));
