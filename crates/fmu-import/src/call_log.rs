@@ -483,7 +483,6 @@ mod tests {
         }
     }
 
-    /// Returns the log of the calls of an FMU of a version.
     fn log_of(fmi_version: &str) -> String {
         let folder = TemporaryFolder::new().unwrap();
         let path = folder.path().join("calls.txt");

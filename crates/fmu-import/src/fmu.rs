@@ -95,7 +95,7 @@ pub(crate) struct Content {
     binding: Binding,
     /// For an FMU that allows one instance only: whether that instance exists.
     instantiated: AtomicBool,
-    /// Positions of variables by type and value reference; filled at the first message that needs one.
+    /// Positions of variables by type and value reference; filled by the first message that refers to a variable.
     names: OnceLock<HashMap<(char, u32), usize>>,
 }
 

@@ -21,11 +21,11 @@ use rustix::process::{
 
 use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
 
-/// How long the process may take to end after its work.
+/// Time limit for the process to end after its work.
 const AFTER_WORK: Duration = Duration::from_secs(1);
 /// How long the process may stay in the same calls of FMUs after an ending signal.
 const AFTER_SIGNAL: Duration = Duration::from_secs(8);
-/// The interval of checks while one of these times passes.
+/// Interval between two checks of these limits.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Number of 64-bit words that both processes share for the program: 2 MiB, of which the system allocates only the
@@ -37,11 +37,11 @@ static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 /// How the process of the program ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// With this exit status; -1 if the system does not know it.
+    /// The process exited with this status; -1 if the system does not know it.
     Exited(i32),
-    /// By this signal.
+    /// This signal ended the process.
     Killed(i32),
-    /// It was killed because an FMU kept it from ending.
+    /// The supervisor killed the process because an FMU kept it from ending.
     Stuck,
 }
 
@@ -57,10 +57,10 @@ impl fmt::Display for End {
     }
 }
 
-/// What is known of the process of the program at its end.
+/// The end of the program's process and its state at this time.
 #[derive(Clone, Debug)]
 pub struct Ended {
-    /// How it ended.
+    /// How the process ended.
     pub end: End,
     /// The exit status that the program chose; `None` if the process ended before.
     pub status: Option<u8>,
@@ -70,8 +70,8 @@ pub struct Ended {
     pub has_begun_steps: bool,
 }
 
-/// Splits the program into two processes. In the child, which does the work, returns `None` at once. In the supervisor,
-/// waits for the end of the child and returns what is known of it. Call it before the program starts a thread.
+/// Splits the program into two processes. In the child, which does the work, returns `None` at once. In the
+/// supervisor, waits for the child and returns how it ended. Call this function before the program starts a thread.
 ///
 /// # Errors
 ///
@@ -136,7 +136,7 @@ pub fn memory() -> Option<&'static [AtomicU64]> {
     MEMORY.get().copied()
 }
 
-/// Lets the system kill this process when its supervisor ends. Ends it at once if the supervisor has ended already.
+/// Lets the system kill this process when `supervisor` ends; ends it at once if its parent is another process.
 fn end_with(supervisor: Pid) {
     // Fails only for an invalid signal.
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
@@ -145,7 +145,7 @@ fn end_with(supervisor: Pid) {
     }
 }
 
-/// The signals for which the supervisor waits. They are blocked meanwhile.
+/// The blocked signals for which the supervisor waits.
 struct Signals {
     set: sigset_t,
     /// The signals that were blocked before.
@@ -173,7 +173,7 @@ impl Signals {
     }
 
     fn restore(&self) {
-        // SAFETY: the set that this process had.
+        // SAFETY: a set of signals to read, and no set to write to.
         unsafe { libc::sigprocmask(libc::SIG_SETMASK, &raw const self.former_mask, null_mut()) };
     }
 

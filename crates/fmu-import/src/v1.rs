@@ -157,7 +157,7 @@ impl Instance {
         }
     }
 
-    /// Stores the values for the FMU: those of negated aliases have the opposite sign.
+    /// Stores the values for the FMU, with the opposite sign for negated aliases.
     fn store_reals(&mut self, list: &[u32], values: &[f64]) {
         self.reals.clear();
         for (value, reference) in values.iter().zip(list) {

@@ -42,7 +42,7 @@ pub(crate) struct Record {
     pub(super) started: AtomicBool,
     /// The exit status with which the program ends, plus 1; 0 while it works.
     pub(crate) done: AtomicI32,
-    /// The number of copies of this process that FMUs made by `fork` and that went on as the program.
+    /// The number of copies of this process that FMUs made by `fork` and that continued as the program.
     pub(super) copies: AtomicUsize,
 }
 

@@ -32,7 +32,7 @@ pub(super) const FATAL: [(c_int, &str); 6] = [
     (libc::SIGABRT, "SIGABRT: abort was called"),
     (libc::SIGSYS, "SIGSYS: an invalid system call"),
 ];
-/// The signals by which users and systems end a program or announce its end.
+/// The ending signals, by which users and systems end a program or announce its end.
 pub(crate) const ENDING_SIGNALS: [c_int; 7] = [
     libc::SIGINT,
     libc::SIGTERM,
@@ -68,7 +68,7 @@ fn is_done() -> bool {
     RECORD.done.load(Ordering::Acquire) != 0
 }
 
-/// Returns whether SIGHUP is ignored, as `nohup` does it.
+/// Returns whether SIGHUP is ignored, as under `nohup`.
 pub(crate) fn ignores_hangup() -> bool {
     handler_of(libc::SIGHUP).is_ok_and(|handler| handler == libc::SIG_IGN)
 }
@@ -367,7 +367,7 @@ fn on_end_of_process() -> io::Result<()> {
     check(unsafe { on_exit(ended, null_mut()) })
 }
 
-/// Registers [`exit_called`] for calls of `exit`, whose status this system does not tell.
+/// Registers [`exit_called`] for calls of `exit`; this system does not tell the exit status.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 fn on_end_of_process() -> io::Result<()> {
     extern "C" fn ended() {

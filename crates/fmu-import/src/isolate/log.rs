@@ -150,7 +150,7 @@ impl Visit for Message {
     }
 }
 
-/// Limits the number of messages that an FMU may log in a [`WINDOW`], and the number of their bytes in total.
+/// Limits the number of messages of an FMU that are logged in a [`WINDOW`], and the number of their bytes in total.
 struct Quota {
     /// Start of the window.
     since: Instant,

@@ -9,7 +9,7 @@ use fmu_description::package::Unpacked;
 use super::{Integrator, IsolateError, Options, WorkerError};
 use slave::{CallError, Slave, StepResult};
 
-/// An instance in a process of its own. It cannot be created on this operating system.
+/// An instance in a separate process, which cannot be created on this operating system.
 #[derive(Debug)]
 pub struct Isolated {
     never: Infallible,

@@ -47,7 +47,7 @@ pub(super) fn words_of(bytes: &[u8]) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Writes values to an area from its start. Values that do not fit are not written.
+/// Writes values to an area from its start. Values that do not fit are dropped.
 pub(super) struct Writer<'a> {
     words: &'a [AtomicU64],
     position: usize,
@@ -71,7 +71,7 @@ impl<'a> Writer<'a> {
         self.position = self.position.saturating_add(1);
     }
 
-    /// Writes the values without their number; none of them if not all fit.
+    /// Writes the values without their number; writes nothing if not all fit.
     #[inline]
     pub(super) fn put_all<T: Word>(&mut self, values: &[T]) {
         let end = self.position.saturating_add(values.len());

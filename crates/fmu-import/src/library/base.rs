@@ -62,7 +62,8 @@ pub(crate) struct Base<F> {
 }
 
 impl<F: Copy> Base<F> {
-    /// Takes over the instance that `function` has created. Null is an error with the messages of the FMU.
+    /// Takes over the instance that `function` has created; if it is null, returns an error with the messages of the
+    /// FMU.
     pub(super) fn new(
         library: &Arc<Loaded<F>>,
         pointer: *mut c_void,

@@ -16,10 +16,10 @@ use crate::error::LoadError;
 /// How to treat a library that calls functions that no library defines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Binding {
-    /// It is loaded with a warning if the system can bind functions at their first call. A call of such
-    /// a function ends the process.
+    /// Load the library with a warning, if the system can bind functions at their first call. A call of an undefined
+    /// function then ends the process.
     Lenient,
-    /// It is refused.
+    /// Refuse the library.
     #[cfg(target_os = "linux")]
     Strict,
 }

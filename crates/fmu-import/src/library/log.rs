@@ -127,8 +127,8 @@ fn find(matches: impl Fn(&Sink) -> bool) -> Option<Arc<Sink>> {
     sinks.iter().filter_map(Weak::upgrade).find(|sink| matches(sink))
 }
 
-/// Receives a message whose environment matches no sink. It goes to the instance that this thread
-/// called last, otherwise to the instance named `instance`.
+/// Receives a message whose environment matches no sink, for the instance that this thread called last, otherwise for
+/// the instance named `instance`.
 fn receive_unmatched(instance: Option<&str>, status: c_int, category: &str, text: &str) {
     let sink = find(|sink| sink.place.is_at(last_of_this_thread()))
         .or_else(|| find(|sink| Some(sink.place.instance()) == instance));

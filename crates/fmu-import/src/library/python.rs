@@ -55,7 +55,7 @@ pub(super) fn provide(fmu: &str) -> Result<(), String> {
     Err(why.unwrap_or_else(|| format!("the {PYTHON} in PATH has no shared library")))
 }
 
-/// Returns whether the libraries of this process see a Python already.
+/// Returns whether the C interface of Python is visible to all libraries of this process.
 fn is_visible() -> bool {
     #[cfg(unix)]
     // SAFETY: the symbol is not used.

@@ -26,7 +26,7 @@ macro_rules! states {
                 if saved.len() <= slot {
                     saved.resize(slot + 1, null_mut());
                 }
-                // SAFETY: the instance is alive; the state is null or its own.
+                // SAFETY: the instance is alive; the state is null or belongs to it.
                 let status = unsafe { function(self.base.pointer, &raw mut saved[slot]) };
                 self.base.check($get, status)
             }
@@ -44,7 +44,7 @@ macro_rules! states {
             fn set_state(&mut self, state: *mut c_void) -> Result<(), CallError> {
                 let function = function!(self.set_state, $set);
                 self.base.log_call($set, String::new);
-                // SAFETY: the instance is alive; the state is its own.
+                // SAFETY: the instance is alive; the state belongs to it.
                 let status = unsafe { function(self.base.pointer, state) };
                 self.base.check($set, status)
             }
@@ -53,7 +53,7 @@ macro_rules! states {
             fn free_state(&mut self, state: &mut *mut c_void) {
                 if let (Some(function), false) = (self.base.functions.free_state, state.is_null()) {
                     self.base.place.enter(&$free);
-                    // SAFETY: the instance is alive, the state is its own.
+                    // SAFETY: the instance is alive; the state belongs to it.
                     unsafe { function(self.base.pointer, &raw mut *state) };
                     self.base.place.leave();
                     *state = null_mut();
@@ -84,7 +84,7 @@ macro_rules! states {
                 let mut size = 0;
                 let function = function!(self.serialized_state_size, $size);
                 self.base.log_call($size, String::new);
-                // SAFETY: the instance is alive, the state is its own.
+                // SAFETY: the instance is alive; the state belongs to it.
                 let status = unsafe { function(self.base.pointer, state, &raw mut size) };
                 self.base.check($size, status)?;
                 let bytes = canary::bytes_of_state(size);

@@ -41,8 +41,7 @@ impl Component {
 
     /// Sets inputs, steps and reads outputs, as [`slave::Slave::pass`] specifies.
     ///
-    /// `fmi2OK` and `fmi2Warning` are handled inline; every other status goes through the methods of
-    /// the single calls.
+    /// Handles `fmi2OK` and `fmi2Warning` inline, and every other status by the methods of the single calls.
     #[inline]
     pub(crate) fn pass(
         &mut self,

@@ -1,4 +1,4 @@
-//! What an FMU can change for its whole process: environment, working directory, rounding mode, locale
+//! The settings that an FMU can change for its whole process: environment, working directory, rounding mode, locale
 //! and process group.
 #![expect(unsafe_code, reason = "the locale of C")]
 

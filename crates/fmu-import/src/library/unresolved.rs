@@ -1,7 +1,7 @@
 //! Functions that a library calls and that no library defines.
 //!
-//! The dynamic linker of glibc ends the process by `_exit` when such a function is called; no handler runs. Here a
-//! function of this module replaces such functions. It aborts, which is reported as a crash with FMU, function and
+//! The dynamic linker of glibc ends the process by `_exit` when such a function is called; no handler runs. Here
+//! [`undefined_function`] replaces such functions. It aborts, which is reported as a crash with FMU, function and
 //! time.
 #![expect(unsafe_code, reason = "the tables of the dynamic linker")]
 

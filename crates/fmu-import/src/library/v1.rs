@@ -148,8 +148,7 @@ impl Component {
         }
     }
 
-    /// Calls `fmiDoStep` from `time` with the step `size`, both in s. The last step is accepted
-    /// (`newStep`).
+    /// Calls `fmiDoStep` from `time` with the step `size`, both in s. `newStep` is true: the last step is accepted.
     #[inline]
     pub(crate) fn do_step(&mut self, time: f64, size: f64) -> Result<StepResult, CallError> {
         const NAME: &str = "fmiDoStep";

@@ -104,8 +104,8 @@ impl Instance {
     }
 
     /// Returns whether variables must be passed to the FMU. If they may change in Event Mode only and one of them
-    /// changes, enters Event Mode. `bits` returns the bits of the value at a place, which are compared with those set
-    /// last.
+    /// changes, enters Event Mode. `bits` returns the bits of the value at a place, which are compared with the bits
+    /// set last.
     fn may_set(
         &mut self,
         event: bool,

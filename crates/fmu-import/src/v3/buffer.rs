@@ -216,7 +216,7 @@ macro_rules! buffer {
                 }
             }
 
-            /// Returns value number `position` as a Real; `None` if the values are no numbers.
+            /// Returns value number `position` as a Real; `None` if the values are not numeric.
             pub(super) fn real(&self, position: usize) -> Option<f64> {
                 match self {
                     $(Buffer::$variant(values) => values[position].real(),)*

@@ -12,7 +12,7 @@ use super::plan::Run;
 use fmu_description::{Causality, NativeType};
 use slave::CallError;
 
-/// Values of clocked elements at their last tick, or to be set at their next one. The key is the position of the
+/// Values of clocked elements at their last tick, or to be set at their next tick. The key is the position of the
 /// element among all elements that may change in Event Mode only.
 pub(super) type Memory = BTreeMap<usize, ElementValue>;
 

@@ -47,7 +47,7 @@ struct TimedClock {
     warned: bool,
 }
 
-/// The clocks of an instance. A serialised state has those that tick at known times, and the ticks of the last step.
+/// The clocks of an instance. A serialised state has only the timed clocks and the ticks of the last step.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Clocks {
     timed: Vec<TimedClock>,
@@ -239,8 +239,8 @@ impl Clocks {
         !self.requested.is_empty() || self.timed.iter().any(|clock| clock.is_due(time, ticks))
     }
 
-    /// Moves the clocks that are due at `time` to their next ticks; returns their value references, after those of the
-    /// requested clocks.
+    /// Moves the clocks that are due at `time` to their next ticks. Returns the value references of the requested
+    /// clocks, then of the moved ones.
     fn take_due(&mut self, time: f64) -> Vec<u32> {
         let (mut due, ticks) = (std::mem::take(&mut self.requested), &self.event_ticks);
         for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time, ticks)) {
@@ -399,8 +399,8 @@ impl Instance {
         self.activate(&due)
     }
 
-    /// Makes `clocks` tick in Event Mode, and passes the values of their clocked inputs to the FMU. In scheduled
-    /// execution notes their model partitions to run.
+    /// Makes `clocks` tick: in Event Mode, with the values of their clocked inputs passed to the FMU; in scheduled
+    /// execution, with their model partitions recorded to run.
     fn activate(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         if self.is_scheduled() {
             self.state.clocks.partitions.extend(clocks);

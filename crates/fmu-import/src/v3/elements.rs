@@ -262,7 +262,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Adds a variable of the FMU unless it is an alias of a known one.
+    /// Adds a variable of the FMU unless it is an alias of a known variable.
     fn add_native(
         &mut self,
         description: &ModelDescription,

@@ -14,7 +14,7 @@ const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
-/// The state of the slave, besides the state of the FMU.
+/// The state of the slave, which is saved with the state of the FMU.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct State {
     #[serde(skip)]
@@ -29,7 +29,7 @@ pub(super) struct State {
     pub(super) time: f64,
     /// Bits of the values set last of the elements that may change in Event Mode only; for Strings and binaries a hash.
     pub(super) held: Vec<Option<u64>>,
-    /// Values of clocked elements at their last tick, and for their next one.
+    /// Values of clocked elements at their last tick, or to be set at their next tick.
     pub(super) memory: Memory,
     pub(super) clocks: Clocks,
 }

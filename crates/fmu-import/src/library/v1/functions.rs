@@ -17,8 +17,8 @@ type Text = *const c_char;
 /// `fmiBoolean`: a `char`, 0 is false.
 type Boolean = c_char;
 
-/// `fmiCallbackFunctions` of model exchange, passed by value, and the start of that of co-simulation. The types of
-/// the functions are those of FMI 2.0; the first argument of the logger is the component.
+/// `fmiCallbackFunctions` of model exchange, passed by value; the structure of co-simulation starts with the same
+/// fields. The functions have the types of FMI 2.0; the first argument of the logger is the component.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(super) struct ModelCallbacks {
