@@ -5,9 +5,9 @@ use std::fmt;
 /// Significant digits of a time; the rounding error of a sum of steps is smaller than the last of them.
 const TIME: usize = 12;
 
-/// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros after the decimal
-/// point; with an exponent if its magnitude is below 1e-4, or if it has more digits before the decimal point than
-/// both `digits` and 6. NaN and infinity are `NaN` and `inf`.
+/// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros after the decimal point.
+/// Has an exponent if the magnitude is below 1e-4, or if there are more digits before the decimal point than both
+/// `digits` and 6. NaN and infinity are `NaN` and `inf`.
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
     let mut text = String::new();

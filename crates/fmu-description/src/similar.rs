@@ -16,8 +16,8 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
     if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
 }
 
-/// Returns those of `names` that contain `name`, are contained in it, or have an edit distance of at most two,
-/// ignoring case: the five most similar ones, in the order of their edit distance.
+/// Returns the five most similar of those `names` that contain `name`, are contained in it, or have an edit distance
+/// of at most two, ignoring case; in the order of their edit distance.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let lower = name.to_ascii_lowercase();
@@ -31,8 +31,8 @@ pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a st
     similar
 }
 
-/// Returns the first of `names` that equals `name`, ignoring case, or, if `name` has more than three bytes, has an edit
-/// distance of one.
+/// Returns the first of `names` that equals `name` or, if `name` has more than three bytes, has an edit distance of
+/// one from `name`, ignoring case.
 #[must_use]
 pub fn slip<'a>(mut names: impl Iterator<Item = &'a str>, name: &str) -> Option<&'a str> {
     let lower = name.to_ascii_lowercase();

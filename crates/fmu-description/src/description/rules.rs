@@ -29,7 +29,7 @@ impl fmt::Display for Problem {
     }
 }
 
-/// The sections with the rules that FMI 2.0.5 and 3.0.2 have in common.
+/// The section numbers of the rules that FMI 2.0.5 and 3.0.2 have in common.
 struct Sections {
     root: &'static str,
     units: &'static str,
@@ -194,7 +194,7 @@ fn check_identity(problems: &mut Problems<'_>) {
 /// The attributes of an interface that the rules compare.
 struct Interface<'a> {
     name: &'static str,
-    /// Section of FMI 2.0.5; `None` for scheduled execution, which it does not have.
+    /// Section of FMI 2.0.5; `None` for scheduled execution, which FMI 2.0 does not have.
     section: Option<&'static str>,
     identifier: &'a str,
     /// `canGetAndSetFMUState`.

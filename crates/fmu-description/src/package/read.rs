@@ -297,7 +297,7 @@ fn temporary_folder() -> Result<TemporaryFolder, PackageError> {
     TemporaryFolder::new().map_err(file_error("create a folder in", std::env::temp_dir()))
 }
 
-/// Reads the model description in `folder`; the error for a malformed one names `path`, the archive or the folder.
+/// Reads the model description in `folder`. The error for a malformed one names `path`, the archive or the folder.
 fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning>), PackageError> {
     let file = folder.join(DESCRIPTION);
     let xml = match read_limited(&file) {

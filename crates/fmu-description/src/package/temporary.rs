@@ -1,4 +1,4 @@
-//! Temporary folders. On Unix, the next process removes those of a killed process.
+//! Temporary folders. On Unix, if a process is killed, the next process that creates one removes its folders.
 
 use std::fs::File;
 use std::io::{self, ErrorKind};

@@ -31,7 +31,6 @@ pub(crate) struct Element<'a> {
     pub(crate) text: &'a str,
     pub(crate) attributes: Vec<(&'a str, Cow<'a, str>)>,
     pub(crate) children: Vec<Element<'a>>,
-    /// The position at which it starts.
     pub(crate) at: Position,
 }
 

@@ -44,7 +44,7 @@ impl<'a> Node<'a> {
         self.fault(attribute, expected, format!("{actual:?}"))
     }
 
-    /// Returns the error for an attribute whose actual content is the text `actual`, without quotes.
+    /// Returns the error for an attribute; the message shows `actual` without quotes.
     fn fault(&self, attribute: &'static str, expected: &str, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
         ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), actual }
@@ -281,7 +281,8 @@ impl<'a> Node<'a> {
         self.one_of(name, words)?.parse().ok()
     }
 
-    /// Reads one of `words`. Warns of another case, white space around it, and another word, which counts as missing.
+    /// Reads one of `words`. Warns of another case, of white space around it, and of an unknown word, which is
+    /// missing.
     pub(super) fn one_of(&self, name: &str, words: &[&'static str]) -> Option<&'static str> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);

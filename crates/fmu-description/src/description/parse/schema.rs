@@ -8,7 +8,7 @@ mod fmi3;
 use super::attributes::Node;
 use crate::description::Version;
 
-/// A list of names, without quotes and commas.
+/// Converts names, without quotes and commas, to a slice of texts.
 macro_rules! names {
     ($($name:ident)*) => { &[$(stringify!($name)),*] };
 }
@@ -33,7 +33,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// Adds a shared list of attributes, of which there are at most three.
+    /// Adds a list of shared attributes; a shape has at most three.
     const fn with(self, shared: &'static [&'static str]) -> Shape {
         let [first, second, third] = self.shared;
         assert!(third.is_empty(), "room for three lists");

@@ -128,7 +128,7 @@ pub(super) fn check_references(elements: &[Node<'_>], variables: &[ScalarVariabl
 fn variable(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<ScalarVariable> {
     let name = element.required("name")?.to_owned();
     let value_reference = element.unsigned("valueReference")?;
-    // The last one, structuralParameter, is of FMI 3.0.
+    // The last word, structuralParameter, belongs to FMI 3.0.
     let causalities = &Causality::WORDS[..6];
     let causality = element.word("causality", causalities).unwrap_or(Causality::Local);
     let kind = kind(typed(element)?, types, count)?;
@@ -178,7 +178,7 @@ pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>> {
     }
 }
 
-/// Reads the type of a variable with its attributes, also those of its declared type.
+/// Reads the type of a variable with its attributes and those of its declared type.
 pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind> {
     let (declared_type, defaults) = declared(element, types).unzip();
     Ok(match element.element.name {

@@ -22,7 +22,7 @@ impl Warnings {
         Self { version, list: RefCell::new(Vec::new()) }
     }
 
-    /// Adds a warning; does nothing after [`MOST`] warnings and the one about others.
+    /// Adds a warning; after [`MOST`] warnings adds only one more, which states that there are others.
     pub(super) fn add(&self, warning: Warning) {
         let mut list = self.list.borrow_mut();
         if list.len() < MOST {

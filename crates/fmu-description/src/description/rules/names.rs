@@ -60,7 +60,7 @@ pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usiz
     misplaced
 }
 
-/// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices, or has others before.
+/// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices, or has more before.
 #[must_use]
 pub fn array_element(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;

@@ -1,4 +1,4 @@
-//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), and those that FMI 3.0 has too.
+//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8), some of which FMI 3.0 has too.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -52,7 +52,7 @@ pub(super) fn is_external(variable: &ScalarVariable) -> bool {
         || matches!(variable.kind, Kind::Clock(_))
 }
 
-/// Whether the variable is a clock or belongs to one.
+/// Whether the variable is a clock or has the attribute `clocks`.
 pub(super) fn is_clocked(variable: &ScalarVariable) -> bool {
     !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_))
 }

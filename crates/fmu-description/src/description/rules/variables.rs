@@ -144,7 +144,7 @@ pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Pro
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
 
-/// Checks that `min <= start <= max` for those that are stated.
+/// Checks that `min <= start <= max`, as far as they are stated.
 pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     who: &str,
     min: Option<T>,

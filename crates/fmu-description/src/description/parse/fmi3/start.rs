@@ -82,7 +82,7 @@ fn texts(element: Node<'_>) -> impl Iterator<Item = &str> {
     element.children_named("Start").map(|start| start.attribute("value").unwrap_or_default())
 }
 
-/// Decodes pairs of hexadecimal digits, without white space; `None` for other characters and an odd number of digits.
+/// Decodes pairs of hexadecimal digits, ignoring white space; `None` for other characters or a single digit.
 fn hexadecimal(text: &str) -> Option<Vec<u8>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());

@@ -28,7 +28,7 @@ const REAL: &[&str] =
 /// Attributes of an Integer or Enumeration, as a type and as a variable.
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 
-/// Returns the shape of an interface with these attributes and those of both interfaces.
+/// Returns the shape of an interface: `attributes`, and the attributes that both interfaces have.
 const fn interface(attributes: &'static [&'static str]) -> Shape {
     let shape = branch(attributes, &["SourceFiles"]).with(&["modelIdentifier"]);
     shape.with(attributes!(COMMON_2, names_in_table!()))

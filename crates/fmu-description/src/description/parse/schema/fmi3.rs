@@ -46,7 +46,7 @@ const CLOCK: &[&str] = names! {
     intervalCounter shiftCounter
 };
 
-/// Returns the shape of an interface with these attributes and those of all interfaces.
+/// Returns the shape of an interface: `attributes`, and the attributes that all interfaces have.
 const fn interface(attributes: &'static [&'static str]) -> Shape {
     let shape = branch(attributes, ANNOTATED).with(&["modelIdentifier"]);
     shape.with(attributes!(COMMON_3, names_in_table!()))

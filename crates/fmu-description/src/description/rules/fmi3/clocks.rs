@@ -62,7 +62,7 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
         problems.demand(holds, TYPES, || format!("clock {name}: {text}"));
     };
     // Section 2.4.4 requires the interval of every periodic clock; by section 2.2.8.2 the functions
-    // `fmi3GetInterval...` return that of fixed and tunable clocks.
+    // `fmi3GetInterval...` return the interval of fixed and tunable clocks.
     let constant = clock.interval_variability == Constant;
     demand(has_interval || !constant, "a constant clock needs intervalDecimal");
     demand(periodic || !has_interval, "only a periodic clock has intervalDecimal");
