@@ -94,7 +94,7 @@ pub fn folder_path(path: &Path) -> Result<String, LocationError> {
 ///
 /// # Errors
 ///
-/// [`LocationError`] for another scheme, a relative path, another host or a NUL, and on other systems than Unix
+/// [`LocationError`] for another scheme, a relative path, another host or a NUL, and on systems other than Unix
 /// for a path that is not UTF-8.
 ///
 /// ```

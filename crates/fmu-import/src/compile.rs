@@ -219,7 +219,7 @@ impl Compiler {
     }
 }
 
-/// Makes the path of the program absolute, because files are compiled in the folder of the sources; a name stays.
+/// Makes the path of the program absolute, because files are compiled in the folder of the sources; keeps a bare name.
 fn absolute(mut words: Vec<OsString>) -> Vec<OsString> {
     if let Some(program) = words.first_mut()
         && Path::new(&*program).components().count() > 1

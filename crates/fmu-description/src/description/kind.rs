@@ -192,7 +192,7 @@ impl Kind {
         }
     }
 
-    /// Whether the type has a `start`, for a scalar or for all elements of an array. A list of them does not count.
+    /// Whether the type has a `start`, for a scalar or for all elements of an array; a list of starts does not count.
     #[must_use]
     pub fn has_start(&self) -> bool {
         match self {

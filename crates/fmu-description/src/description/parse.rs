@@ -86,7 +86,7 @@ impl ModelDescription {
         };
         let mut warnings = warnings.finish();
         let section = if version == Version::V3 { "2.4" } else { "2.2" };
-        // FMI 1.0 demands no encoding.
+        // FMI 1.0 requires no particular encoding.
         let not_utf8 = not_utf8.filter(|_| version != Version::V1);
         warnings.splice(0..0, not_utf8.map(|warning| Warning { section, ..warning }));
         Ok((description, warnings))

@@ -219,7 +219,7 @@ impl Unpacked {
             || has_file(&self.folder().join("sources"))
     }
 
-    /// The paths of the files in the folders of platforms in `binaries`, in upper or lower case; sorted, at most 20.
+    /// The paths of the files in the platform folders of `binaries`, whose case is ignored; sorted, at most 20.
     fn libraries(&self) -> Vec<String> {
         let mut libraries = if self.temporary.is_some() {
             self.names.clone()

@@ -85,7 +85,7 @@ struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    /// Checks that an element at `at`, `inner` levels below the children of the open element, is not too deep.
+    /// Checks the depth of an element at position `at`, `inner` levels below the children of the open element.
     fn check_depth(&self, at: Position, inner: usize) -> Result<(), ParseError> {
         if self.open.len() + inner >= DEPTH {
             let what = "levels of nested elements";
@@ -95,7 +95,7 @@ impl<'a> Tree<'a> {
     }
 
     fn end(&mut self) -> Result<(), ParseError> {
-        // The reader has checked that there is a parent.
+        // The reader has checked that an element is open.
         self.open.pop().map_or(Ok(()), |element| self.add(element))
     }
 
@@ -205,7 +205,7 @@ pub(super) fn read_but(
                 tree.add(element)?;
             }
             Ok(Event::End(_)) => tree.end()?,
-            // The reader splits a text at its references.
+            // The reader splits a text at references to characters and entities.
             Ok(Event::Text(_) | Event::GeneralRef(_)) => {
                 tree.text(text.get(offset..).unwrap_or_default());
             }

@@ -288,7 +288,7 @@ mod tests {
         assert!(calls(1).any(|actual| actual == call));
         one.leave();
         assert!(calls(address).all(|call| &*call.instance != "one"));
-        // As in an iteration of a step: the same function at the same time, but another call.
+        // A repeated step: the same function at the same time, but another call.
         one.enter(&"fmi2DoStep");
         let again = calls(address).next().unwrap();
         assert_eq!((again.function, again.time), (call.function, call.time));

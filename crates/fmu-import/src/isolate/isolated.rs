@@ -157,7 +157,7 @@ impl Isolated {
     /// Lets the worker load and instantiate the FMU.
     fn open(&mut self, name: &str, options: &Options) -> Result<Opening, CallError> {
         let package = self.package.clone();
-        // The time limit starts in one slice: the process has then usually become a worker.
+        // The time limit starts one slice from now, when the process has usually become a worker.
         self.posted_at = Some(Instant::now() + self.slice);
         self.request(&Request::Open(Open {
             folder: package.folder().as_os_str().as_bytes(),

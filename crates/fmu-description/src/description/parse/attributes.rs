@@ -197,7 +197,7 @@ impl<'a> Node<'a> {
         self.integer_in(name, range, "an integer")
     }
 
-    /// Reads an integer in `range`; `expected_if_empty` is the expectation in the warning of an empty attribute.
+    /// Reads an integer in `range`. The warning about an empty attribute states `expected_if_empty`.
     fn integer_in(
         &self,
         name: &'static str,

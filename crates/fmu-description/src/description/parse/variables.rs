@@ -82,8 +82,8 @@ pub(super) fn scalar_variables<'a>(
     Ok((elements, variables))
 }
 
-/// Refuses a name of two variables. Only warns if both are local, or have one base type and value reference, because
-/// then either may be meant.
+/// Refuses a name that two variables have. Only warns if both are local, or have one base type and value reference,
+/// because then either variable may be meant.
 pub(super) fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()> {
     let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
     for (element, variable) in elements.iter().zip(variables) {

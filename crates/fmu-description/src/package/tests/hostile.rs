@@ -158,7 +158,7 @@ fn to_run_an_fmu_only_needed_files_are_unpacked() {
     }
     let foreign = if platforms().contains(&"win64") { "linux64" } else { "win64" };
     package.add(format!("binaries/{foreign}/Foreign.dll"), "x");
-    // With one library only, its name would not matter.
+    // The name of a single library would not matter.
     package.add(format!("binaries/{}/Second{}", platforms()[0], std::env::consts::DLL_SUFFIX), "x");
     package.write(&target).unwrap();
     let files = |unpacked: &Unpacked| {

@@ -139,8 +139,8 @@ fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType> {
     })
 }
 
-/// Returns the interval variability of a clock without a valid one: constant if it has an interval, otherwise
-/// triggered. Warns if the attribute is missing.
+/// Returns the interval variability of a clock that states no valid one: constant if the clock has an interval,
+/// otherwise triggered. Warns if the attribute is missing.
 fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariability {
     const NAME: &str = "intervalVariability";
     let assumed = if interval.is_some() {

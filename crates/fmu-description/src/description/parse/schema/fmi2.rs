@@ -59,7 +59,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "LogCategories") => list(&["Category"]),
         (_, "Category") => leaf(&["name", "description"]),
         (_, "DefaultExperiment") => leaf(&["startTime", "stopTime", "tolerance", "stepSize"]),
-        // May be empty here: `problems` reports it.
+        // May be empty: `problems` reports an empty list.
         (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
         (_, "ScalarVariable") => VARIABLE,
         ("ScalarVariable", "Real") => {

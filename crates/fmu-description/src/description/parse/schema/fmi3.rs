@@ -72,7 +72,7 @@ pub(super) fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "DefaultExperiment") => {
             branch(&["startTime", "stopTime", "tolerance", "stepSize"], ANNOTATED)
         }
-        // May be empty here: `problems` reports it.
+        // May be empty: `problems` reports an empty list.
         (_, "ModelVariables") => Shape { unordered: VARIABLES.len(), ..branch(&[], &VARIABLES) },
         ("ModelVariables", name) => of_variable(name)?,
         (_, "Dimension") => leaf(&["start", "valueReference"]),

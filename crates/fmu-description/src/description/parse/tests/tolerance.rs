@@ -93,7 +93,7 @@ fn words_in_another_case_are_read_and_unknown_words_count_as_missing() {
     };
     let (variable, assumed) = read("causality='Output'");
     assert_eq!((variable.causality, assumed.as_str()), (Causality::Output, "read as output"));
-    // The second word is one of FMI 3.0 only.
+    // `structuralParameter` belongs to FMI 3.0 only.
     for word in ["inout", "structuralParameter"] {
         let (variable, _) = read(&format!("causality='{word}'"));
         assert_eq!(variable.causality, Causality::Local);
