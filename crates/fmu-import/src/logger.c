@@ -1,6 +1,6 @@
-/* The logger that FMUs call: formats the message and hands everything to the receiver in Rust.
+/* The logger that FMUs call: formats the message and passes all arguments to the receiver in Rust.
  *
- * Nothing that the FMU hands over as its environment or as a name is looked into here. */
+ * It does not dereference the environment and the names, which may be invalid pointers. */
 #include <stdarg.h>
 #include <stdio.h>
 
