@@ -185,7 +185,10 @@ impl Watch {
             system.slaves.iter().map(|(_, instance)| types(instance.description())).collect();
         let watched = system.connections.iter().filter_map(|connection| {
             let (from, to) = (connection.from, connection.to);
-            let limits = Limits::of(system.variable(to), &types[to.slave])?;
+            let mut limits = Limits::of(system.variable(to), &types[to.slave])?;
+            if matches!(system.variable(from).kind, Kind::Float32(_)) {
+                limits.rounding = f32::EPSILON.into();
+            }
             let source = position(from).map_or(Source::Integer(from), Source::Real);
             let (name, transformation) = (system.name(to), connection.transformation.clone());
             Some(Watched { name, source, transformation, limits })
@@ -232,6 +235,7 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use slave::{CallError, Slave, StepResult};
 
     /// The largest `f32` below 1234567.8 is 1234567.75, the one next to 0.1 is 1.5e-9 larger.
     #[test]
@@ -245,6 +249,40 @@ mod tests {
         let limits = Limits::of(variable, &types(&description)).unwrap();
         assert_eq!([0.1, 1_234_567.8].map(|value| limits.refuse(value)), [None, None]);
         assert!([0.09999, 1_234_569.0].iter().all(|value| limits.refuse(*value).is_some()));
+    }
+
+    /// A slave without a model.
+    struct Stub(ModelDescription);
+
+    impl Slave for Stub {
+        fn description(&self) -> &ModelDescription {
+            &self.0
+        }
+        fn get_real(&mut self, _: &[u32], _: &mut [f64]) -> Result<(), CallError> {
+            Ok(())
+        }
+        fn set_real(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
+            Ok(())
+        }
+        fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+            Ok(StepResult::Whole)
+        }
+    }
+
+    /// The `f32` next to 0.1 is larger.
+    #[test]
+    fn a_float32_may_be_at_the_limit_of_the_float64_that_it_is_connected_to() {
+        let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
+            <CoSimulation modelIdentifier="m"/><ModelVariables><Float32 name="y" valueReference="1"
+            causality="output"/><Float64 name="u" valueReference="2" causality="input" start="0"
+            max="0.1"/></ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let mut system = System::default();
+        let stub = Stub(ModelDescription::parse(xml).unwrap());
+        system.add("a", Box::new(stub)).unwrap();
+        system.connect("a.y", "a.u").unwrap();
+        let watch = Watch::new(&system, |_| Some(0));
+        let is_refused = |y: f32| watch.watched[0].limits.refuse(y.into()).is_some();
+        assert_eq!([0.1, 0.1001].map(is_refused), [false, true]);
     }
 
     #[test]
