@@ -129,6 +129,9 @@ EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, fmi2StatusKind kind, fmi
 
 EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, fmi2StatusKind kind, fmi2Boolean *value) {
     Slave *slave = c;
+    if (is(slave, "discard at t1 and break later")) {
+        return fmi2Fatal;
+    }
     if (kind != fmi2Terminated) {
         return fmi2Discard;
     }

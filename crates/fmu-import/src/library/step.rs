@@ -184,8 +184,10 @@ macro_rules! finish_step {
                 // A failed query counts as no request.
                 let terminated = false $(|| {
                     let function = self.base.functions.$get_boolean_status;
-                    let answer = self.base.ask(function, &$terminated, StatusKind::Terminated, 0);
-                    answer.is_ok_and(|value| value != 0)
+                    match self.base.ask(function, &$terminated, StatusKind::Terminated, 0) {
+                        Err(error) if error.failure == fatal => return Err(error),
+                        answer => answer.is_ok_and(|value| value != 0),
+                    }
                 })?;
                 let rounding = 1e-9 * (size.abs() + time.abs());
                 if !(reached >= time - rounding && reached <= time + size + rounding) {
