@@ -93,7 +93,7 @@ impl Table {
 
     /// Calls a function for each row, with the time and the values of the columns at `positions`: a
     /// Boolean is 0 or 1, a missing value NaN. A last line of CSV that has no end of line and too few or too many
-    /// values, or one that is no number, is ignored, as incomplete.
+    /// values, or that ends within a number, is ignored, as incomplete.
     ///
     /// # Errors
     ///

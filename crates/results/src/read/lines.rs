@@ -139,8 +139,8 @@ pub(super) fn visit(
     if layout.has_units {
         reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))?;
     }
-    // The error of a line with too few or too many values, or one that is no number. It is ignored if this is the last
-    // line and has no end of line: then the line is incomplete.
+    // The error of a line with too few or too many values, or that may end within a number. It is ignored if this is
+    // the last line and has no end of line: then the line is incomplete.
     let mut wrong: Option<ResultsError> = None;
     while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))? {
         if let Some(error) = wrong {
@@ -155,7 +155,7 @@ pub(super) fn visit(
             wrong = Some(unreadable(path, &ragged(line(), count, columns.len(), layout.delimiter)));
             continue;
         }
-        let values = row.iter_mut().zip(positions).try_for_each(|(value, position)| {
+        for (value, position) in row.iter_mut().zip(positions) {
             let cell = &record[*position];
             let parsed = number(cell, layout.delimiter).ok_or_else(|| ResultsError::Number {
                 path: path.to_owned(),
@@ -163,10 +163,17 @@ pub(super) fn visit(
                 name: columns[*position].name.clone(),
                 text: String::from_utf8_lossy(cell).into_owned(),
             });
-            parsed.map(|parsed| *value = parsed)
-        });
-        if let Err(error) = values {
-            wrong = Some(error);
+            // A line is cut in its last cell.
+            let continued = || number(&[cell, b"0"].concat(), layout.delimiter);
+            match parsed {
+                Ok(parsed) => *value = parsed,
+                Err(error) if *position + 1 == record.len() && continued().is_some() => {
+                    wrong = Some(error);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if wrong.is_some() {
             continue;
         }
         clock.check(row[0], || format!("line {}", line()))?;

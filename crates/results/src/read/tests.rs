@@ -56,13 +56,19 @@ fn a_last_line_that_was_cut_is_no_row_and_one_before_is_an_error() {
 }
 
 #[test]
-fn a_last_line_that_was_cut_within_a_number_is_no_row_and_an_ended_one_is_an_error() {
+fn a_last_line_that_was_cut_within_a_number_is_no_row_and_other_texts_are_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let table = written(folder.path(), "a.csv", "time,x\n0,1\n1,3\n2,5e-");
     assert_eq!(table.column(1).unwrap(), [1.0, 3.0]);
-    for text in ["time,x\n0,1\n1,5e-\n", "time,x\n0,1\n1,5e-\n2,3"] {
+    for (text, found) in [
+        ("time,x\n0,1\n1,5e-\n", "5e-"),
+        ("time,x\n0,1\n1,5e-\n2,3", "5e-"),
+        ("time,x\n0,1\n1,open", "open"),
+        ("time,x,y\n0,1,2\n1,5e-,3", "5e-"),
+    ] {
         let refused = written(folder.path(), "b.csv", text).column(1).unwrap_err().to_string();
-        assert!(refused.ends_with("line 3: x is \"5e-\", expected a number"), "{refused}");
+        let expected = format!("line 3: x is {found:?}, expected a number");
+        assert!(refused.ends_with(&expected), "{refused}");
     }
 }
 
