@@ -28,15 +28,18 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
 
 fn table(text: &str, file: &str) -> Result<Draft, String> {
     let header = text.lines().next().unwrap_or_default();
-    let count = |sign: &char| header.matches(*sign).count();
+    // Outside of quotes.
+    let names: String = header.split('"').step_by(2).collect();
+    let count = |sign: &char| names.matches(*sign).count();
     let separator = [',', ';', '\t'].into_iter().max_by_key(count).unwrap_or(',');
     let cells = |line: &str| -> Vec<String> {
         // A separator in quotes is part of a name: "q[1,2]".
         let (mut is_quoted, mut is_start) = (false, true);
         let ends = |sign: char| {
             is_quoted ^= sign == '"' && (is_quoted || is_start);
-            is_start = sign == separator && !is_quoted;
-            is_start
+            let is_end = sign == separator && !is_quoted;
+            is_start = is_end || is_start && sign == ' ';
+            is_end
         };
         line.split(ends).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
     };
@@ -44,7 +47,7 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     if columns.is_empty() {
         return Err(EXPECTED.to_owned());
     }
-    let (mut rows, mut derivatives) = (Vec::new(), 0);
+    let (mut rows, mut others) = (Vec::new(), Vec::new());
     for (at, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
         let cells = cells(line);
         if cells.len() != columns.len() + 1 {
@@ -63,13 +66,10 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
         let row = named(&cells[0]);
         let name = derivative(&row.name).to_owned();
         // The first row with the name of a state is its derivative: `der(x)`, also behind a measurement x.
-        let mut place = rows.len();
-        if name != row.name {
-            place = derivatives;
-            derivatives += 1;
-        }
-        rows.insert(place, (Signal { name, ..row }, values));
+        let list = if name == row.name { &mut others } else { &mut rows };
+        list.push((Signal { name, ..row }, values));
     }
+    rows.append(&mut others);
     split(&rows, &columns, file)
 }
 
@@ -171,13 +171,17 @@ mod tests {
 
     #[test]
     fn a_name_in_quotes_may_contain_the_separator() {
-        let text = "\"\",\"q[1,1] [m]\",\"q[1,2]\",u\n\"q[1,1]\",0,1,0\n\
-                    \"q[1,2]\",0,-0.5,0.5\npipe 2\" wide,1,0,0\n";
-        let draft = table(text, "trolley.csv").unwrap();
-        let Model::Matrices { a, states, .. } = draft.model else { panic!("matrices") };
-        assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
-        assert_eq!([&states[0].name, &states[1].name], ["q[1,1]", "q[1,2]"]);
-        assert_eq!(draft.measurements[0].name, "pipe 2\" wide");
+        let commas = "\"\",\"q[1,1] [m]\", \"q[1,2]\",u\n\"q[1,1]\",0,1,0\n\
+                      \"q[1,2]\",0,-0.5,0.5\npipe 2\" wide,1,0,0\n";
+        let semicolons = ";\"q[1,1]\";\"q[1,2]\";\"u[1,1,1]\"\n\"q[1,1]\";0;1;0\n\
+                          \"q[1,2]\";0;-0,5;0,5\npipe 2\" wide;1;0;0\n";
+        for text in [commas, semicolons] {
+            let draft = table(text, "trolley.csv").unwrap();
+            let Model::Matrices { a, states, .. } = draft.model else { panic!("matrices") };
+            assert_eq!(a, DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -0.5]));
+            assert_eq!([&states[0].name, &states[1].name], ["q[1,1]", "q[1,2]"]);
+            assert_eq!(draft.measurements[0].name, "pipe 2\" wide");
+        }
     }
 
     #[test]
