@@ -1,4 +1,4 @@
-//! Control allocation: the commands that take over when an actuator is gone.
+//! Control allocation: distributes the effect of failed actuators over the remaining ones.
 
 use crate::blocks::beside;
 use crate::svd::{Svd, norm_2};
@@ -9,14 +9,15 @@ use nalgebra::{DMatrix, DVector};
 /// Singular values below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
-/// The actuators of a plant, some of which are gone.
+/// The actuators of a plant, some of which have failed.
 #[derive(Debug, Clone, Copy)]
 pub struct Actuators<'a> {
     /// B, n x m: how the inputs act on the states.
     pub b: &'a DMatrix<f64>,
-    /// The inputs that are gone, from zero.
+    /// The failed inputs, counted from zero.
     pub gone: &'a [usize],
-    /// a, m numbers above zero, for example the distance from each command to its nearest limit.
+    /// a, m positive numbers, for example the distance from each command to its nearest limit; inputs with a larger a
+    /// do more.
     pub authority: &'a [f64],
 }
 
@@ -31,14 +32,13 @@ impl Actuators<'_> {
     }
 }
 
-/// The distribution of the effect of all inputs over the remaining ones.
+/// Distribution of the effect of all inputs over the remaining inputs.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Allocation {
-    /// M of u = M `u_d`, m x m; the rows of inputs that are gone are zero.
+    /// M of u = M `u_d`, m x m; the rows of failed inputs are zero.
     pub matrix: DMatrix<f64>,
-    /// Norm of B M - B relative to the norm of B: the part of the effect that the remaining inputs cannot
-    /// produce.
+    /// 2-norm of B M - B divided by the 2-norm of B: the part of the effect that the remaining inputs cannot produce.
     pub residual: f64,
 }
 
@@ -50,16 +50,15 @@ pub struct Allocation {
 /// M = D (B_r D)^+ B,  D = diag(a), B_r = B with zero columns for the inputs that are gone
 /// ```
 ///
-/// The effect is exact, and with it the loop that a feedback `u_d` = K x closes, if the columns of B are in
-/// the range of `B_r`: the remaining inputs are as many as the rank of B at least. Singular values below
-/// 1e-12 of the largest count as zero.
+/// If the columns of B are in the range of `B_r`, the effect is exact, and a feedback `u_d` = K x closes the same loop
+/// as before the failure. Singular values below 1e-12 of the largest count as zero.
 ///
 /// Source: W. C. Durham, Constrained control allocation, J. Guidance, Control and Dynamics 16 (1993); M. Bodson, Evaluation of
 /// optimization methods for control allocation, J. Guidance, Control and Dynamics 25 (2002), the weighted pseudo-inverse.
 ///
 /// # Example
 ///
-/// Two of three forces that act on a mass take over what the first one did, the stronger one more:
+/// Two of three forces on a mass take over the effect of the first; the stronger one does more:
 ///
 /// ```
 /// use control::allocation::{Actuators, allocate};
@@ -99,9 +98,9 @@ pub fn allocate(actuators: &Actuators<'_>) -> Result<Allocation, Error> {
 pub struct Equilibrium {
     /// The states, n.
     pub x: DVector<f64>,
-    /// The m commands; 0 for inputs that are gone.
+    /// The m commands; 0 for failed inputs.
     pub u: DVector<f64>,
-    /// Norm of C x: what is left of the outputs that should be zero.
+    /// Norm of C x, the outputs that should be zero.
     pub left: f64,
 }
 
@@ -113,11 +112,10 @@ pub struct Equilibrium {
 /// least norm of x and u, u_j in units of a_j
 /// ```
 ///
-/// `a`: n x n; `outputs`: C, r x n, rows in units in which they compare; `disturbance`: w, n entries, for
-/// example a column of B times the command at which an actuator is stuck. `B_r` has zero columns for the
-/// inputs that are gone. An equilibrium exists for every w if [A, `B_r`] has rank n, which holds for a
-/// stabilisable (A, `B_r`). C x = 0 is reached for every w with as many independent remaining inputs as
-/// outputs, without an invariant zero at 0.
+/// `a`: n x n; `outputs`: C, r x n, rows in comparable units; `disturbance`: w, n entries, for example a column of B
+/// times the command at which an actuator is stuck. `B_r` has zero columns for failed inputs. An equilibrium exists for
+/// every w if [A, `B_r`] has rank n, as for every stabilisable (A, `B_r`). C x = 0 is reached for every w if there are
+/// as many independent remaining inputs as outputs and (A, `B_r`, C) has no invariant zero at 0.
 ///
 /// Source: E. J. Davison, The feedforward control of linear multivariable time-invariant systems,
 /// Automatica 9 (1973), for the existence.
@@ -144,11 +142,12 @@ pub fn equilibrium(
     if rank < n {
         return Err(Error::NotControllable { rank, n });
     }
-    // x and, in units of `authority`, u.
+    // [x; u], u_j in units of a_j.
     let mut solution = svd.least_squares(&-&w, rank);
     solution -= svd.least_squares(&(&whole * &solution + &w), rank);
     let free = svd.right.columns(rank, n + m - rank);
-    // The outputs that they reach; what rounding leaves of the others is no effect.
+    // The number of outputs that the remaining inputs can set independently; further singular values are rounding
+    // errors.
     let reached = tracking_rank(a, &remaining, outputs)?.rank.saturating_sub(n);
     let svd = Svd::new(&(outputs * free.rows(0, n)))?;
     let correction = svd.least_squares(&-(outputs * solution.rows(0, n)), reached);

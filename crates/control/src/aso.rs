@@ -46,10 +46,9 @@ use nalgebra::{Complex, DMatrix};
 pub struct AsoDesign {
     /// The gains.
     pub gains: Gains,
-    /// Frobenius norm of B `K_f` + `F_a` relative to the norm of `F_a`: the part of the effect of
-    /// the faults that the compensation does not cancel. Zero up to rounding for the default `K_f`
-    /// when the columns of `F_a` are in the range of B. States of a measurement filter do not count;
-    /// if no fault acts on the other states, it is the norm of B `K_f`.
+    /// Frobenius norm of B `K_f` + `F_a` divided by the norm of `F_a`: the part of the effect of the faults that is not
+    /// compensated. Zero up to rounding for the default `K_f` if the columns of `F_a` are in the range of B. Rows of a
+    /// measurement filter are left out; if `F_a` is zero in the other rows, this is the norm of B `K_f`.
     pub cancellation_residual: f64,
     /// Quality of the assignment for A + B `K_x`.
     pub controller: Quality,
@@ -61,7 +60,8 @@ pub struct AsoDesign {
 pub(crate) type Place =
     fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Alternatives, Error>;
 
-/// Computes `K_x` for the first `states` states, on which the others do not act; its other columns are zero.
+/// Computes `K_x` from the first `states` states, on which the other states do not act; other columns of `K_x` are
+/// zero.
 pub(crate) fn place_controller(
     plant: &FaultyPlant,
     states: usize,
@@ -73,12 +73,12 @@ pub(crate) fn place_controller(
     Ok(placed.map(|gain| gain.clone().resize_horizontally(plant.a.ncols(), 0.0)))
 }
 
-/// The feedbacks and observers of a plant, of which one pair becomes the controller.
+/// Candidates for the feedback and the observer of a plant; one pair becomes the controller.
 pub(crate) struct GainCandidates<'a> {
     pub(crate) plant: &'a FaultyPlant,
-    /// `K_x`.
+    /// Candidates for `K_x`.
     pub(crate) feedbacks: &'a Alternatives,
-    /// L.
+    /// Candidates for L.
     pub(crate) observers: &'a Alternatives,
     pub(crate) estimator: Estimator,
     pub(crate) k_f: &'a DMatrix<f64>,
@@ -86,7 +86,7 @@ pub(crate) struct GainCandidates<'a> {
 }
 
 impl GainCandidates<'_> {
-    /// The gains of the pair whose loop [`least_sensitive`] prefers, and the quality of both assignments.
+    /// Returns the gains of the pair whose loop [`least_sensitive`] prefers, and the quality of both assignments.
     pub(crate) fn best(&self) -> Result<(Gains, [Quality; 2]), Error> {
         let Self { feedbacks, observers, .. } = self;
         let [mut pairs, second] = pairs(&feedbacks.candidates(), &observers.candidates());
@@ -128,8 +128,8 @@ impl GainCandidates<'_> {
     }
 }
 
-/// Returns all pairs of an item of `one` and an item of `other`: first those of both first lists, then
-/// those with at least one item of a second list.
+/// Returns all pairs of an item of `one` and an item of `other`: first the pairs of items from both first lists, then
+/// the pairs with at least one item from a second list.
 #[must_use]
 pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2] {
     let product = |i: usize, j: usize| {
@@ -141,12 +141,12 @@ pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2
 
 /// Designs the controller: assigns the eigenvalues of A + B `K_x` and of `A_0` - L `C_0`.
 ///
-/// `controller_poles`: n, `observer_poles`: n + q, in the unit of A, of negative real part for a
-/// stable loop; `k_f`: m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists
-/// when (A, B) is controllable and [`FaultyPlant::check_observer_exists`] succeeds. Method, cost
-/// and tolerance: [`alternatives`] for (A, B), [`alternatives_balanced`] for (`A_0`', `C_0`'). Of
-/// their results the pair is chosen whose loop with `plant` has the lowest peaks of S, see
-/// [`least_sensitive`]: at most 22 x 22 loops, 3 x 3 above 24 states.
+/// `controller_poles`: n, `observer_poles`: n + q, in the unit of A, with negative real parts for a stable loop; `k_f`:
+/// m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists when (A, B) is controllable and
+/// [`FaultyPlant::check_observer_exists`] succeeds. Method, cost and tolerance: [`alternatives`] for (A, B),
+/// [`alternatives_balanced`] for (`A_0`', `C_0`'). The design is the pair of a feedback and an observer whose loop with
+/// `plant` has the lowest peaks of S, see [`least_sensitive`]; at most 22 x 22 loops are compared, 3 x 3 above 24
+/// states.
 ///
 /// # Example
 ///
@@ -187,12 +187,12 @@ pub fn design(
 impl ExtendedPlant {
     /// Designs the controller as [`design`] does.
     ///
-    /// A measurement filter belongs to the plant of the loop whose peaks of S are compared.
+    /// The loops are compared with the measurement filter as a part of the plant.
     ///
-    /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
-    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x
-    /// q, or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for
-    /// rates are zero and which is -1 for an effectiveness that is lost.
+    /// `controller_poles`: one per state of the plant without the filter, whose states are not fed back;
+    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x q, or None for
+    /// [`FaultyPlant::compensation_gain`], which is zero in the columns of sensor faults and of rates of faults, and -1
+    /// for a loss of effectiveness.
     ///
     /// # Errors
     ///
@@ -225,8 +225,7 @@ impl ExtendedPlant {
     }
 }
 
-/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; the norm itself if no fault acts
-/// there.
+/// Norm of B `K_f` + `F_a` in the first `states` rows, divided by the norm of these rows of `F_a` unless they are zero.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
     let residual = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();

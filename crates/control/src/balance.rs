@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 const SWEEPS: usize = 100;
 /// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
-/// For an exponential, entries of a state that acts on no other state, or on which no other state acts, are large above
-/// this multiple of the largest diagonal entry.
+/// In [`Balance::of_exponential`], the norm of a row or column is large above this multiple of the largest diagonal
+/// entry.
 const LARGE: f64 = 1024.0;
 
 /// S^-1 A S, S diagonal and positive such that row i and column i have about the same norm.
@@ -26,13 +26,13 @@ impl Balance {
         Self::with_signals(a, zeros(), zeros())
     }
 
-    /// The balance that does not change A: S = I.
+    /// No balancing: S = I.
     pub(crate) fn none(a: &DMatrix<f64>) -> Self {
         Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) }
     }
 
-    /// Balances A as a part of [A, B; C, 0]. If the states do not all act on each other, A alone would be scaled up
-    /// to the limit of sweeps, and B and C with it.
+    /// Balances A as a part of [A, B; C, 0]. Without B and C, states that do not all act on each other would be scaled
+    /// until the limit of sweeps is reached.
     ///
     /// Source: D. S. Watkins, A case where balancing is harmful, Electronic Trans. Numerical Analysis 23 (2006).
     pub(crate) fn of_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
@@ -41,9 +41,9 @@ impl Balance {
         Self::with_signals(a, entering, leaving)
     }
 
-    /// Balances A for its exponential: the scale of a state that acts on no other state, or on which no other state
-    /// acts, is changed, too, if its entries are large. They would be squared with the rates beside them, which lose a
-    /// digit in every third squaring.
+    /// Balances A for its exponential: also scales a state that acts on no other state, or on which no other state
+    /// acts, if its entries are large. The squarings of the exponential would mix large entries with the rates on the
+    /// diagonal, which would lose a digit in every third squaring.
     pub(crate) fn of_exponential(a: &DMatrix<f64>) -> Self {
         let mut balance = Self::new(a);
         let size = a.diagonal().amax();
@@ -75,14 +75,14 @@ impl Balance {
         balance
     }
 
-    /// Balances A; `entering`, `leaving`: the 1-norms of each state's row of B and of its column of C.
+    /// Balances A; `entering`, `leaving`: for each state, the 1-norm of its row of B and the 1-norm of its column of C.
     fn with_signals(
         a: &DMatrix<f64>,
         mut entering: DVector<f64>,
         mut leaving: DVector<f64>,
     ) -> Self {
         let mut balance = Self::none(a);
-        // The rows of the matrix as columns, whose entries are neighbours in memory.
+        // A column is contiguous in memory, a row is not.
         let mut transposed = a.transpose();
         for _ in 0..SWEEPS {
             let mut changed = false;
@@ -101,8 +101,8 @@ impl Balance {
         balance
     }
 
-    /// Scales a state and returns the factor; None if that reduces the norms by less than 5 %. `signals`: the norms
-    /// of its column of C and of its row of B.
+    /// Scales a state and returns the factor; None if the scaling would reduce the norms by less than 5 %. `signals`:
+    /// the 1-norms of the state's column of C and of its row of B.
     fn level(
         &mut self,
         transposed: &mut DMatrix<f64>,
@@ -131,7 +131,7 @@ impl Balance {
     }
 }
 
-/// The power of two nearest to x > 0 on the logarithmic scale; returns a number that is not normal unchanged.
+/// The power of two nearest to x > 0 on the logarithmic scale; x itself if it is zero, subnormal, infinite or NaN.
 pub(crate) fn power_of_two(x: f64) -> f64 {
     if !x.is_normal() {
         return x;

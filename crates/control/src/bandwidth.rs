@@ -1,7 +1,7 @@
-//! Linear-quadratic regulators and Kalman filters by their bandwidth.
+//! Linear-quadratic regulators and Kalman filters, designed for a bandwidth.
 //!
-//! One weight is free: the larger it is, the slower the loop. It is chosen so that the loop gain crosses one at the
-//! bandwidth. What the other weights are relative to is the choice of units, see [`NaturalUnits`].
+//! One scalar weight is free; a larger weight gives a slower loop. The weight is chosen so that the loop gain crosses
+//! one at the bandwidth. All other weights are relative to the units of inputs and outputs, see [`NaturalUnits`].
 
 use crate::blocks::to_complex;
 use crate::lyapunov::{CONTINUOUS, DISCRETE};
@@ -18,13 +18,13 @@ const STRIDE: f64 = 100.0;
 const STRIDES: usize = 6;
 /// Largest distance of the loop gain from one.
 const ACCURACY: f64 = 1e-6;
-/// A loop gain above one of which a stride leaves more than this part is held there by unstable modes.
+/// If a stride leaves more than this part of a loop gain above one, unstable modes keep the loop gain above one.
 const SATURATED: f64 = 0.7;
 /// Largest number of steps of the regula falsi.
 const STEPS: usize = 40;
-/// The smallest energy, relative to the largest.
+/// Entries of h below this part of the largest are raised to it.
 const FLOOR: f64 = 1e-12;
-/// A bandwidth without a response, at the frequency of an undamped mode, is raised by this factor.
+/// Factor on a bandwidth at which the response is infinite, the frequency of an undamped mode.
 const DETUNING: f64 = 1.01;
 
 /// Units of inputs and outputs: each output is measured by the strongest effect of an input on it, then each input by
@@ -36,9 +36,10 @@ const DETUNING: f64 = 1.01;
 /// outputs[j]^2 = 1 / max over i of h[j, i],    inputs[i]^2 = 1 / max over j of outputs[j]^2 h[j, i]
 /// ```
 ///
-/// g is the impulse response, without D: C e^(A t) B or C A^k B. Entries of h below 1e-12 of the largest are raised
-/// to it; if all are zero, all units are 1. The physical sizes of the units do not depend on the units of states and
-/// outputs; nor on those of inputs, up to a common factor, if one input has the strongest effect on every output.
+/// g is the impulse response without D: C e^(A t) B or C A^k B; T is the sample time. Entries of h below 1e-12 of the
+/// largest are raised to it; if all are zero, all units are 1. The physical sizes of the units do not depend on the
+/// units of states and outputs. Other units of inputs change them by a common factor if one input dominates every
+/// output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalUnits {
     /// Size of a unit of each input.
@@ -100,9 +101,9 @@ pub struct ByBandwidth<T> {
     pub weight: f64,
 }
 
-/// Computes the regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u, where r is such that the largest
-/// singular value of K (s I - A)^-1 B, in units of the inputs, is one at s = j `bandwidth`; at z = e^(j `bandwidth`
-/// h) in sampled time.
+/// Computes the regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u. The largest singular value of
+/// K (s I - A)^-1 B, in units of the inputs, is one at s = j `bandwidth`, or z = e^(j `bandwidth` h) with the sample time h;
+/// this determines r.
 ///
 /// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin
 /// of 1/2 to infinity and a phase margin of 60 degrees in continuous time, for all weights (M. G. Safonov, M. Athans,
@@ -135,9 +136,9 @@ pub fn regulator(
 /// that the largest singular value of C (s I - A)^-1 L, in units of the outputs, is one at s = j `bandwidth`.
 ///
 /// The dual of [`regulator`]. `a`: n x n; `c`: p x n; `w`: n x n; `units`: inverse size of a unit of each output.
-/// With W = N N', the loop of regulator and filter tends to that of the regulator when the bandwidth grows, if N is
-/// the input matrix and the plant has no zero in the right half plane (J. C. Doyle, G. Stein, IEEE Trans. Autom.
-/// Control 26 (1981)).
+/// With W = N N', the loop of regulator and filter tends to the loop of the regulator alone when the bandwidth grows,
+/// if N is the input matrix and the plant has no zero in the right half plane (J. C. Doyle, G. Stein, IEEE Trans.
+/// Autom. Control 26 (1981)).
 ///
 /// # Errors
 ///
@@ -159,7 +160,7 @@ pub fn filter(
     Ok(ByBandwidth { result: kalman(a, c, w, &v, domain)?, loop_gain, weight })
 }
 
-/// Returns the weight r of R = r I and the loop gain that it gives.
+/// Returns the weight r of R = r I and its loop gain.
 fn weight(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -187,15 +188,15 @@ fn weight(
         let gain = lqr(a, b, &Weights { q: q.clone(), r, n: None }, domain)?.gain;
         Ok(point(&gain)?.singular_values.first().copied().unwrap_or(0.0))
     };
-    // |Q^(1/2) G|^2 at the bandwidth: the weight of a loop of one state.
+    // The search starts at the weight of an integrator: |Q^(1/2) G|^2 at the bandwidth, G = (s I - A)^-1 B.
     let response = point(&DMatrix::identity(a.nrows(), a.nrows()))?.gain;
     let size = ComplexSvd::new(&(response.adjoint() * to_complex(q) * response))?.values()[0];
     let start = if size.is_finite() && size > 0.0 { size.ln() } else { 0.0 };
     enclosed(start, loop_gain)
 }
 
-/// Searches from `start` for an x with f(x) = 1, where f falls; returns e^x and f(x). If no stride passes such an x,
-/// these are the values where the strides end.
+/// Searches from `start` for an x with f(x) = 1, f decreasing; returns e^x and f(x). If the strides do not pass such an
+/// x, these are the values at the last stride.
 fn enclosed(start: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<(f64, f64), Error> {
     let (mut x, mut value) = (start, f(start)?);
     let direction = if value > 1.0 { 1.0 } else { -1.0 };
@@ -211,14 +212,14 @@ fn enclosed(start: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<(f64, f
             other = Some(next);
             break;
         }
-        // Unstable modes keep the loop gain above one: a larger weight would slow all others down without end.
+        // Unstable modes keep the loop gain above one: a larger weight would only slow the other modes down.
         if value > 1.0 && gain > SATURATED * value {
             break;
         }
         (x, value) = (next, gain);
     }
     let Some(mut other) = other else { return Ok((x.exp(), value)) };
-    // Regula falsi on logarithms, between which f is nearly a line; an end that stays counts half (Illinois).
+    // Regula falsi on ln f(x), nearly a straight line; the Illinois variant halves the value at an end that stays.
     let (mut low, mut high) = (value.ln(), f(other)?.ln());
     for _ in 0..STEPS {
         let middle = (x * high - other * low) / (high - low);

@@ -2,7 +2,6 @@
 
 use nalgebra::{Complex, ComplexField, DMatrix};
 
-/// A matrix of complex numbers.
 pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// The matrix [above; below] of two matrices with the same number of columns.
@@ -48,7 +47,6 @@ pub(crate) fn symmetric_part(m: &DMatrix<f64>) -> DMatrix<f64> {
     (m + m.transpose()) * 0.5
 }
 
-/// A real matrix as a complex one.
 pub(crate) fn to_complex(m: &DMatrix<f64>) -> ComplexMatrix {
     m.map(|entry| Complex::new(entry, 0.0))
 }

@@ -45,12 +45,12 @@ pub(crate) fn with_outputs(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<usize, 
     Ok(n)
 }
 
-/// Checks that a column has this many rows, is not empty and is finite.
+/// Checks that a column has `rows` entries, at least one, and that all are finite.
 pub(crate) fn column(name: &'static str, entries: &[f64], rows: usize) -> Result<(), Error> {
     shape(name, &DMatrix::from_column_slice(entries.len(), 1, entries), (rows, 1))
 }
 
-/// Checks the number of entries alone.
+/// Checks the number of entries, not their values.
 pub(crate) fn length<T>(matrix: &'static str, list: &[T], expected: usize) -> Result<(), Error> {
     if list.len() == expected {
         return Ok(());
@@ -63,7 +63,7 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
     that(value.is_finite() && value > 0.0, name, value, "a finite number above zero")
 }
 
-/// Checks that a rule `holds` for a number.
+/// Returns [`Error::OutOfRange`] with `rule` unless the rule `holds`.
 pub(crate) fn that(
     holds: bool,
     name: &'static str,
@@ -78,7 +78,6 @@ pub(crate) fn in_range(what: &'static str, m: DMatrix<f64>) -> Result<DMatrix<f6
     if m.iter().all(|value| value.is_finite()) { Ok(m) } else { Err(Error::Overflow { what }) }
 }
 
-/// Converts a number of rows, inputs or samples.
 #[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
 pub(crate) fn as_number(count: usize) -> f64 {
     count as f64

@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 /// current:     A = G W,             B = G M,  C = [K_x, K_f] W,  D = [K_x, K_f] M
 /// ```
 ///
-/// `A_p`, `B_p`, `C_p` are the matrices of the plant. `domain` is that of plant and gains. A current
+/// `A_p`, `B_p`, `C_p` are the matrices of the plant, `domain` is the domain of plant and gains. A current
 /// estimator, for sampled plants, corrects z by M times the new residual, forms u from the corrected
 /// z, then predicts; its state z is the prediction. With a direct term `P_f` (see [`Gains`])
 ///
@@ -27,8 +27,8 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// with the corrected z, and the same u enters the model of the plant in A and B.
-/// y is what the observer receives: the filtered measurements, if they are filtered. Neither the filter nor
-/// integral action is part of this system; [`complete_controller`] has both.
+/// y is the input of the observer: the filtered measurements if there is a filter. The filter and integral action are
+/// not part of this system; [`complete_controller`] has both.
 ///
 /// # Errors
 ///
@@ -44,7 +44,7 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     let mut k = beside(&gains.k_x, &gains.k_f);
     let output = plant.augmented_output();
     let m_c = &m * &output;
-    // What the direct term adds to D, and with it to B.
+    // The direct term K_f P_f in D, and its part of B.
     let direct = gains.p_f.as_ref().map(|p_f| &gains.k_f * p_f);
     let direct_b = direct.as_ref().map(|d| (&plant.b * d).resize_vertically(n + q, 0.0));
     if let (Some(direct), Some(direct_b)) = (&direct, &direct_b) {
@@ -68,7 +68,7 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     })
 }
 
-/// The system from y to the estimates of the faults: A and B of `system`, the [`controller`], and C and D of `f_hat`.
+/// The system from y to the fault estimates, with A and B of `system`, the [`controller`].
 ///
 /// ```text
 /// f_hat = ([0, I] - P_f [C_p, 0]) z + P_f y
@@ -91,18 +91,17 @@ fn fault_estimates(plant: &FaultyPlant, gains: &Gains, system: &StateSpace) -> S
     StateSpace { c, d, ..system.clone() }
 }
 
-/// A controller from the measurements, as the sensors give them, to the commands.
+/// A controller from the unfiltered measurements to the commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CompleteController {
-    /// From y to u. The state is [`y_f`; `x_hat`; `f_hat`; `x_i`], the first part with a filter, the last one
-    /// with integral action.
+    /// From y to u. The state is [`y_f`; `x_hat`; `f_hat`; `x_i`], `y_f` only with a filter, `x_i` only with integral
+    /// action.
     pub commands: StateSpace,
-    /// From y to `f_hat`, the estimate that u uses; the same A and B.
+    /// From y to `f_hat`, the estimate that u uses; same A and B as `commands`.
     pub estimates: StateSpace,
 }
 
-/// The controller of [`controller`] with the measurement filter W before it and the integral action of
-/// [`crate::tracking`] beside it, for references r = 0.
+/// The [`controller`] behind the measurement filter W, with the integral action of [`crate::tracking`] for r = 0.
 ///
 /// ```text
 /// y_f' = W (y - y_f)                              sampled: y_f[k+1] = y_f[k] + W (y[k] - y_f[k])
@@ -110,8 +109,9 @@ pub struct CompleteController {
 /// x_i' = -H y + H F_s f_hat                       sampled: x_i[k+1] = x_i[k] + T (-H y[k] + H F_s f_hat)
 /// ```
 ///
-/// with A, B, C, D of [`controller`]; `filter`: the diagonal of W, p entries, in sampled time the gains of
-/// [`crate::sampled::filter`]; without it `y_f` = y. `x_i'` contains y itself, not `y_f`.
+/// with A, B, C, D of [`controller`], H and `F_s` of [`crate::tracking`], the sample time T. `filter`: the diagonal of
+/// W, p entries, in sampled time the gains of [`crate::sampled::filter`]; without it `y_f` = y. Integral action uses y,
+/// not `y_f`.
 ///
 /// # Errors
 ///
@@ -162,17 +162,17 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
     Ok(StateSpace { a, b, c, d, domain: controller.domain })
 }
 
-/// Converts `controller`, which is for the plant without D, into the controller of the plant with
-/// y = C x + D u: its input is y - D u, with its commands u.
+/// Converts `controller`, designed for a plant with y = C x, for the plant with y = C x + D u: its input becomes y - D
+/// u.
 ///
 /// ```text
 /// continuous:  z' = (A - B D C) z + B y,            u = C z
 /// sampled:     z[k+1] = A z[k] + B (y[k] - D v[k]),  u[k] = C z[k],  v[k+1] = u[k]
 /// ```
 ///
-/// In sampled time, `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is
-/// [z; v]. `controller`: k states, p inputs and any outputs, which the result has too; its direct term is zero, as
-/// with a measurement filter; `feedthrough`: D of the plant, p x m; `commands`: C of u, m x k.
+/// In sampled time, `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is [z; v].
+/// `controller`: k states, p inputs, any outputs; its direct term is zero, as with a measurement filter; `feedthrough`:
+/// D of the plant, p x m; `commands`: C of u, m x k.
 ///
 /// # Errors
 ///
@@ -202,8 +202,8 @@ pub fn with_feedthrough(
     })
 }
 
-/// The dynamics of plant and controller together, of [x; z], where input i of the plant acts with
-/// the factor `effectiveness[i]`.
+/// Computes the dynamics of the closed loop with the state [x; z], where input i of the plant acts with the factor
+/// `effectiveness[i]`.
 ///
 /// ```text
 /// x' = A_p x + B_p diag(effectiveness) u,  y = C_p x

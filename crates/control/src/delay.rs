@@ -1,8 +1,7 @@
 //! Delays of the commands and of the measurements of a plant.
 //!
-//! The design of a gain needs a plant with finitely many states, and so an approximation of each delay; a frequency
-//! response does not. The loop is therefore designed with the approximation and compared with the delays themselves,
-//! see [`Delays::exact`].
+//! The design of a gain needs a plant with finitely many states; a frequency response does not. The loop is therefore
+//! designed with an approximation of each delay, then compared with the exact delays, see [`Delays::exact`].
 
 use crate::blocks::{ComplexMatrix, to_complex};
 use crate::check::as_number;
@@ -23,15 +22,16 @@ const WHOLE: f64 = 1e-9;
 /// z' = A z + b u,  y = z_1,   A: q x q
 /// ```
 ///
-/// `order`: q. The delay is one unit of time; for a delay d divide A and b by d. The approximant is strictly proper,
-/// so that a command that passes it does not jump, and has the delay's moments up to the order 2 q - 1. From the
-/// Legendre coefficients m of the last second of u,
+/// `order`: q. The delay is one unit of time; for a delay d divide A and b by d. The approximant is strictly proper, so
+/// that it smooths a jump of the command, and has the delay's moments up to the order 2 q - 1. In terms of the Legendre
+/// coefficients m of u over the last unit of time,
 ///
 /// ```text
 /// m_i' = (2 i + 1) ((-1)^i u - sum over j of g_ij m_j),  g_ij = 1 for i < j, (-1)^(i - j) otherwise,  y = sum of m_i
 /// ```
 ///
-/// with `z_1` = y in place of `m_0`, all entries of A and b are small whole numbers. A constant u leads to z = [u, 0, ..., 0].
+/// With `z_1` = y in place of `m_0`, all entries of A and b are small integers. A constant u leads to z = [u, 0, ...,
+/// 0].
 ///
 /// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, I. Kajic, C.
 /// Eliasmith, Legendre memory units, Advances in Neural Information Processing Systems 32 (2019), (1), for the Legendre form.
@@ -63,28 +63,28 @@ pub fn pade(order: usize) -> (DMatrix<f64>, DVector<f64>) {
 /// The delays of a plant: of each command before it acts, of each measurement before it arrives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delays {
-    /// Of each command, s; not below zero.
+    /// Delay of each command, s; not negative.
     pub inputs: Vec<f64>,
-    /// Of each measurement, s; not below zero.
+    /// Delay of each measurement, s; not negative.
     pub outputs: Vec<f64>,
 }
 
-/// The result of [`Delays::exact`]: a loop with its delays beside the same loop with their approximation.
+/// The result of [`Delays::exact`]: a loop with exact delays, compared with the same loop with approximated delays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ExactLoop {
-    /// The largest spectral radius of K (G - `G_a`) S over the frequencies, with the plant G with the delays themselves, its
-    /// approximation `G_a`, the controller K, and S of the approximation. Below 1 the loop with the delays is stable,
-    /// because that with the approximation is and no loop between the two has a pole on the stability limit.
+    /// The largest spectral radius of K (G - `G_a`) S over the frequencies: the plant G with exact delays, its
+    /// approximation `G_a`, the controller K, the sensitivity S with `G_a`. Below 1 the loop with G is stable, because
+    /// the loop with `G_a` is stable and no loop between the two has a pole on the stability limit.
     pub radius: f64,
     /// The frequency of `radius` in rad/s.
     pub frequency: f64,
-    /// The largest singular value of S over the frequencies, with the delays themselves: at commands, at measurements.
+    /// The largest singular value of S over the frequencies, with exact delays: at commands, at measurements.
     pub peaks: [f64; 2],
 }
 
 impl Delays {
-    /// Whether there is a delay.
+    /// Whether any delay is above zero.
     #[must_use]
     pub fn any(&self) -> bool {
         self.inputs.iter().chain(&self.outputs).any(|delay| *delay > 0.0)
@@ -184,7 +184,7 @@ impl Delays {
         Ok(extended)
     }
 
-    /// The position, in the result of [`Delays::approximated`], of an entry of the plant, which has n states.
+    /// The position of an entry of the plant, which has n states, in the result of [`Delays::approximated`].
     #[must_use]
     pub fn entry(&self, n: usize, order: usize, entry: PlantEntry) -> PlantEntry {
         let PlantEntry { matrix, row, column } = entry;
@@ -207,7 +207,7 @@ impl Delays {
         }
     }
 
-    /// Extracts the entries of the plant without its delays, with n states, from the form of [`Delays::approximated`].
+    /// Extracts the matrices of the plant without delays, with n states, from the matrices of [`Delays::approximated`].
     #[must_use]
     pub fn of_plant(&self, n: usize, order: usize, all: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
         let (p, m) = (self.outputs.len(), self.inputs.len());
@@ -221,7 +221,7 @@ impl Delays {
         [part(0, n, n), part(1, n, m), part(2, p, n), part(3, p, m)]
     }
 
-    /// Compares a loop with an approximation of the delays with the same loop with the delays themselves.
+    /// Compares a loop with approximated delays with the same loop with exact delays.
     ///
     /// ```text
     /// continuous:            G_ij(j w) = (c_i (j w I - A)^-1 b_j + d_ij) e^(-j w d),   d = d_i + d_j
@@ -229,12 +229,12 @@ impl Delays {
     /// d = k T + T - g:       Phi(g) = e^(A g), Gamma(g) = integral of e^(A s) b from 0 to g
     /// ```
     ///
-    /// `plant`: in continuous time, without its delays; `closed`: the loop with an approximation, stable; `frequencies`: in
-    /// rad/s, in sampled time up to pi / T. A sample is taken before the command changes.
+    /// d is the delay of measurement i plus the delay of command j, k is a whole number, 0 < g <= T. `plant`: in
+    /// continuous time, without its delays; `closed`: the loop with an approximation, stable; `frequencies`: in rad/s,
+    /// in sampled time up to pi / T. A sample is taken before the command changes.
     ///
-    /// Sources: for the stability J. C. Doyle, G. Stein, IEEE Trans. Autom. Control 26 (1981), who follow the poles between
-    /// the two loops; for the samples the modified z-transform, E. I. Jury, Theory and application of the z-transform method
-    /// (1964).
+    /// Sources: J. C. Doyle, G. Stein, IEEE Trans. Autom. Control 26 (1981), for the stability between two loops; E. I.
+    /// Jury, Theory and application of the z-transform method (1964), for the samples (modified z-transform).
     ///
     /// # Errors
     ///
@@ -270,7 +270,7 @@ impl Delays {
         Ok(result)
     }
 
-    /// The response G, p x m, with the delays themselves at each of `frequencies`.
+    /// The response G, p x m, with exact delays at each of `frequencies`.
     fn responses(
         &self,
         plant: &StateSpace,
@@ -296,7 +296,7 @@ impl Delays {
     }
 }
 
-/// Discretises a path; returns it without its lag, and the lag in s, a whole number of samples.
+/// Discretises a path; returns the path without its lag, and the lag in s, a whole number of samples.
 fn sampled_path(path: &StateSpace, delay: f64, period: f64) -> Result<(StateSpace, f64), Error> {
     check::positive("the sample time", period)?;
     let samples = (delay / period + WHOLE).floor();

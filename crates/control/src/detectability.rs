@@ -1,4 +1,4 @@
-//! Tests which faults the measurements make it possible to estimate.
+//! Tests which faults can be estimated from the measurements.
 
 mod hidden;
 mod visibility;
@@ -66,7 +66,7 @@ impl Detectability {
 ///
 /// # Example
 ///
-/// x' = v + f, v' = u with x measured: a constant error f of the rate acts as a change of the velocity v.
+/// x' = v + f, v' = u with x measured: a constant f cannot be told from a change of the velocity v.
 ///
 /// ```
 /// use control::{Domain, aso::FaultyPlant, detectability::detectability};

@@ -8,7 +8,7 @@
 //! | test of one residual by cumulative sums | [`Cusum`] |
 //! | test of the mean of several residuals over a window | [`WindowTest`] |
 //! | what errors of the model do to residuals | [`UncertainPlant::largest_mean`] |
-//! | distribution chi-square, central and noncentral | [`chi_square`] |
+//! | chi-square distribution, central and noncentral | [`chi_square`] |
 //!
 //! The filter is a Kalman filter of the plant without faults, so that its residuals are white: the false
 //! alarms and the delays of the tests then follow from the normal distribution alone. Unknown inputs are

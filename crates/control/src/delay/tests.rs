@@ -26,7 +26,7 @@ fn response(system: &StateSpace, frequency: f64) -> DMatrix<Complex<f64>> {
     frequency_response(system, &[frequency]).unwrap()[0].gain.clone()
 }
 
-/// The numerator and the denominator of the approximant of degrees q - 1 and q, from their closed form.
+/// The approximant with degrees q - 1 and q of its numerator and denominator, from the closed form; `order`: q.
 fn closed_form(order: u32, s: Complex<f64>) -> Complex<f64> {
     let factorial = |n: u32| (1..=n).map(f64::from).product::<f64>();
     let term = |top: u32, degree: u32, k: u32, s: Complex<f64>| {
@@ -61,7 +61,7 @@ fn the_legendre_form_is_the_pade_approximant_of_a_delay() {
     }
 }
 
-/// Each path has the product of the approximants of its delays, whatever is delayed.
+/// Each path has the approximants of its command's delay and of its measurement's delay as factors.
 #[test]
 fn an_approximated_plant_is_the_plant_between_the_approximants() {
     let plant = plant();
@@ -85,7 +85,7 @@ fn an_approximated_plant_is_the_plant_between_the_approximants() {
     }
 }
 
-/// Beside a simulation that knows nothing of z: the state at each instant of the delayed command and measurement.
+/// Compares with a simulation in the time domain: the state at the time of each sample minus the delay.
 #[test]
 fn samples_of_a_delayed_plant_are_those_of_a_simulation() {
     let (plant, period) = (StateSpace { d: DMatrix::zeros(2, 2), ..plant() }, 0.25);
@@ -133,12 +133,12 @@ fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
     let frequencies: Vec<_> =
         (0..4000_u16).map(|k| 10.0_f64.powf(f64::from(k) / 1000.0 - 2.0)).collect();
     let exact = |gain: f64, order: usize| {
-        // A state that nothing enters, as a system has at least one.
+        // A static gain; its one state, the least that a system has, is not used.
         let controller = scalar(-1.0, 0.0, 0.0, -gain);
         let closed = Loop::new(delays.approximated(&plant, order).unwrap(), controller).unwrap();
         delays.exact(&plant, &closed, &frequencies).unwrap()
     };
-    // Peaks of S from 1 / |1 + k e^(-j w) / (j w)| on a grid of their own.
+    // Peaks of S from 1 / |1 + k e^(-j w) / (j w)| on a finer grid.
     for gain in [0.5, 1.0, 1.4] {
         let peak = (1..400_000_u32)
             .map(|k| {
@@ -159,8 +159,8 @@ fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
     assert!(exact(1.6, 1).radius > 1.0);
 }
 
-/// The samples of fast states that follow slow ones and act on nothing but the measurement: A alone can be balanced
-/// without end, and the responses were wrong by 1e3.
+/// Fast states of the delay act on nothing but the measurement: balancing A alone would not end, with errors of 1e3 in
+/// the responses.
 #[test]
 fn a_long_sample_time_spoils_no_response() {
     let plant = scalar(-0.01, 0.02, 1.0, 0.0);

@@ -1,7 +1,7 @@
 //! Faults that the measurements cannot tell from a motion of the states.
 //!
-//! A fault f = `f_0` e^(s t) that follows its model, `A_f` `f_0` = s `f_0`, and a motion x = `x_0` e^(s t)
-//! of the plant that it drives give no output when
+//! A fault f = `f_0` e^(s t) that follows its model, `A_f` `f_0` = s `f_0`, and a motion x = `x_0` e^(s t) of the plant
+//! driven by f give no output when
 //!
 //! ```text
 //! (A - s I) x_0 + F_a f_0 = 0,   C x_0 = 0
@@ -27,9 +27,9 @@ use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A singular value below this counts as zero, relative to the largest, or for `A_f` - s I to |`A_f`| + |s|.
+/// Singular values below this part of the largest count as zero; of `A_f` - s I, below this part of |`A_f`| + |s|.
 const RANK_TOLERANCE: f64 = 1e-12;
-/// Eigenvalues of the fault model nearer than this, relative to its norm, count as one.
+/// Eigenvalues of the fault model closer than this, relative to its norm, count as equal.
 const CLUSTER_TOLERANCE: f64 = 1e-6;
 /// An entry of a combination below this, relative to the largest, counts as zero.
 const ENTRY_TOLERANCE: f64 = 1e-6;
@@ -42,15 +42,15 @@ type ComplexVector = DVector<Complex<f64>>;
 pub struct HiddenFault {
     /// s: fault and motion develop as e^(s t), or s^k in sampled time. An eigenvalue of `A_f`.
     pub at: Complex<f64>,
-    /// Number of independent faults that develop so: columns of N, the eigenvectors of `A_f` for s.
+    /// Number of independent faults at s: columns of N, the eigenvectors of `A_f` for s.
     pub channels: usize,
     /// Rank of R(s) = [A - s I, `F_a` N; C, 0].
     pub rank: usize,
     /// Number of columns of R(s). The fault is hidden because `rank` is lower.
     pub expected: usize,
-    /// The fault `f_0`, q entries, one of which is 1: the largest one, if no other fault is hidden at s.
+    /// The fault `f_0`, q entries. One entry is 1: the largest one, if no other fault is hidden at s.
     pub fault: DVector<Complex<f64>>,
-    /// The motion `x_0` of the states that cancels it in the measurements, n entries.
+    /// The motion `x_0` of the states that cancels the fault in the measurements, n entries.
     pub state: DVector<Complex<f64>>,
 }
 
@@ -74,7 +74,7 @@ fn support(v: &ComplexVector) -> Vec<usize> {
     (0..v.len()).filter(|&at| v[at].norm() > ENTRY_TOLERANCE * largest).collect()
 }
 
-/// All hidden faults of a plant, for each eigenvalue s of `A_f` a basis of the null space of R(s).
+/// All hidden faults of a plant: for each eigenvalue s of `A_f`, a basis of the null space of R(s).
 ///
 /// The basis is reduced so that each of its vectors has a fault that the others lack. R(s) has rows
 /// and columns scaled to length one. Of two conjugate s only the one above the real axis is examined;
@@ -136,11 +136,10 @@ fn rosenbrock_matrix(
     beside(&of_states, &of_faults.resize_vertically(n + p, Complex::ZERO))
 }
 
-/// The rank of M, a basis of its null space and the diagonal of D, decided for M with rows, then columns,
-/// scaled to length one, so that units do not decide the rank.
+/// Returns the rank of M, a basis of its null space and the diagonal of D. The rank does not depend on units: it is the
+/// rank of M with rows, then columns, scaled to length one.
 ///
-/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in the null
-/// space of M.
+/// D has the lengths of the columns: D^-1 z is in the null space of M for z in the null space of the scaled matrix.
 fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix, Vec<f64>), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();
@@ -165,7 +164,7 @@ fn without_rounding_errors(vector: &ComplexVector, lengths: &[f64]) -> ComplexVe
     ComplexVector::from_fn(vector.len(), entry)
 }
 
-/// The rank of M and a basis of its null space; for a matrix with imaginary parts one vector of it.
+/// The rank of M and a basis of its null space; if M has imaginary parts, a single vector of it.
 fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let svd = ComplexSvd::new(m)?;
     let (cols, rank) = (m.ncols(), svd.rank(RANK_TOLERANCE));

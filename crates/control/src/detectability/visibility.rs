@@ -6,8 +6,8 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// An output of the controllable states counts as zero below this fraction of the norm of the
-/// output, a singular value below this fraction of the largest.
+/// An output row restricted to the reached states counts as zero below this part of the norm of the row; a singular
+/// value counts as zero below this part of the largest.
 const TOLERANCE: f64 = 1e-12;
 
 /// The effect of one fault on one measurement.
@@ -55,7 +55,7 @@ struct Reach {
     column: DMatrix<f64>,
 }
 
-/// Restricts a transposed output matrix, `c`, to the reached states; None if it is zero up to rounding.
+/// Restricts `c`, a transposed output row, to the reached states; None if the result is zero up to rounding.
 fn reached_output(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (c, norm) = reached.reached_output(c);
     (c.norm() > TOLERANCE * norm).then_some(c)

@@ -1,11 +1,11 @@
 //! The chi-square distribution, central and noncentral, for a whole number of degrees of freedom.
 
-/// A series ends with a weight below this part of the sum: the probabilities that follow are at most 1.
+/// The series ends at a weight below this part of the sum; the weights are factors of probabilities, at most 1.
 const NEGLIGIBLE: f64 = 1e-17;
 const MOST_TERMS: u32 = 1_000_000;
 /// The largest noncentrality whose series is summed.
 const LARGEST: f64 = 1e6;
-/// In double precision the probability is 1 that a variable is not so many standard deviations below its mean.
+/// Standard deviations below the mean: in double precision, a variable is above this point with probability 1.
 const FAR: f64 = 40.0;
 
 /// The probability that a chi-square variable with `degrees` degrees of freedom is above `x`.
@@ -15,8 +15,8 @@ const FAR: f64 = 40.0;
 /// Q(x) = erfc((x/2)^(1/2)) + e^(-x/2) sum (x/2)^(j-1/2) / Gamma(j+1/2), 1 <= j <= (k-1)/2     k odd
 /// ```
 ///
-/// All terms are positive: full relative precision, also for large x. 1 for x <= 0;
-/// 0 for x > 0 without degrees of freedom.
+/// k = `degrees`. All terms are positive: full relative precision, also for large x. Q is 1 for x <= 0, and 0 for x > 0
+/// and k = 0.
 ///
 /// Source: M. Abramowitz and I. Stegun, Handbook of Mathematical Functions (1964), 26.4.4, 26.4.5.
 ///
@@ -37,9 +37,9 @@ pub fn survival(degrees: u32, x: f64) -> f64 {
 /// The probability that a noncentral chi-square variable is above `x`. The variable is the squared length of a
 /// normal vector with `degrees` entries, unit covariance and a mean of squared length `noncentrality`.
 ///
-/// A `noncentrality` below 0 counts as 0; 1 for x <= 0. Method: the Poisson mixture of the central
-/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above 1e6 the length
-/// counts as normally distributed.
+/// A `noncentrality` below 0 counts as 0; the result is 1 for x <= 0. Method: the Poisson mixture of the central
+/// probabilities of k, k + 2, ... degrees of freedom, about `noncentrality` terms; above a noncentrality of 1e6 the
+/// vector's length counts as normally distributed.
 ///
 /// Source: Abramowitz and Stegun (1964), 26.4.25.
 #[must_use]
@@ -133,7 +133,7 @@ impl Terms {
         terms
     }
 
-    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, half of the degrees before.
+    /// Adds two degrees of freedom: Q grows by h^a e^(-h) / Gamma(a + 1), h = x / 2, a = half of the previous degrees.
     fn raise(&mut self) {
         let exponent = self.shape * self.half.ln() - self.half - libm::lgamma(self.shape + 1.0);
         self.survival += exponent.exp();

@@ -12,15 +12,15 @@ const NODES: usize = 48;
 /// exp(-(pi / h)^2) in each for the least drifts, and h is at most [`LARGE`].
 const SETTLING: usize = 10_000;
 const BISECTIONS: usize = 60;
-/// The largest threshold whose integral equation is solved for single samples.
+/// The largest threshold for which the integral equation of single samples is solved.
 const LARGE: f64 = 40.0;
-/// The threshold of the test of several samples together in place of a larger one.
+/// The approximate threshold of a test of grouped samples, in place of a threshold above [`LARGE`].
 const REDUCED: f64 = 20.0;
 /// The largest threshold that is tried.
 const LARGEST: f64 = 1e6;
 /// Twice the mean excess of a sum of standard normal steps over a distant limit: Siegmund (1985), (10.37).
 const EXCESS: f64 = 1.166;
-/// The largest run length that is taken from the LU factors: their relative error is about 1e-16 times it.
+/// The largest run length computed from LU factors, with a relative error of about 1e-16 times the run length.
 const LONGEST: f64 = 1e12;
 
 /// The two-sided test by cumulative sums of a residual g with variance 1 and, without faults, mean 0.
@@ -33,14 +33,14 @@ const LONGEST: f64 = 1e12;
 /// The best drift kappa for a fault that moves the mean by delta is delta / 2 (Lorden 1971, Moustakides
 /// 1986: the largest mean delay is the least possible for a given mean time between false alarms).
 ///
-/// The run length of one sum solves an integral equation (Page 1954, (4)), which is solved here by the
-/// Gauss-Legendre quadrature of Goel and Wu (1971); both sums together have 1/L = 1/L+ + 1/L- (Kemp 1961).
-/// Run lengths above 1e12 come from the elimination of Grassmann, Taksar and Heyman (1985), which subtracts
-/// nothing and so has no cancellation. Brook and Evans (1972) and textbooks have tables of run lengths.
+/// The run length L+ or L- of one sum solves an integral equation (Page 1954, (4)), here by the Gauss-Legendre
+/// quadrature of Goel and Wu (1971); both sums together have 1/L = 1/L+ + 1/L- (Kemp 1961). Run lengths above 1e12 come
+/// from the elimination of Grassmann, Taksar and Heyman (1985), which has no subtractions and so no cancellation. Brook
+/// and Evans (1972) and textbooks have tables of run lengths.
 ///
-/// Above a threshold of 40, N samples are taken together as one of mean N^(1/2) times as large, which changes
-/// the run length by less than 1 % for a small drift: the threshold plus 1.166, the mean excess on both sides
-/// (Siegmund 1985, section 10.2), scales with N^(-1/2).
+/// Above a threshold of 40, N samples are replaced by one sample with N^(1/2) times the mean. This changes the run
+/// length by less than 1 % for a small drift: the threshold plus 1.166, the mean excess on both sides (Siegmund 1985,
+/// section 10.2), scales with N^(-1/2).
 ///
 /// Source: E. S. Page, Biometrika 41 (1954); A. L. Goel and S. M. Wu, Technometrics 13 (1971); K. W. Kemp,
 /// J. Royal Stat. Soc. B 23 (1961); D. Brook and D. A. Evans, Biometrika 59 (1972); D. Siegmund, Sequential
@@ -54,12 +54,11 @@ pub struct Cusum {
 }
 
 impl Cusum {
-    /// The test with this drift whose mean number of samples between false alarms is `samples`; at a large
-    /// drift, a test with rarer false alarms.
+    /// Returns the test with this drift whose mean number of samples between false alarms is `samples`.
     ///
-    /// `drift`: above 0; `samples`: at least 2. If false alarms are rarer at every threshold, the threshold is
-    /// next to 0 and [`Cusum::between_false_alarms`] is larger than `samples`: 1.7e6 for a drift of 5. Method:
-    /// bisection, relative accuracy of the threshold 1e-12.
+    /// `drift`: above 0; `samples`: at least 2. With a large drift, false alarms may be rarer at every threshold: the
+    /// threshold is then close to 0 and [`Cusum::between_false_alarms`] larger than `samples`, 1.7e6 for a drift of 5.
+    /// Method: bisection, relative accuracy of the threshold 1e-12.
     ///
     /// # Example
     ///
@@ -81,7 +80,7 @@ impl Cusum {
         check::that(samples >= 2.0, name, samples, "at least 2")?;
         let test = |threshold: f64| Self { drift, threshold };
         let (mut low, mut high) = (0.0, 1.0);
-        // Infinity is too short for an infinite number of samples, which so reaches the largest threshold.
+        // With `samples` = infinity, the loop ends with the error at the largest threshold.
         while test(high).between_false_alarms() <= samples {
             (low, high) = (high, 1.5 * high);
             let rule = "less, as the threshold would be above 1e6";
@@ -109,13 +108,14 @@ impl Cusum {
         1.0 / (1.0 / self.run_length(bias) + 1.0 / self.run_length(-bias))
     }
 
-    /// The mean number of samples until S+, from 0, is above the threshold, if the residual has this mean.
+    /// The mean number of samples until S+, started at 0, exceeds h, if the residual has this mean: L(0) of
     ///
     /// ```text
     /// L(s) = 1 + L(0) Phi(kappa - mean - s) + integral of L(y) phi(y - s + kappa - mean), y from 0 to h
     /// ```
     ///
-    /// Infinite beyond the range of double precision.
+    /// L(s) is the number from S+ = s; Phi and phi are the standard normal distribution function and density. Infinite
+    /// beyond the range of double precision.
     #[must_use]
     pub fn run_length(&self, mean: f64) -> f64 {
         let (group, test) = self.grouped();
@@ -142,10 +142,9 @@ impl Cusum {
     /// The distribution of the delay of a fault that moves the mean of the residual to `mean(k)` in its
     /// k-th sample, k from 0 on; at most `most` samples are followed.
     ///
-    /// When the fault starts, the sums have the distribution of a long time without faults and alarms. Only
-    /// one sum is followed: S- if the sum of the first `most` means is negative, otherwise S+. The result has
-    /// fewer samples where less than 1e-6 of the faults are missed before. With a threshold above 40, `mean`
-    /// is also called for some k from `most` on.
+    /// When the fault starts, the sums have the distribution after a long time without faults and alarms. Only one sum
+    /// is followed: S- if the sum of the first `most` means is negative, otherwise S+. The result ends early when less
+    /// than 1e-6 of the faults are missed. With a threshold above 40, `mean` is also called for some k from `most` on.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> f64, most: usize) -> Delay {
         let (group, test) = self.grouped();
@@ -168,8 +167,8 @@ impl Cusum {
         Delay { missed }
     }
 
-    /// The number of samples that are taken together, and the test for their sum divided by the root of this
-    /// number: one sample and the test itself up to a threshold of 40.
+    /// The number N of samples in a group, and the test for their sum divided by N^(1/2); up to a threshold of 40, N =
+    /// 1 and the test itself.
     fn grouped(&self) -> (usize, Self) {
         if self.threshold <= LARGE {
             return (1, *self);
@@ -238,7 +237,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// After many samples without a fault and without an alarm.
+    /// The distribution after many samples without a fault and without an alarm.
     fn settled(test: &Cusum) -> Self {
         let (nodes, weights) = test.quadrature();
         let transitions = transitions(&nodes, &weights, test.drift);

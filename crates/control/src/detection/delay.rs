@@ -9,8 +9,8 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// The probability that the fault is detected within `samples` samples, beyond the last computed number within
-    /// that number; 0 if `missed` is empty.
+    /// The probability that the fault is detected within `samples` samples, at most the last computed number; 0 if
+    /// `missed` is empty.
     #[must_use]
     pub fn detected_within(&self, samples: usize) -> f64 {
         1.0 - self.missed.get(samples).or(self.missed.last()).copied().unwrap_or(1.0)

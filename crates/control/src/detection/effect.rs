@@ -8,10 +8,10 @@ use nalgebra::{DMatrix, DVector};
 /// The mean of each residual in the samples after a unit step of the input of `effect`: rows are
 /// residuals, column k, from 0, is the k-th sample from the step on.
 ///
-/// `effect`: n states, one input, p outputs. In sampled time the result has the values of the step response,
-/// and `period` is only checked. In continuous time it has the averages over each interval of `period` s, times
-/// the root of `period`: the average of white noise of intensity 1 over an interval has the variance
-/// 1 / `period`, so that the result is in standard deviations.
+/// `effect`: n states, one input, p outputs. In sampled time the result is the step response, and `period` is only
+/// checked. In continuous time the result is the average over each interval of `period` s, times the root of `period`:
+/// the average of white noise of intensity 1 over an interval has the variance 1 / `period`, so that the result is in
+/// standard deviations.
 ///
 /// Method: one exponential for x and its integral (Van Loan 1978).
 ///

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this part of the largest count as zero; the columns have length one.
 const TOLERANCE: f64 = 1e-9;
-/// An effect of an input on a measurement below this part of the sizes of its terms is rounding of their sum.
+/// An effect of an input on a measurement below this part of the sum of the moduli of its terms counts as zero.
 const ROUNDING: f64 = 1e-13;
 
 /// A plant with noise and unknown inputs d: x' = A x + B u + w + sum of e d, y = C x + v + sum of `e_s` d;
@@ -31,17 +31,17 @@ pub struct NoisyPlant {
     pub domain: Domain,
 }
 
-/// An input that nobody measures: a disturbance, or a fault.
+/// An unmeasured input: a disturbance, or a fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnknownInput {
-    /// e, n entries: how it acts on the states.
+    /// e, n entries: the effect on the states.
     pub on_states: DVector<f64>,
-    /// `e_s`, p entries: how it adds to the measurements.
+    /// `e_s`, p entries: the effect on the measurements.
     pub on_measurements: DVector<f64>,
 }
 
-/// A filter with white residuals r: without unknown inputs, or with those that it decouples, r has mean 0
-/// and the intensity (in sampled time the covariance) I.
+/// A filter with white residuals r. Without unknown inputs other than the decoupled ones, r has mean 0 and the
+/// intensity (in sampled time the covariance) I.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DetectionFilter {
@@ -69,9 +69,9 @@ impl NoisyPlant {
     /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
     /// time `d[k+1] = d[k]` + noise of this covariance).
     ///
-    /// A filter of this plant estimates the input, so that a constant one has no effect on the residuals in
-    /// steady state. A larger intensity makes the effect decay sooner. Other inputs need a zero for the new
-    /// state ([`UnknownInput::extended`]).
+    /// A filter of this plant estimates the input, so that a constant input has no effect on the residuals in steady
+    /// state. A larger intensity makes the effect decay sooner. Other unknown inputs need a zero for the new state
+    /// ([`UnknownInput::extended`]).
     ///
     /// # Errors
     ///
@@ -95,17 +95,17 @@ impl NoisyPlant {
 }
 
 impl UnknownInput {
-    /// The same input of a plant with `states` states, with zeros for the further states.
+    /// The same input, with zeros for further states up to the number `states`.
     #[must_use]
     pub fn extended(&self, states: usize) -> Self {
         Self { on_states: self.on_states.clone().resize_vertically(states, 0.0), ..self.clone() }
     }
 }
 
-/// Designs the filter whose residuals do not depend on the inputs `unknown`; None if this method has none.
+/// Designs the filter whose residuals do not depend on the inputs `unknown`, the columns e of E and `e_s` of `E_s`.
 ///
-/// Measurements in which an input appears directly are left out: y becomes `N_s` y with `N_s` `E_s` = 0.
-/// An unknown-input observer (Chen and Patton 1999, section 3.2) removes the inputs on the states. With C for `N_s` C,
+/// Measurements in which an input appears directly are left out: `N_s` y with `N_s` `E_s` = 0 replaces y. An
+/// unknown-input observer (Chen and Patton 1999, section 3.2) removes the inputs on the states. With C for `N_s` C,
 ///
 /// ```text
 /// H = E (C E)^+,  T = I - H C,  s = T x                               rank C E = rank E
@@ -120,7 +120,7 @@ impl UnknownInput {
 /// r = R (N y - N C s_hat),   R (N V N') R' = I,   in sampled time R (N V N' + N C P C' N') R' = I
 /// ```
 ///
-/// which is white, and of all decoupled filters the one with the least covariance of the state error.
+/// The residual is white; P, the covariance of the state error, is the least of all decoupled filters.
 ///
 /// Existence: rank C E = rank E < n, at least one row N is left, and (T A, N C) is detectable: (A, E, C) has no
 /// unstable invariant zeros. The result is None if one of these conditions does not hold.
@@ -186,7 +186,7 @@ impl UnknownInputObserver {
             if rank < Svd::new(&e)?.rank(TOLERANCE) {
                 return Ok(None);
             }
-            // In units of the inputs in which all have effects of length one.
+            // Scales the inputs so that each effect on the measurements has length one.
             let lengths = visible.column_iter().map(|column| column.norm());
             let e = divide_columns(&e, &DVector::from_iterator(e.ncols(), lengths));
             let unit = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
@@ -311,7 +311,7 @@ fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
 mod tests {
     use super::*;
 
-    /// 0.1 * 3 - 0.3 is zero, but not with the rounded length of (3, -1).
+    /// The effect 0.1 * 3 - 0.3 is zero, but not after (3, -1) is divided by its length with rounding.
     #[test]
     fn an_input_without_effect_on_the_measurements_is_not_decoupled() {
         let plant = NoisyPlant {

@@ -1,4 +1,4 @@
-//! The mean that errors of the model give to residuals without a fault.
+//! The mean of residuals that errors of the model cause without a fault.
 
 use crate::blocks::{beside, stacked};
 use crate::eigen::eigenvalues;
@@ -20,16 +20,15 @@ const WIDTH: f64 = 1e-2;
 /// entry by entry. The errors dA, dB, dC may vary with time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UncertainPlant {
-    /// A, B, C, D; a deviation from the operating point that is there from the start is a column of B and D with an
-    /// input bounded by 1.
+    /// A, B, C, D. A constant deviation from the operating point is a column of B and D with an input bounded by 1.
     pub nominal: StateSpace,
     /// The largest errors of the entries of A, B and C, not below 0.
     pub sizes: [DMatrix<f64>; 3],
 }
 
 impl UncertainPlant {
-    /// Bounds the means of the residuals `rows` r, r those of `filter`: no mean has a larger modulus, in sampled
-    /// time at the samples. None if no bound exists.
+    /// Bounds the moduli of the means of `rows` r with the residuals r of `filter`, in sampled time at the samples.
+    /// None if no bound exists.
     ///
     /// `rows`: one row for each result, one column for each residual of `filter`; `bounds`: `u_max`, the
     /// largest modulus of each entry of u. The plant starts at rest.
@@ -39,13 +38,13 @@ impl UncertainPlant {
     /// |r| <= R_u u_max + R_w w_max + R_z |dC| x_max                               (z = dC x)
     /// ```
     ///
-    /// with the peak gains G of the plant from u and w to x, and R of plant and filter together to r. It is
-    /// a small-gain bound: `x_max` exists if the spectral radius of `G_w |dA|` is below 1. For a plant with an
-    /// impulse response without sign changes and errors that add up, it is attained by a constant command;
-    /// for a lightly damped one it may be several times too large.
+    /// with the peak gains G of the plant from u and w to x, and R of plant and filter together to r. This small-gain
+    /// bound exists if the spectral radius of `G_w |dA|` is below 1. A constant command attains the bound if the
+    /// impulse response of the plant has no sign changes and the errors add up; for a lightly damped plant, the bound
+    /// may be several times too large.
     ///
-    /// In sampled time u is constant over a sample, and the effect of w over a sample, the integral of
-    /// `e^(A s) w`, is bounded by that of `e^(M s) w_max`, M = A with absolute values off the diagonal.
+    /// In sampled time u is constant over a sample, and the effect of w over a sample, the integral of `e^(A s) w`, is
+    /// bounded by the integral of `e^(M s) w_max`, M = A with absolute values off the diagonal.
     ///
     /// Source: M. A. Dahleh and M. H. Khammash, Automatica 29 (1993), for peak bounds under structured
     /// errors; the comparison with M: T. Wazewski (1950).
