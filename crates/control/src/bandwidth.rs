@@ -101,9 +101,9 @@ pub struct ByBandwidth<T> {
     pub weight: f64,
 }
 
-/// Computes the regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u. The largest singular value of
-/// K (s I - A)^-1 B, in units of the inputs, is one at s = j `bandwidth`, or z = e^(j `bandwidth` h) with the sample time h;
-/// this determines r.
+/// Computes the regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u. r is such that the largest singular
+/// value of K (s I - A)^-1 B, in units of the inputs, is one at s = j `bandwidth`, or at z = e^(j `bandwidth` h) with
+/// the sample time h.
 ///
 /// `a`: n x n; `b`: n x m; `q`: n x n; `units`: size of a unit of each input. The loop at the input has a gain margin
 /// of 1/2 to infinity and a phase margin of 60 degrees in continuous time, for all weights (M. G. Safonov, M. Athans,

@@ -53,15 +53,16 @@ pub struct Distance {
 /// and time do not matter. The distance is the 2-norm of the smallest complex change of the scaled
 /// [A, B] that makes the pair uncontrollable: 1 is large, 1e-12 is within rounding.
 ///
-/// The upper bound is the smallest value found by descents s := u* A u, u the left singular vector, which start at
-/// each eigenvalue of A that is not below the real axis and at each better point of the search. The lower bound is a
-/// branch and bound: the singular value changes by at most the change of s, so that its value at the centre of a
-/// square less half the diagonal bounds it in the square; for |s| > 1 + upper it is larger than `upper`. The square
-/// with the lowest bound is divided until the bounds agree to 10 %, with at most 1000 evaluations of about 100 (n +
-/// m) n^2 multiplications each, those of the descents apart. For a small distance the lower bound may remain far
-/// below the upper one; below 1e-14 it is zero. With more than 24 states the lower bound is zero, and the singular
-/// values of the descents are computed by inverse iteration in coordinates in which [B, A] is zero below its
-/// diagonal, with about 8 (m + 4) n^2 multiplications each.
+/// The upper bound is the smallest value found by descents s := u* A u, u the left singular vector. A descent starts at
+/// each eigenvalue of A on or above the real axis, and at each better point of the search for the lower bound. This
+/// search is a branch and bound: the singular value changes by at most the change of s, so that in a square it is at
+/// least its value at the centre minus half the diagonal; for |s| > 1 + upper it is larger than `upper`. The square
+/// with the lowest bound is divided until the bounds agree to 10 %, with at most 1000 evaluations of about 100 (n + m)
+/// n^2 multiplications each, besides those of the descents. For a small distance the lower bound may remain far below
+/// the upper bound; below 1e-14 it is zero.
+///
+/// With more than 24 states the lower bound is zero, and inverse iteration computes the singular values of the descents
+/// in coordinates in which [B, A] is zero below its diagonal, with about 8 (m + 4) n^2 multiplications each.
 ///
 /// Source: R. Eising, Between controllable and uncontrollable, Systems and Control Letters 4
 /// (1984); the lower bound follows from Weyl's inequality for singular values.
@@ -89,7 +90,7 @@ pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distanc
 
 /// Bounds the distance of (A, C) from the nearest unobservable pair.
 ///
-/// `a`: n x n; `c`: p x n. It is the distance of (A', C') from uncontrollability: [`from_uncontrollable`].
+/// `a`: n x n; `c`: p x n. Equals the distance of (A', C') from uncontrollability, see [`from_uncontrollable`].
 ///
 /// # Errors
 ///
@@ -187,18 +188,18 @@ impl Pencil {
     }
 }
 
-/// The smallest singular value of [A - s I, B] at s.
+/// A local minimum over s of the smallest singular value of [A - s I, B].
 struct Minimum {
     value: f64,
     s: Complex<f64>,
 }
 
-/// A square of the plane in which no value is below `bound`.
+/// A square of the complex plane in which no singular value is below `bound`.
 #[derive(Clone)]
 struct Square {
     bound: f64,
     centre: Complex<f64>,
-    /// Half of its side.
+    /// Half of the side length.
     half: f64,
 }
 

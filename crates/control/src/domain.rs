@@ -17,7 +17,7 @@ pub enum Domain {
 
 impl Domain {
     /// Distance of an eigenvalue beyond the stability limit: Re s in continuous time, |z| - 1 in
-    /// sampled time. A mode is stable when it is negative.
+    /// sampled time. A mode with a negative excess is stable.
     #[must_use]
     pub fn excess(self, eigenvalue: Complex<f64>) -> f64 {
         match self {

@@ -28,11 +28,11 @@ const LARGE: usize = 48;
 
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///
-/// `a`: n x n, finite. Method: diagonal balancing (Parlett and Reinsch 1969), then the QR algorithm
-/// with a bounded number of iterations; about 25 n^3 operations, 10 n^3 from order 48 on, where no
-/// Schur form is computed. If the algorithm fails, its other form is tried, then the Schur form of a
-/// reflected A. The result is exact for a matrix that differs from the balanced A by a few units of
-/// rounding of its norm. Complex eigenvalues are exact conjugates.
+/// `a`: n x n, finite. Method: diagonal balancing (Parlett and Reinsch 1969), then the QR algorithm with a bounded
+/// number of iterations: with the Schur form, about 25 n^3 operations, or without it, 10 n^3, from order 48 on. If one
+/// form of the algorithm fails, the other is tried, then the Schur form of a reflected A. The result is exact for a
+/// matrix that differs from the balanced A by a few units of rounding of its norm. Complex eigenvalues are exact
+/// conjugates.
 ///
 /// # Example
 ///

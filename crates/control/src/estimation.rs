@@ -1,7 +1,7 @@
 //! Laws that estimate faults: alternatives to the augmented state observer of [`crate::aso`].
 //!
-//! With e = y - C `x_hat` every law has a form that [`crate::aso::Gains`], the controller and all analyses
-//! of this crate know. For constant faults, without the feedback:
+//! With e = y - C `x_hat`. Every law can be written as [`crate::aso::Gains`], so that the controller and all analyses
+//! of this crate apply. For constant faults, without the feedback:
 //!
 //! | law | estimate of the fault | exists if |
 //! |---|---|---|
@@ -32,16 +32,16 @@ use crate::gains::{Estimator, Gains};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// The largest decay of an error in one sample that [`mean_rate`] counts: to e^-4, 1.8 %.
+/// The largest decay of an error in one sample that [`mean_rate`] counts: by the factor e^-4, 1.8 %.
 const FASTEST: f64 = 4.0;
 
-/// A law in which another model takes the place of the fault model.
+/// A law whose observer has another `A_f` than the fault model.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct OwnModel {
     /// The gains; of a nonlinear law those of its linearisation about a zero estimate.
     pub gains: Gains,
-    /// `A_f` of the observer, q x q, which takes the place of the fault model.
+    /// `A_f` of the observer, q x q.
     pub a_f: DMatrix<f64>,
 }
 
@@ -73,8 +73,8 @@ pub(crate) fn eigenvalue(rate: f64, domain: Domain) -> f64 {
     }
 }
 
-/// The matrix from e after the correction to e before it: (I - C `L_x`)^-1 of a current estimator, I of a prediction
-/// estimator.
+/// The matrix from e after the correction to e before the correction: (I - C `L_x`)^-1 of a current estimator, I of a
+/// prediction estimator.
 fn before_correction(plant: &FaultyPlant, gains: &Gains) -> Result<DMatrix<f64>, Error> {
     let p = plant.c.nrows();
     let identity = DMatrix::identity(p, p);
@@ -94,7 +94,7 @@ fn require_constant_faults(plant: &FaultyPlant, domain: Domain) -> Result<(), Er
     check::that(difference <= 0.0, "A_f of f' = A_f f", difference, rule)
 }
 
-/// Checks a current estimator of a sampled plant.
+/// Checks that the controller is sampled and its estimator a current one.
 fn require_current(domain: Domain, estimator: Estimator) -> Result<(), Error> {
     let holds = domain != Domain::Continuous && estimator == Estimator::Current;
     check::that(holds, "the domain", f64::NAN, "a sampled controller with a current estimator")

@@ -5,7 +5,7 @@ use super::chi_square::{noncentral_quantile, noncentral_survival};
 use crate::check::as_number;
 use crate::{Error, check};
 
-/// The largest number of starts of a fault within a window that are averaged for a delay.
+/// The largest number of starts of the fault within a window over which a delay is averaged.
 const PHASES: usize = 32;
 
 /// The chi-square test of the mean of m white residuals r with covariance I, over successive windows of N samples.
@@ -14,8 +14,8 @@ const PHASES: usize = 32;
 /// s = N |mean of r over the window|^2,  alarm at the end of the window: s > h
 /// ```
 ///
-/// Without faults s has the chi-square distribution with m degrees of freedom. It is the generalised
-/// likelihood ratio of a constant mean of any direction and size, doubled. Windows do not overlap, so that
+/// Without faults s has the chi-square distribution with m degrees of freedom. s is twice the logarithm of the
+/// generalised likelihood ratio for a constant mean of unknown direction and size. Windows do not overlap, so that
 /// their results are independent and the mean number of samples between false alarms is N / P(s > h).
 ///
 /// Source: A. S. Willsky, Automatica 12 (1976), section 4.1; M. Basseville and I. V. Nikiforov, Detection of
@@ -70,8 +70,8 @@ impl WindowTest {
     /// The distribution of the delay of a fault that moves the mean of the residuals to `mean(k)`, m
     /// entries, in its k-th sample, k from 0 on; at most `most` samples are followed.
     ///
-    /// The fault starts in each sample of a window with the same probability; of a window with more than 32
-    /// samples, in 32 of them. The result ends where less than 1e-6 of the faults are missed.
+    /// All starts of the fault within a window are equally likely; of more than 32 starts, 32 are evaluated. The result
+    /// ends where less than 1e-6 of the faults are missed.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> Vec<f64>, most: usize) -> Delay {
         let dimension = self.residuals as usize;

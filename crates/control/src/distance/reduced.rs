@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// Number of steps of the inverse iteration.
 const ITERATIONS: usize = 6;
-/// Entries above this divide their vector in a substitution, so that no product overflows.
+/// A substitution divides its vector by any entry above this, so that no product overflows.
 const LARGE: f64 = 1e100;
 
 /// The pencil [B, A - s I] in coordinates in which [B, A] is zero below its diagonal.
@@ -54,7 +54,7 @@ impl ReducedPencil {
             pencil[(i, self.inputs + i)] -= s;
         }
         let mut t = triangular(pencil, self.inputs);
-        // A singular T is replaced by one that differs by rounding, whose inverse shows the left vector of zero.
+        // A T singular within rounding is made regular; inverse iteration then gives the left singular vector.
         for i in 0..n {
             if t[(i, i)].norm() < f64::EPSILON {
                 t[(i, i)] = Complex::from(f64::EPSILON);
@@ -72,9 +72,9 @@ impl ReducedPencil {
     }
 }
 
-/// Replaces u by the direction of T^-1 u; T: upper triangular with at least rounding on its diagonal.
+/// Replaces u by the direction of T^-1 u; T: upper triangular, its diagonal at least eps, the unit of rounding.
 ///
-/// The inverse of a chain of k states that no input reaches has the size of rounding to the power -k.
+/// A chain of k states that no input reaches gives T^-1 entries of the size eps^-k.
 fn solve(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
     for i in (0..u.len()).rev() {
         u[i] /= t[(i, i)];
@@ -95,7 +95,7 @@ fn solve_adjoint(t: &ComplexMatrix, u: &mut DVector<Complex<f64>>) {
     u.unscale_mut(u.norm());
 }
 
-/// Divides the vector by the size of one entry if that is large.
+/// Divides the vector by the modulus of the entry `at` if this is above [`LARGE`].
 fn limit(u: &mut DVector<Complex<f64>>, at: usize) {
     let size = u[at].norm();
     if size > LARGE {
@@ -103,7 +103,7 @@ fn limit(u: &mut DVector<Complex<f64>>, at: usize) {
     }
 }
 
-/// The triangular T of M = [0, T] Z, n x (m + n), zero below its diagonal, with a unitary Z.
+/// The upper triangular T of the pencil [0, T] Z, n x (m + n), zero below its diagonal, with a unitary Z.
 fn triangular(mut pencil: ComplexMatrix, inputs: usize) -> ComplexMatrix {
     let n = pencil.nrows();
     for row in (0..n).rev() {

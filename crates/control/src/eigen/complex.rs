@@ -6,9 +6,9 @@ use nalgebra::{Complex, DMatrix};
 
 /// Largest number of sweeps for one eigenvalue; two or three are usual.
 const SWEEPS: usize = 120;
-/// Every so many sweeps without a result an exceptional shift is used.
+/// Number of sweeps without a result after which an exceptional shift is used, again and again.
 const EXCEPTIONAL: usize = 10;
-/// After so many sweeps an entry counts as zero if it is small in comparison with the whole matrix.
+/// Number of sweeps after which an entry that is small relative to the norm of the matrix counts as zero.
 const PATIENCE: usize = 20;
 
 /// Computes the eigenvalues of a square complex matrix, in no particular order; none for an empty matrix.
@@ -72,7 +72,7 @@ fn start_of_block(h: &DMatrix<Complex<f64>>, last: usize, norm: f64) -> usize {
     (1..=last).rev().find(|&k| negligible(k)).unwrap_or(0)
 }
 
-/// The eigenvalue of the last 2 x 2 block that is nearer to the last entry.
+/// The Wilkinson shift: the eigenvalue of the last 2 x 2 block that is nearer to the last entry.
 fn wilkinson(h: &DMatrix<Complex<f64>>, last: usize) -> Complex<f64> {
     let (a, d) = (h[(last - 1, last - 1)], h[(last, last)]);
     let product = h[(last - 1, last)] * h[(last, last - 1)];
@@ -139,7 +139,7 @@ mod tests {
         }
     }
 
-    /// V diag(0, 1, 1, ...) V^-1 with rounding errors, as T of a loop with many integrators at low frequencies.
+    /// V diag(0, 1, 1, ...) V^-1 with rounding errors: I - S of a loop with many integrators is such a matrix.
     #[test]
     fn a_cluster_beside_a_zero_is_found() {
         let n = 20;

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 /// Largest number of sweeps for one eigenvalue or pair; three or four are usual.
 const SWEEPS: usize = 120;
-/// Every so many sweeps without a result an exceptional shift is used.
+/// Number of sweeps without a result after which an exceptional shift is used, again and again.
 const EXCEPTIONAL: usize = 10;
 
 /// Computes the eigenvalues of an upper Hessenberg matrix, in no particular order; None if the
@@ -85,7 +85,7 @@ fn start_of_block(h: &DMatrix<f64>, last: usize, smallest: f64) -> usize {
 /// Two shifts with the same real part: real +- i imaginary.
 struct Shift {
     real: f64,
-    /// The imaginary part, without its sign.
+    /// The modulus of the imaginary part.
     imaginary: f64,
 }
 
@@ -108,8 +108,8 @@ impl Shift {
         Self { real: nearer.re, imaginary: nearer.im.abs() }
     }
 
-    /// The direction of the first column of (H - s1)(H - s2) from row `at` on. Differences come first:
-    /// in a cluster of eigenvalues their products would cancel.
+    /// The direction of the first column of (H - s1 I) (H - s2 I), with the two shifts, from row `at` on. Differences
+    /// are formed first: in a cluster of eigenvalues the products would cancel.
     fn column(&self, h: &DMatrix<f64>, at: usize) -> [f64; 3] {
         let (here, next) = (h[(at, at)] - self.real, h[(at + 1, at + 1)] - self.real);
         let (below, right) = (h[(at + 1, at)], h[(at, at + 1)]);
@@ -176,7 +176,7 @@ struct Reflection {
 }
 
 impl Reflection {
-    /// None if the vector is on the axis already, or not finite.
+    /// None if the vector is on the first axis, or not finite.
     fn new([first, second, third]: [f64; 3]) -> Option<Self> {
         let size = first.abs() + second.abs() + third.abs();
         if second.abs() + third.abs() <= 0.0 || !size.is_finite() {

@@ -1,4 +1,4 @@
-//! Eigenvalues of a matrix with a feedback of one channel, for many gains.
+//! Eigenvalues of A + g b c, the feedback of one channel, for many gains g.
 
 use super::{eigenvalues, francis};
 use crate::Error;

@@ -92,7 +92,7 @@ impl DirectForm {
         self.a.view((q, q), (n - q, n - q)).into()
     }
 
-    /// The eigenvalues of `A_22` that `C_2` does not show.
+    /// The unobservable eigenvalues of (`A_22`, `C_2`).
     fn invariant_zeros(&self) -> Result<Vec<Complex<f64>>, Error> {
         let a_22 = self.rest();
         if a_22.is_empty() {
@@ -107,10 +107,10 @@ impl DirectForm {
 
     /// `L_x`, n x p, with A - `L_x` C = [`pole` I, \*; 0, `A_22` - `L_w` `C_2`] in these coordinates.
     ///
-    /// The zeros are eigenvalues of the last block; the others are placed with rates from `rate` to twice
-    /// `rate`, in 1/s. \* is the part of `A_12` that `y_2` cannot cancel. With P = `T'` diag(I, p `P_w`) T,
-    /// T = [`M_1` C; N], `P_w` of the Lyapunov equation of the last block and p large enough, the symmetric part of
-    /// P (A - `L_x` C) is negative definite and `F_a`' P = `M_1` C: the strictly-positive-real condition.
+    /// The zeros are eigenvalues of the last block; its other eigenvalues get rates from `rate` to twice `rate`, in
+    /// 1/s. \* is the part of `A_12` that `y_2` cannot cancel. Let P = `T'` diag(I, p `P_w`) T with T = [`M_1` C; N],
+    /// `P_w` from the Lyapunov equation of the last block and a large number p. The symmetric part of P (A - `L_x` C)
+    /// is then negative definite and `F_a`' P = `M_1` C: the strictly-positive-real condition.
     ///
     /// # Errors
     ///
@@ -132,7 +132,7 @@ impl DirectForm {
         Ok(&self.from * gain)
     }
 
-    /// `L_w`, (n - q) x (p - q), which places the eigenvalues of `A_22` - `L_w` `C_2` other than the zeros.
+    /// `L_w`, (n - q) x (p - q), which places all eigenvalues of `A_22` - `L_w` `C_2` except the zeros.
     fn rest_gain(&self, rate: f64) -> Result<DMatrix<f64>, Error> {
         let (a, c) = (self.rest().transpose(), self.c_2.transpose());
         let part = controllable_part(&a, &c)?;

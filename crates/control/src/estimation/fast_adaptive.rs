@@ -6,7 +6,7 @@ use crate::gains::{Estimator, Gains};
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The two parameters of the law.
+/// The parameters of [`fast_adaptive`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FastAdaptive {
     /// sigma in 1/s.
@@ -22,17 +22,16 @@ pub struct FastAdaptive {
 /// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = f_hat_i + Gamma F e,  f_hat_i' = sigma Gamma F e
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and in the coordinates of that form `L_x` has
-/// A - `L_x` C = [-sigma I, J; 0, ..]. The error eps = `f_hat` - f then obeys
-/// eps' = -Gamma eps + Gamma J w - f': each estimate is the fault after a first-order lag of
-/// rate gamma, disturbed only by w, the error of the states that no fault enters, which no fault excites. In
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I. In its coordinates A - `L_x` C = [-sigma I, J; 0, ..]. The error eps =
+/// `f_hat` - f then obeys eps' = -Gamma eps + Gamma J w - f': each estimate is the fault after a first-order lag of
+/// rate gamma. The only disturbance is w, the error in the coordinates that no fault enters; no fault excites w. In
 /// sampled time (current estimator) the eigenvalues are e^(-sigma T) and e^(-gamma T).
-/// `gains`: for `K_x`, `K_f` and the estimator; `rate`: the rate of the other errors, in 1/s, see
-/// [`DirectForm::observer_gain`], whose P proves the stability for every Gamma and sigma above zero in continuous
-/// time.
 ///
-/// The result is in the form of [`Gains`], where `F_a` `f_hat_i` takes the place of `F_a` `f_hat`: its `L_x` is the
-/// one above plus `F_a` Gamma F.
+/// `gains`: `K_x`, `K_f` and the estimator are used; `rate`: the rate of the other errors, in 1/s, see
+/// [`DirectForm::observer_gain`], whose P proves the stability for all positive Gamma and sigma in continuous time.
+///
+/// In the resulting [`Gains`], `F_a` `f_hat_i` takes the place of `F_a` `f_hat`, and `L_x` is the gain above plus `F_a`
+/// Gamma F.
 ///
 /// Source: K. Zhang, B. Jiang and V. Cocquempot, Adaptive observer-based fast fault estimation, Int. J. Control,
 /// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y,
