@@ -8,15 +8,16 @@
 //! | actuator and sensor | in both places | [`F_a`; W `F_s`] | by its kind |
 //! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
 //!
-//! A fault of the measurements passes their filter, a part of the controller and, in the observer, of the plant:
+//! Sensor faults pass the measurement filter W. The filter is a part of the controller; the observer models it as a
+//! part of the plant:
 //!
 //! ```text
 //! y_f' = W (y - y_f)
 //! A -> [A, 0; W C, -W],  B -> [B; 0],  C -> [0, I],  F_a -> [F_a, 0; 0, W F_s]
 //! ```
 //!
-//! A plant with y = C x + D u is one without D for a controller that filters y - D u, as it knows u:
-//! [`crate::controller::with_feedthrough`]. A fault of its input i has the columns i of B and D, [`FaultEntry::Both`].
+//! With y = C x + D u, the plant without D is used and the controller gets y - D u as its measurement:
+//! [`crate::controller::with_feedthrough`]. A fault of input i has the columns i of B and D, [`FaultEntry::Both`].
 
 use crate::blocks::{block_2x2, stacked};
 use crate::check::as_number;
@@ -80,10 +81,10 @@ pub struct FaultChannel {
     pub rate: Option<usize>,
 }
 
-/// A plant in the form that the observer needs, and the places of the user's faults in `f_hat`.
+/// A plant in the form that the observer needs, and the indices of the given faults in `f_hat`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedPlant {
-    /// The plant; the states of the measurement filter follow its own.
+    /// The plant; the states of the measurement filter follow those of the plant itself.
     pub plant: FaultyPlant,
     /// The time domain of the plant.
     pub domain: Domain,
@@ -91,7 +92,7 @@ pub struct ExtendedPlant {
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
     pub states: usize,
-    /// For each fault of the user its indices in `f_hat`.
+    /// For each given fault its indices in `f_hat`.
     pub channels: Vec<FaultChannel>,
 }
 

@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 /// Singular values of B, its columns scaled to length one, below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
-/// The plant with faults (1) and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x; in
-/// sampled time x[k+1], f[k+1] in place of x', f'.
+/// The plant with faults, (1) of [`crate::aso`], and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x;
+/// in sampled time x[k+1], f[k+1] in place of x', f'.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaultyPlant {
     /// A, n x n.
@@ -19,14 +19,14 @@ pub struct FaultyPlant {
     pub b: DMatrix<f64>,
     /// C, p x n.
     pub c: DMatrix<f64>,
-    /// `F_a`, n x q: how the faults act on the states. A force against the actuator has `F_a` = -B.
+    /// `F_a`, n x q: the effect of the faults on the states. A force against the actuator has `F_a` = -B.
     pub f_a: DMatrix<f64>,
     /// `A_f`, q x q: the fault model. 0 for constant faults; I for constant faults in sampled time.
     pub a_f: DMatrix<f64>,
 }
 
 impl FaultyPlant {
-    /// Creates the plant of the paper, with constant faults: `A_f` = 0.
+    /// Creates the plant of [`crate::aso`] with constant faults: `A_f` = 0.
     ///
     /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q, checked by the functions that use the plant.
     #[must_use]
@@ -52,7 +52,7 @@ impl FaultyPlant {
         check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))
     }
 
-    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); equal to (10) if B `K_f` = -`F_a`, `A_f` = 0.
+    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); (10) of [`crate::aso`] if B `K_f` = -`F_a`, `A_f` = 0.
     #[must_use]
     pub fn augmented_dynamics(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
@@ -66,7 +66,7 @@ impl FaultyPlant {
         self.c.clone().resize_horizontally(n + q, 0.0)
     }
 
-    /// `F_0` = [-`F_a`; 0], (n + q) x q: a fault f enters the error dynamics (11) as -`F_0` f.
+    /// `F_0` = [-`F_a`; 0], (n + q) x q: a fault f enters the error dynamics, (11) of [`crate::aso`], as -`F_0` f.
     #[must_use]
     pub fn augmented_fault(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();

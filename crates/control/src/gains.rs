@@ -26,8 +26,8 @@ pub enum Estimator {
 /// f_hat = f_hat_i + P_f (y - C x_hat)
 /// ```
 ///
-/// where `x_hat` and `f_hat_i` are the corrected ones if the estimator is [`Estimator::Current`]. The direct
-/// term does not change the error dynamics, only what is read from them.
+/// where `x_hat` and `f_hat_i` are the corrected ones if the estimator is [`Estimator::Current`]. The direct term does
+/// not change the error dynamics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
     /// How the observer uses the newest measurement.
@@ -59,13 +59,13 @@ impl Estimator {
 }
 
 impl Gains {
-    /// The number of integrals.
+    /// The number of integrator states.
     #[must_use]
     pub fn integrals(&self) -> usize {
         self.integral.as_ref().map_or(0, |integral| integral.gain.ncols())
     }
 
-    /// L = [`L_x`; -`L_f`], (n + q) x p, as in (10).
+    /// L = [`L_x`; -`L_f`], (n + q) x p, as in (10) of [`crate::aso`].
     #[must_use]
     pub fn observer_gain(&self) -> DMatrix<f64> {
         stacked(&self.l_x, &-&self.l_f)
@@ -77,17 +77,17 @@ impl Gains {
         &plant.a + &plant.b * &self.k_x
     }
 
-    /// `A_0` - L `C_0`, (n + q) x (n + q): the dynamics of the estimation error (11); `A_0` - L
-    /// `C_0` `A_0` for a current estimator, after the correction.
+    /// `A_0` - L `C_0`, (n + q) x (n + q): the dynamics of the estimation error, (11) of [`crate::aso`]. For a current
+    /// estimator, `A_0` - L `C_0` `A_0`: the dynamics of the error after the correction.
     #[must_use]
     pub fn error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
         let a_0 = plant.augmented_dynamics();
         &a_0 - self.observer_gain() * self.estimator.output_matrix(&a_0, &plant.augmented_output())
     }
 
-    /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the dynamics of the state
-    /// error while the fault estimates are held. Its eigenvalues are not assigned; a loop that
-    /// starts without fault estimation needs them stable.
+    /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the dynamics of the state error while the fault
+    /// estimates are constant. Its eigenvalues are not assigned; they must be stable for a loop that starts without
+    /// fault estimation.
     #[must_use]
     pub fn state_error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
         &plant.a - &self.l_x * self.estimator.output_matrix(&plant.a, &plant.c)
@@ -116,7 +116,7 @@ impl Gains {
         check::shape("H F_s", faults, (t, q))
     }
 
-    /// `P_f` C, q x n: how the direct term reads the error e = x - `x_hat`; None without a direct term.
+    /// `P_f` C, q x n: the direct term adds this matrix times x - `x_hat` to `f_hat`; None without a direct term.
     pub(crate) fn direct(&self, plant: &FaultyPlant) -> Option<DMatrix<f64>> {
         self.p_f.as_ref().map(|p_f| p_f * &plant.c)
     }

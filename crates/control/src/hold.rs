@@ -1,4 +1,4 @@
-//! Exact discretisation of a linear system with an input that is constant or linear over the step, and back.
+//! Exact discretisation of a linear system whose input is constant or linear over the step, and its inverse.
 
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
@@ -90,7 +90,7 @@ impl FirstOrderHold {
 ///
 /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Returns (Phi,
 /// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. This
-/// is the plant as a sampled controller sees it that holds its output between samples. Method, source,
+/// is the plant for a sampled controller that holds its output between samples. Method, source,
 /// cost and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
 ///
 /// # Example
@@ -119,7 +119,8 @@ pub fn zero_order_hold(
 
 /// Computes A and B of the plant x' = A x + B u whose samples have Phi and Gamma: inverts [`zero_order_hold`].
 ///
-/// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants it is the one whose eigenvalues
+/// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants, the result is the one whose
+/// eigenvalues
 /// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: states
 /// balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I], [`logarithm_of_one_plus`].
 ///
@@ -208,7 +209,7 @@ macro_rules! fixed_sizes {
     };
 }
 
-/// out += M v, column by column; the same sums for every size.
+/// out += M v, column by column; the order of the sums is the same for every size.
 fn add_product(m: &DMatrix<f64>, v: &[f64], out: &mut [f64]) {
     fixed_sizes!(m, v, out; 1 2 3 4 5 6 7 8);
 }

@@ -11,10 +11,10 @@
 //! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their block Toeplitz matrix times the s
 //!    earlier samples is the extended observability matrix times `x[k]`, if (A - K C)^s is negligible.
 //! 3. The singular value decomposition of this product gives `x[k]` = T z, in the order of what the states explain.
-//! 4. `y[k]` on `x[k]`, `u[k]` gives C, D, d and `e[k]`; `x[k+1]` on `x[k]`, `u[k]`, `e[k]` gives A, B, K, b: least squares.
+//! 3. The singular value decomposition of this product gives `x[k]` = T z, the states ordered by their singular values.
 //!
-//! All of it depends on the samples by one triangular factor of constant size, [`Windows`]; factors of parts of a record,
-//! and of several records, are [joined](Windows::joined).
+//! The samples enter only by one triangular factor of constant size, [`Windows`]. Factors of parts of a record, and of
+//! several records, can be [joined](Windows::joined).
 //!
 //! Source: A. Chiuso, The role of vector autoregressive modeling in predictor-based subspace identification, Automatica 43
 //! (2007); M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge (2007), chapter 9; P. Van Overschee

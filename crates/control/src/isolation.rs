@@ -1,7 +1,7 @@
 //! Residual generators, decoupled from commands, disturbances and chosen faults, to detect and isolate faults.
 //!
-//! The plant is a [`DisturbedPlant`]. A residual has a pattern: one entry per fault, true if the
-//! residual responds to the fault, false if it is decoupled from it. The patterns of several
+//! The plant is a [`DisturbedPlant`]. A residual has a pattern: one entry per fault, true if the residual responds to
+//! the fault, false if the residual is decoupled from the fault. The patterns of several
 //! residuals are the rows of the structure matrix, whose columns are the signatures of the faults.
 //!
 //! 1. [`achievable_patterns`] lists the patterns that a plant admits.
@@ -24,7 +24,7 @@
 //! v' = (V' A - K C) V v + (V' B_u - K D_u) u + K y,   H y = H C V v + H D_u u        (2)
 //! ```
 //!
-//! holds for v = V' x and all e. Its observable part has the states z and the matrices `A_o`,
+//! (2) holds for v = V' x and all e. Its observable part has the states z and the matrices `A_o`,
 //! `C_o`. A generator of order k with one residual is a function of z: states ζ = T z and the
 //! residual r = c ζ + w (H y - H `D_u` u) with
 //!
@@ -32,12 +32,11 @@
 //! T A_o - F T = L C_o,   c T + w C_o = 0                                             (3)
 //! ```
 //!
-//! where F, c are a chain of k lags with the prescribed poles. (3) is linear in (L, w); its solutions
-//! are the left null space of one matrix, whose dimension follows from the observability indices of
-//! (2). The least k is taken for which all faults of the pattern have a gain; among the solutions the
-//! one is taken whose smallest gain is largest for a given effect of measurement noise. The
-//! decoupling of the result is verified on the given plant; if a coupling that counted as zero
-//! spoils it, it is computed again with a smaller tolerance.
+//! where F, c are a chain of k lags with the prescribed poles. (3) is linear in (L, w); its solutions are the left null
+//! space of one matrix, whose dimension follows from the observability indices of (2). k is the least order for which
+//! all faults of the pattern have a gain; the solution is the one whose smallest gain is largest for a given effect of
+//! measurement noise. The decoupling is verified on the given plant; if it fails because a coupling counted as zero,
+//! the generator is computed again with a smaller tolerance.
 //!
 //! Sources: M.-A. Massoumnia, A geometric approach to the synthesis of failure detection filters,
 //! IEEE Trans. Autom. Control 31 (1986), and, with G. C. Verghese and A. S. Willsky, Failure

@@ -6,7 +6,7 @@ use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// The parameters of the law.
+/// The parameter of [`learning`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learning {
     /// `K_1`: the factor of the previous estimate, above 0 and at most 1.
@@ -22,11 +22,10 @@ pub struct Learning {
 /// ```
 ///
 /// `K_2` = g F with F = `M_1` of [`DirectForm`], and L gives s the eigenvalue lambda; * w is the effect of the error of
-/// the other states. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v;
-/// lambda = p^2 / `K_1` and g = lambda + `K_1` - 2 p make it (z - p)^2, p = e^(-rate T): stable for every `K_1` above
-/// p^2. The estimate of a constant fault lacks the part
-/// (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) of it; nothing with `K_1` = 1, which is an integrator.
-/// The gains have M with A M = L as the gain of the correction.
+/// the other states. The characteristic polynomial of s and v is (z - lambda) (z - `K_1`) + g z. It is (z - p)^2 with
+/// p = e^(-rate T), lambda = p^2 / `K_1` and g = lambda + `K_1` - 2 p; lambda is stable for every `K_1` above p^2. The
+/// estimate of a constant fault lacks the part (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) of the fault,
+/// zero for `K_1` = 1, an integrator. The gain of the correction in the result is M with A M = L.
 ///
 /// Source: W. Chen and M. Saif, An iterative learning observer-based approach to fault detection and accommodation in
 /// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and An iterative learning observer for

@@ -13,14 +13,14 @@ use nalgebra::DMatrix;
 /// f_hat = f_hat_i + P_f (y - C x_hat),  f_hat_i' = A_f f_hat_i + L_f (y - C x_hat),  P_f = part T L_f
 /// ```
 ///
-/// The lag of `f_hat_i` behind a fault whose rate is constant (for a ramp model: whose second derivative is
-/// constant) is T times this rate; for constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that
-/// `f_hat` = `f_hat_i` + part T `f_hat_i`'. `part` = 1 removes the lag: for constant fault models a ramp leaves no
-/// lasting error. `part` = 0 gives the augmented observer. `gains`: those of the augmented observer; its error dynamics
-/// must be stable. In sampled time with a current estimator, `x_hat` in the first equation is the corrected estimate.
-/// The law exists whenever the augmented observer does.
+/// T is the matrix of the lag: if the rate of a fault is constant (for a ramp model: its second derivative), `f_hat_i`
+/// lags behind by T times this rate. For constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that `f_hat` =
+/// `f_hat_i` + part T `f_hat_i`'. `part` = 1 removes the lag: for constant fault models a ramp leaves no lasting error.
+/// `part` = 0 gives the augmented observer. `gains`: those of the augmented observer; its error dynamics must be
+/// stable. In sampled time with a current estimator, `x_hat` in the first equation is the corrected estimate. The law
+/// exists whenever the augmented observer does.
 ///
-/// The price is noise: in continuous time `P_f` passes measurement noise of any frequency to `f_hat`.
+/// In continuous time `P_f` passes measurement noise of any frequency to `f_hat`.
 ///
 /// Source: proportional and integral correction of B. Wojciechowski, Analysis and synthesis of
 /// proportional-integral observers for single-input-single-output time-invariant continuous systems,
@@ -44,7 +44,7 @@ pub fn proportional_integral(
     let holds = part.is_finite() && part >= 0.0;
     check::that(holds, "proportional", part, "a finite number of at least 0")?;
     let (n, q) = plant.f_a.shape();
-    // The states of the fault models with f' = 0: the last one of each model.
+    // The states of the fault models that are constant: the last one of each model.
     let change = &plant.a_f - DMatrix::identity(q, q) * domain.constant();
     let constant: Vec<usize> = (0..q).filter(|&j| change.row(j).amax() <= 0.0).collect();
     let mut rates = DMatrix::zeros(n + q, constant.len());

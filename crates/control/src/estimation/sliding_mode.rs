@@ -6,10 +6,10 @@ use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
-/// The part of a constant fault, small compared with rho, that the estimate lacks because of the boundary layer.
+/// The part of a constant fault, small compared with rho, by which the boundary layer makes the estimate too small.
 const LEFT: f64 = 0.01;
 
-/// The parameters of the law, one number for each fault, in its unit.
+/// The parameters of [`sliding_mode`], one number for each fault, in the unit of the fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlidingMode {
     /// rho, above the largest fault.
@@ -27,15 +27,14 @@ pub struct SlidingMode {
 /// s[k+1] = lambda s[k] + f[k] - nu[k] + * w
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is the effect of the
-/// error of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with
-/// lambda - rho / delta. The default of delta makes this e^(-rate T); with lambda = 1 - 0.01 (1 - e^(-rate T)) the
-/// estimate then lacks 1 % of a small constant fault, and rho / (rho - |f|) times as much of a larger one. The
-/// result has M with A M = L as the gain of the correction of `x_hat`; its `L_f` is (rho / delta) F; the observer
-/// itself uses F and the nonlinear function.
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is the effect of the error
+/// of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho /
+/// delta. The default of delta makes this e^(-rate T). With lambda = 1 - 0.01 (1 - e^(-rate T)), the estimate of a
+/// small constant fault is 1 % too small; the error of a larger fault is rho / (rho - |f|) times as large. In the
+/// linearisation, the gain of the correction of `x_hat` is M with A M = L, and `L_f` is (rho / delta) F; the observer
+/// itself uses F and the nonlinear nu.
 ///
-/// The estimate is bounded by rho whatever the measurements are. The error stays bounded if every |`f_i`| is
-/// below `rho_i`.
+/// The estimate never exceeds rho. The error stays bounded if every |`f_i`| is below `rho_i`.
 ///
 /// Source: C. Edwards, S. K. Spurgeon and R. J. Patton, Sliding mode observers for fault detection and isolation,
 /// Automatica 36 (2000): injection rho P e / (|P e| + delta) and reconstruction by its equivalent value. There the

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use crate::svd::Svd;
 use crate::{Error, check};
 
-/// The inverse condition number of rows of unit length above which measurements and rates are independent.
+/// Measurements and rates are independent if their rows, of unit length, have an inverse condition number above this.
 const SMALLEST: f64 = 1e-3;
 
 /// States of a continuous plant that are its measurements and their rates.

@@ -31,10 +31,10 @@ pub struct IdentifiedModel {
 }
 
 impl IdentifiedModel {
-    /// Predicts the outputs of the samples in `range`, p x its length, from the inputs and, at the first and each
-    /// `horizon`-th sample after it, the s samples before it.
+    /// Predicts the outputs of the samples in `range`, one column for each, from the inputs. At the first sample and
+    /// every `horizon` samples, the state is estimated from the s samples before.
     ///
-    /// With the length of the range as horizon it is a simulation; a horizon of 0 counts as 1.
+    /// A horizon of the length of the range gives a simulation; 0 counts as 1.
     ///
     /// # Errors
     ///
@@ -68,7 +68,7 @@ impl IdentifiedModel {
         Ok(predictions)
     }
 
-    /// The model of the signals in other units: those of this model times `units`, [u; y].
+    /// Converts the model to signals that are the signals of this model, [u; y], times `units`.
     pub(super) fn in_units(mut self, units: &[f64]) -> Self {
         let inputs = self.b.ncols();
         for (input, unit) in units[..inputs].iter().enumerate() {

@@ -7,9 +7,9 @@ use crate::identification::{IdentifiedModel, Windows};
 use crate::svd::Svd;
 use crate::{Error, check};
 
-/// Singular values below this part of the largest one are rounding.
+/// Singular values below this part of the largest one count as rounding errors.
 const ROUNDING: f64 = 1e-12;
-/// Innovations below this part of the deviation of the outputs are rounding.
+/// Innovations below this part of the deviation of the outputs count as rounding errors.
 const NO_INNOVATION: f64 = 1e-9;
 
 /// The state sequence that the samples determine, for models of every order.
@@ -36,7 +36,7 @@ const NO_INNOVATION: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Subspace {
     windows: Windows,
-    /// The factor of the deviations of the windows from their means, these means, and the units of the signals in both.
+    /// The factor of the deviations of the windows from `means`, with signals in `units`.
     factor: DMatrix<f64>,
     means: DVector<f64>,
     units: Vec<f64>,
@@ -65,7 +65,8 @@ impl Subspace {
         let (factor, units) = windows.scaled();
         let width = factor.ncols() - 1;
         let means = factor.row(0).columns(1, width).transpose() / factor[(0, 0)];
-        // Without its first row the factor is that of the deviations, which would count as rounding beside large means.
+        // The factor of the deviations is the factor without its first row; beside large means they would count as
+        // rounding.
         let factor = factor.view((1, 1), (width, width)).into_owned();
         let outputs = factor.columns(past + m, windows.outputs).into_owned();
         let svd = Svd::new(&factor.columns(0, regressors).into_owned())?;
@@ -149,7 +150,7 @@ fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMat
     })
 }
 
-/// The coefficients of least squares, one row for each column of `targets`, and the residuals of the targets.
+/// Least squares: the coefficients, one row for each column of `targets`, and the residuals of the targets.
 fn regression(
     parts: &[&DMatrix<f64>],
     targets: &DMatrix<f64>,

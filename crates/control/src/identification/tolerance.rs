@@ -1,4 +1,4 @@
-//! The tolerance of matrices that is as large as the uncertainty of an identification.
+//! The tolerance of matrix entries that is equivalent to the uncertainty of an identification.
 
 use nalgebra::DMatrix;
 
@@ -24,7 +24,7 @@ pub struct ResponseUnits {
 /// The relative tolerance of the entries of `plant` that moves its frequency response as far as two standard deviations
 /// of its estimate do.
 ///
-/// `estimate`: the same plant, or the sampled one of which `plant` is the continuous one; `parts`: the estimates from the same
+/// `estimate`: `plant`, or the sampled plant whose continuous form is `plant`; `parts`: the estimates from the same
 /// samples without one of g blocks each, the jackknife. With the distance
 ///
 /// ```text
@@ -33,10 +33,10 @@ pub struct ResponseUnits {
 ///
 /// of responses in units of the signals, the estimate G has the variance (g - 1) / g times the sum of d(G, `G_i`)^2.
 /// Independent entries of A, B, C and D with relative deviation r give r^2 times the sum of the squared derivatives
-/// of d by the logarithm of each entry. Zeros and rows of C with a single 1 are exact. The result, 2 r, depends
-/// neither on units nor on the scales of the states; it is not finite if no entry varies, and zero for fewer than two
-/// parts. For one input and one output d is the chordal distance of the responses, which weighs the frequencies near
-/// a gain of one, where a feedback acts, most.
+/// of d by the logarithm of each entry. Zeros and rows of C with a single 1 are exact. The result, 2 r, depends neither
+/// on units nor on the scales of the states; it is not finite if no entry varies, and zero for fewer than two parts.
+/// For one input and one output d is the chordal distance of the responses. It gives the most weight to frequencies
+/// near a gain of one, where a feedback acts.
 ///
 /// Source: B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), equation 3.6; G. Vinnicombe, Frequency
 /// domain uncertainty and the graph topology, IEEE Trans. Autom. Control 38 (1993).

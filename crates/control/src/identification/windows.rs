@@ -101,7 +101,7 @@ impl Windows {
         Ok(Self { past, inputs, outputs, count: range.len(), factor })
     }
 
-    /// The windows of all parts together, which are of the same signals and the same s.
+    /// Joins the windows of all parts, which must have the same signals and the same s.
     ///
     /// # Errors
     ///
@@ -170,11 +170,11 @@ impl Windows {
         1..1 + self.past * self.signals()
     }
 
-    /// The factor of signals divided by their units, and these units: their deviations; 1 for a constant signal, and
-    /// without windows.
+    /// Returns the factor of signals divided by their units, and the units: the deviations, or 1 for a constant signal
+    /// and without windows.
     ///
     /// A signal counts as constant if its deviation is at most the rounding of the factorisation, one eps of the mean
-    /// for each row; deviations of a column that are smaller are zero in the factor.
+    /// for each row; smaller deviations of a column are zero in the factor.
     pub(super) fn scaled(&self) -> (DMatrix<f64>, Vec<f64>) {
         let rounding = f64::EPSILON * as_number(self.count + self.factor.nrows());
         let mut units = self.deviations();
@@ -197,7 +197,7 @@ impl Windows {
     }
 }
 
-/// The triangular factor of matrices below each other.
+/// The triangular factor of the stacked matrices.
 fn stacked_factor(parts: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let all = parts[1..].iter().fold(parts[0].clone(), |all, part| stacked(&all, part));
     all.qr().r()
