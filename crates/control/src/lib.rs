@@ -9,7 +9,7 @@
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
 //! | extended and unscented Kalman filters for nonlinear plants | [`nonlinear_filter`] |
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
-//! | commands without an actuator: control allocation, equilibrium | [`allocation`] |
+//! | commands after the failure of an actuator: control allocation, equilibrium | [`allocation`] |
 //! | test which faults can be estimated | [`detectability`] |
 //! | a plant from samples of its inputs and outputs: subspace identification | [`identification`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
@@ -23,11 +23,11 @@
 //! | bound of the estimation error with a proof | [`theorem1`] |
 //! | loop shaping: mixed sensitivity for gains of a given structure | [`tuning`] |
 //! | weights over frequency | [`weight`] |
-//! | loss of effectiveness: its estimate, which losses the loop bears | [`losses`] |
+//! | loss of effectiveness: its estimate, the losses for which the loop is stable | [`losses`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
 //! | discretisation and back, matrix exponential and logarithm | [`hold`], [`exponential`], [`logarithm`] |
-//! | matrices below and beside each other | [`blocks`] |
+//! | block matrices | [`blocks`] |
 //! | eigenvalues, Lyapunov equations, reproducible products | [`eigen`], [`lyapunov`], [`product`] |
 //!
 //! # Conventions

@@ -7,8 +7,8 @@ use crate::blocks::{beside, stacked};
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
-/// z' = A z + `B_u` u + K y + `B_f` f, `y_h` = H y - `D_u` u = C z + `D_f` f, for all values of the unknown
-/// inputs; (A, C) observable.
+/// The observable part of (2) of [`crate::isolation`], which holds for all unknown inputs: z' = A z + `B_u` u + K y +
+/// `B_f` f, `y_h` = H y - `D_u` u = C z + `D_f` f.
 pub(super) struct DecoupledPart {
     pub(super) a: DMatrix<f64>,
     pub(super) b_u: DMatrix<f64>,
@@ -58,8 +58,8 @@ impl Gap {
 impl DecoupledPart {
     /// Decouples the disturbances and the faults with `decoupled[fault]`; None if no measurements are left.
     ///
-    /// `plant`: in balanced coordinates. Outputs are scaled to rows of C of length one, unknown inputs
-    /// to columns of length one, A to its norm; a singular value below `tolerance` counts as zero.
+    /// `plant`: in balanced coordinates. Rows of C and columns of unknown inputs are scaled to length one, A is divided
+    /// by its norm; a singular value below `tolerance` counts as zero.
     pub(super) fn new(
         plant: &DisturbedPlant,
         decoupled: &[bool],
@@ -160,9 +160,9 @@ pub(super) fn complement(
     Ok(svd.right.columns(rank, m.nrows() - rank).into_owned())
 }
 
-/// An orthonormal basis of the observable states of (A, C), and how many of them y, y', ... each add.
+/// An orthonormal basis of the observable states of (A, C), and the numbers of states that y, y', ... each add.
 ///
-/// Method: the staircase algorithm without further scaling, which enlarges rounding errors; narrows `gap`.
+/// Method: the staircase algorithm; further scaling would enlarge rounding errors. Narrows `gap`.
 pub(super) fn observable_states(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

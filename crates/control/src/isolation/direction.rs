@@ -1,4 +1,4 @@
-//! The member of a family of residuals whose weakest fault is strongest.
+//! The member of a family of residuals with the largest gain for its weakest fault.
 
 use crate::balance::unit_columns;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -11,12 +11,12 @@ const SWEEPS: usize = 2000;
 pub(super) struct Direction {
     /// One factor for each member.
     pub(super) factors: DVector<f64>,
-    /// The smallest relative gain of the faults. The gain of a fault is relative to the largest that the
-    /// fault can have for the same effect of noise: 1 if each fault has its largest gain.
+    /// The smallest relative gain of the faults. The gain of a fault is relative to the largest gain that this fault
+    /// can have for the same effect of noise: 1 if each fault has its largest gain.
     pub(super) quality: f64,
 }
 
-/// The combination with the largest smallest gain for a given effect of noise.
+/// The combination whose smallest gain of a fault is largest for a given effect of noise.
 ///
 /// ```text
 /// max over v of min over j of |g_j' v| / |g_j|_W,  v' W v = 1,  |g|_W^2 = g' W^-1 g

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 const NOISE_POINTS: u32 = 40;
 const NOISE_DECADES: f64 = 4.0;
 
-/// A basis of all solutions of (3) of the module for given poles `p_1`, ..., `p_k`.
+/// A basis of all solutions of (3) of [`crate::isolation`] for given poles `p_1`, ..., `p_k`.
 ///
 /// The states are a chain of lags `zeta_i'` = `p_i` `zeta_i` + `g_i` `zeta_(i-1)` + `L_i` (H y - `D_u` u) +
 /// ..., so that row by row
@@ -109,7 +109,8 @@ impl Family {
         (0..part.b_f.ncols()).map(size).collect()
     }
 
-    /// W: the combination v has the variance v W v' per frequency for noise of the intensity `noise[i]`^2.
+    /// W: the residual of the combination v has the variance v W v' per frequency for noise of the intensity
+    /// `noise[i]`^2.
     ///
     /// The mean over 40 frequencies: in continuous time over four decades up to ten times `fastest`, the
     /// rate of the fastest pole; in sampled time evenly from 0 to pi / period.

@@ -9,10 +9,10 @@ use crate::residual::ResidualGenerator;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
-/// A gain counts as zero below this times the accuracy of the family.
+/// A gain below this multiple of the accuracy of the family counts as zero.
 const ACCURACIES: f64 = 10.0;
-/// A decoupling error up to this comes from rounding of the data; a larger one comes from a coupling that
-/// counted as zero, so that smaller tolerances are tried.
+/// A decoupling error up to this comes from rounding of the data; a larger error comes from a coupling that counted as
+/// zero, so that smaller tolerances are tried.
 const DECOUPLED: f64 = 1e-6;
 /// While the decoupling error is above `DECOUPLED`, a tolerance above this is divided by 100: all are above 1e-14.
 const SMALLEST_TOLERANCE: f64 = 1e-12;
@@ -30,7 +30,7 @@ pub struct Requirements {
     /// The frequency, in rad per unit of time, from 0, at which the residual must respond to each fault
     /// of its pattern: 0 for constant faults.
     pub frequency: f64,
-    /// The smallest accepted gain of a fault, relative to its largest for the same effect of noise, in (0, 1).
+    /// The smallest accepted gain of a fault, relative to its largest gain for the same effect of noise, in (0, 1).
     pub quality: f64,
     /// Relative singular values below this count as zero. If the residual then is not decoupled up to
     /// 1e-6 (see [`Residual::decoupling_error`]), smaller values are tried.
@@ -101,11 +101,11 @@ pub struct Residual {
     /// The gain of each fault at the required frequency; the largest of the pattern has the modulus 1. The
     /// gain of a single fault of the pattern at frequency 0 is 1.
     pub gains: Vec<Complex<f64>>,
-    /// The smallest relative gain of the faults of the pattern. The gain of a fault is relative to the
-    /// largest that it can have for the same effect of noise.
+    /// The smallest relative gain of the faults of the pattern. The gain of a fault is relative to the largest gain
+    /// that this fault can have for the same effect of noise.
     pub quality: f64,
-    /// Number of modes of the plant that no command, disturbance or fault moves. Their initial
-    /// values count as zero: they may appear in the residual.
+    /// Number of modes of the plant that no command, disturbance or fault moves. They count as zero; with other initial
+    /// values they may appear in the residual.
     pub unreachable: usize,
     /// The smallest relative singular value that counted as nonzero, and the largest that counted
     /// as zero: the wider apart, the more certain the decoupling.

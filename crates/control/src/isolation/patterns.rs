@@ -9,26 +9,26 @@ use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, VecDeque};
 
-/// More patterns than this are not enumerated.
+/// Largest number of patterns.
 const PATTERNS: usize = 4096;
 
 /// A pattern that some residual generator has.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct AchievablePattern {
-    /// One entry per fault: whether the residual responds to it, at some frequency.
+    /// One entry per fault: whether the residual responds to it at some frequency.
     pub pattern: Vec<bool>,
-    /// Whether it responds to each of these faults at the required frequency, too: for frequency 0,
+    /// Whether a residual of this pattern responds to all its faults at the required frequency, too: for frequency 0,
     /// whether constant faults stay visible.
     pub strong: bool,
 }
 
 /// All patterns of residuals that are decoupled from the commands and the disturbances.
 ///
-/// `requirements`: its frequency decides which patterns are strong, its tolerance which singular values count
-/// as zero; the other fields are only checked. Starting with no fault decoupled, further faults are decoupled
-/// one by one; faults to which no residual then responds are decoupled with them. Patterns with most faults
-/// come first. Up to 2^q sets of faults, each at the cost of the decoupling, about 20 n^3 multiplications.
+/// `requirements`: the frequency decides which patterns are strong, the tolerance which singular values count as zero;
+/// the other fields are only checked. Starting with no fault decoupled, further faults are decoupled one by one; faults
+/// to which no residual then responds are decoupled with them. Patterns with most faults come first. Cost: up to 2^q
+/// decouplings of about 20 n^3 multiplications.
 ///
 /// Source: A. Varga, Solving fault diagnosis problems (2017), section 5.4; the recursion of his genspec, on
 /// unobservability subspaces in place of rational null spaces.

@@ -14,12 +14,12 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Largest number of inputs with a loss: a box over k inputs has 2^k corners.
+/// Largest number of inputs with a loss, as a box over k inputs has 2^k corners.
 const MOST_INPUTS: usize = 6;
 /// Number of points between no loss and the largest loss at which stability is tested.
 const POINTS: u32 = 50;
 const BISECTIONS: usize = 40;
-/// Largest number of directions from no loss that are tested.
+/// Largest number of tested rays from zero loss.
 const DIRECTIONS: usize = 70;
 
 /// The loop of a plant and a controller as a function of the losses E of its actuators.
@@ -42,12 +42,12 @@ pub struct LossyLoop {
     pub domain: Domain,
 }
 
-/// How large constant losses may become.
+/// The limit of constant losses.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ConstantLimit {
-    /// The factor of the box up to which the loop is stable; `most` if it is stable in the whole box, 0 if it
-    /// is not stable without loss.
+    /// The factor of the box up to which the loop is stable; the argument `most` if it is stable in the whole box, 0 if
+    /// it is not stable without loss.
     pub factor: f64,
     /// The losses at which the loop becomes unstable; the least stable of the tested losses on the far faces
     /// of the box if the loop is stable in the whole box.

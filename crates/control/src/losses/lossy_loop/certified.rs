@@ -7,7 +7,7 @@ use crate::stability::instability;
 
 /// Relative accuracy of the largest certified factor and of the largest certified decay rate.
 const WIDTH: f64 = 1e-2;
-/// The smallest decay rate that is tried, relative to the slowest of the corners.
+/// The smallest decay rate that is tried, relative to the slowest decay rate of a corner.
 const SLOWEST: f64 = 1e-3;
 
 /// A box of losses for which a loop is proven stable, also if they vary.
