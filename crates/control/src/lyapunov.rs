@@ -16,7 +16,7 @@ const ALLOWED_RESIDUAL: f64 = 1e-9;
 const REFINEMENTS: usize = 2;
 /// From this order on the equations are solved by doubling first.
 const LARGE: usize = 48;
-/// A solution with a residual above this is compared with that of the other method.
+/// A solution with a residual above this is compared with the solution of the other method.
 const GOOD_RESIDUAL: f64 = 1e-12;
 
 /// The solution P of A' P + P A = -Q or A' P A - P = -Q.
@@ -30,8 +30,8 @@ pub struct Solution {
     /// `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
     pub residual: f64,
     /// Norm of the left side plus Q relative to the norm of Q (Frobenius); for Q = 0 the norm itself. For a badly
-    /// scaled A the rounding of P alone keeps it far above the rounding error; below 1 / sqrt(n) with Q = I it still
-    /// proves A stable.
+    /// scaled A, rounding of P alone makes the defect much larger than eps. With Q = I and a positive definite P, a
+    /// defect below 1 / sqrt(n) proves A stable.
     pub defect: f64,
 }
 
@@ -39,11 +39,10 @@ pub struct Solution {
 ///
 /// `a`: n x n, Hurwitz; `q`: n x n, symmetric. The solution exists and is unique, and is symmetric
 /// positive definite when Q is. Method: balancing of A, complex Schur form, substitution (Bartels
-/// and Stewart), refinement; about 100 n^3 multiplications. From 48 states on a Cayley transform and
-/// doubling (R. A. Smith, SIAM J. Appl. Math. 16, 1968) come first, about 3 n^3 multiplications of the
-/// fastest kind for each of some 15 doublings. A result with a residual above 1e-12 is compared with that
-/// of the other method, and the one with the smaller residual is returned. Every entry of the residual is
-/// at most 1e-9 of the sum of its absolute terms.
+/// and Stewart), refinement; about 100 n^3 multiplications. From 48 states on, doubling after a Cayley transform (R. A.
+/// Smith, SIAM J. Appl. Math. 16, 1968) is tried first: about 15 matrix doublings of 3 n^3 multiplications each. If the
+/// residual is above 1e-12, the other method is used, too, and the result with the smaller residual is returned. Every
+/// entry of the residual is at most 1e-9 of the sum of its absolute terms.
 ///
 /// Source: R. H. Bartels and G. W. Stewart, Solution of the matrix equation A X + X B = C, Comm.
 /// ACM 15 (1972), algorithm 432.
@@ -189,7 +188,7 @@ impl Equation {
             Some(p) if residual(&p) <= GOOD_RESIDUAL => p,
             _ => by_schur_form()?,
         };
-        // Doubling adds terms of one sign, which keeps the digits of small entries beside large ones.
+        // Doubling adds terms of one sign, so that small entries beside large ones keep their precision.
         let p = match (residual(&p) > GOOD_RESIDUAL).then(by_doubling).flatten() {
             Some(other) if residual(&other) < residual(&p) => other,
             _ => p,

@@ -7,22 +7,22 @@
 //! ```
 //!
 //! where faults are part of z, both filters keep the mean z and the covariance P of the estimate. They differ in how
-//! they transform these by g and h:
+//! mean and covariance pass g and h:
 //!
 //! * **extended**: g and h are replaced by their tangents at the mean, with the Jacobians G and H:
 //!   P becomes G P G' + W, the gain is P H' (H P H' + V)^-1 (A. H. Jazwinski, Stochastic Processes and Filtering Theory, 1970,
 //!   section 8.3);
 //! * **unscented**: g and h are evaluated at 2 N points, z plus and minus the columns of a square root of N P; means and
 //!   covariances are those of the values (S. J. Julier, J. K. Uhlmann, H. F. Durrant-Whyte, American Control Conference 1995,
-//!   without a point at the mean: then each covariance is that of points, and has no negative variance. I. Arasaratnam and
+//!   without a point at the mean, so that all weights are positive and no variance is negative. I. Arasaratnam and
 //!   S. Haykin, IEEE Trans. Autom. Control 54 (2009), derive the same points from a cubature rule).
 //!
-//! For a linear plant both are the Kalman filter of [`crate::riccati::kalman`], before it is stationary.
+//! For a linear plant both are the Kalman filter whose stationary form is [`crate::riccati::kalman`].
 
 use crate::check::as_number;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// A pivot of a covariance below this part of its variance, times the order, is rounding.
+/// A pivot of a Cholesky factor below this part of its variance, times the order, is a rounding error.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A plant in sampled time, z having N states and faults and y having p measurements.
@@ -100,9 +100,9 @@ pub struct NonlinearFilter {
     points: DMatrix<f64>,
     /// The measurements at `points`, as columns.
     measured: DMatrix<f64>,
-    /// S, the covariance of the innovation; its factor after a correction.
+    /// S, the covariance of the innovation; a correction replaces it by its Cholesky factor.
     s: DMatrix<f64>,
-    /// The covariance of y and z, p x N; multiplied by an inverse after a correction.
+    /// The covariance of y and z, p x N; a correction overwrites it.
     cross: DMatrix<f64>,
     /// The transpose of H, then the gain K, N x p.
     gain: DMatrix<f64>,
@@ -145,8 +145,8 @@ impl NonlinearFilter {
     ///
     /// # Errors
     ///
-    /// [`FilterError::Plant`]. The extended filter then has the mean that the plant left. [`FilterError::NotFinite`];
-    /// the estimate is of no use then.
+    /// [`FilterError::Plant`]; the mean of the extended filter is then what the plant has written.
+    /// [`FilterError::NotFinite`]; the estimate cannot be used any more.
     pub fn predict<M: SampledPlant>(
         &mut self,
         plant: &mut M,
@@ -173,7 +173,7 @@ impl NonlinearFilter {
         check_finite(&self.covariance)
     }
 
-    /// Corrects the estimate by those of the measurements `y` for whose index `is_due` is true.
+    /// Corrects the estimate by the measurements `y[k]` for which `is_due(k)` is true.
     ///
     /// `y`: p numbers. Returns e' S^-1 e with the innovation e and its covariance S; if the filter is consistent, its
     /// mean is the number of measurements that are due.

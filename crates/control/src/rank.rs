@@ -1,6 +1,6 @@
 //! Controllability and observability: the rank decision, the uncontrollable and the unobservable modes.
 //!
-//! [`crate::distance`] measures the distance of a pair from the nearest one without the property.
+//! [`crate::distance`] measures the distance of a pair from the nearest uncontrollable or unobservable pair.
 
 mod part;
 mod staircase;
@@ -23,7 +23,7 @@ const DOMINANT: f64 = 0.5;
 pub struct Rank {
     /// Rank of the controllability or observability matrix.
     pub rank: usize,
-    /// Number of states; the pair is controllable or observable when `rank` equals it.
+    /// Number of states n; the pair is controllable or observable when `rank` equals n.
     pub n: usize,
     /// Singular values at or below this count as zero, relative to the scaled matrix.
     pub tolerance: f64,
@@ -38,9 +38,9 @@ pub struct Rank {
 pub struct Mode {
     /// Its eigenvalue.
     pub eigenvalue: Complex<f64>,
-    /// An eigenvector of length one in the given coordinates, its largest entry real and positive:
-    /// v with A v = s v, C v = 0 for an unobservable mode: the motion that the measurements do not
-    /// show; w with w' A = s w', w' B = 0 for an uncontrollable one: no input moves w' x.
+    /// An eigenvector of length one in the given coordinates, its largest entry real and positive. For an unobservable
+    /// mode v with A v = s v, C v = 0: the measurements do not show a motion along v. For an uncontrollable mode w with
+    /// w' A = s w', w' B = 0: no input moves w' x.
     pub vector: DVector<Complex<f64>>,
     /// Indices, from zero, of the states whose entries of the vector, in balanced coordinates, are
     /// at least half of the largest one; largest first.
@@ -59,8 +59,8 @@ impl Rank {
 ///
 /// `a`: n x n; `b`: n x m. The powers of A are never formed: the staircase algorithm reduces (A, B)
 /// by orthogonal transformations and adds up the ranks of its steps, after balancing the states and
-/// giving each input unit length. If this rank is not full, it is also computed without balancing, and
-/// the larger one counts. About 20 n^3 multiplications, for each. Tolerance: 100 n eps, relative to the
+/// giving each input unit length. If this rank is not full, it is also computed without balancing, and the larger rank
+/// counts. Each computation has about 20 n^3 multiplications. Tolerance: 100 n eps, relative to the
 /// norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability,
@@ -115,7 +115,7 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<(
     Err(Error::NotObservable { rank: rank.rank, n: rank.n })
 }
 
-/// The uncontrollable modes of x' = A x + B u: as many as the rank is below n.
+/// The uncontrollable modes of x' = A x + B u, n minus the rank of them.
 ///
 /// `a`: n x n; `b`: n x m. They are the eigenvalues of the uncontrollable block of the staircase
 /// form, so that their number agrees with [`controllability`]. A multiple eigenvalue with a single
@@ -130,7 +130,7 @@ pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mo
     modes_of(&Staircase::new(a, b)?)
 }
 
-/// The unobservable modes of x' = A x, y = C x: as many as the rank is below n.
+/// The unobservable modes of x' = A x, y = C x, n minus the rank of them.
 ///
 /// `a`: n x n; `c`: p x n. Method: [`uncontrollable_modes`] of (A', C').
 ///
@@ -178,7 +178,7 @@ fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
     values.iter().enumerate().map(mode).collect()
 }
 
-/// The mode with these coordinates of its left eigenvector in the basis of the uncontrollable states.
+/// Creates the mode whose left eigenvector has these coordinates in the basis of the uncontrollable states.
 fn mode_in_given_coordinates(
     eigenvalue: Complex<f64>,
     staircase: &Staircase,

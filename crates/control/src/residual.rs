@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 /// x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k],  r[k] = C x_r[k] + D_u u[k] + D_y y[k]    sampled
 /// ```
 ///
-/// Without faults, disturbances and noise r converges to 0 for all commands, so that r differs from 0 only
-/// if one of them acts on the plant. The fields are public; functions that return a `Result` check them.
+/// Without faults, disturbances and noise r converges to 0 for all commands. The fields are public; functions that
+/// return a `Result` check them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualGenerator {
     /// A, n x n.

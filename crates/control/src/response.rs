@@ -15,7 +15,7 @@
 //! | z for a step or a ramp of w | [`step_response`], [`ramp_response`], [`settled_output`] |
 //! | bounds of errors and states of the loop of [`crate::aso`] under bounded faults | [`fault_bounds`] |
 //! | peak gains of a sampled loop at all times, between its samples too | [`gains_between_samples`] |
-//! | response of that loop to a reversal of friction | [`reversal`] |
+//! | response of the loop of [`crate::aso`] to a reversal of friction | [`reversal`] |
 
 mod between_samples;
 mod energy;

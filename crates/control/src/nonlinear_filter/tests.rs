@@ -1,4 +1,4 @@
-//! Closed forms, and the linear filter.
+//! Tests against closed forms and the linear Kalman filter.
 
 use std::convert::Infallible;
 
@@ -50,7 +50,7 @@ impl SampledPlant for Linear {
     }
 }
 
-/// One state that stays, of which the square is measured.
+/// One constant state, whose square is measured.
 struct Square;
 
 impl SampledPlant for Square {
@@ -120,8 +120,8 @@ fn for_a_linear_plant_both_transforms_give_the_same_estimate() {
     assert!((one.2 - other.2).abs() < 1e-12);
 }
 
-/// For z of mean m and variance P, the mean of the square is m^2 + P, which its tangent does not know. Its covariance with z
-/// is 2 m P for both.
+/// For z of mean m and variance P, the mean of z^2 is m^2 + P; the extended filter takes m^2. The covariance of z^2 and
+/// z is 2 m P for both.
 #[test]
 fn the_unscented_transform_knows_the_mean_of_a_square() {
     let (mean, variance, v, y) = (3.0, 0.25, 0.5, 10.0);

@@ -23,8 +23,8 @@ pub struct SampledLoop<'a> {
     pub period: f64,
 }
 
-/// Computes upper bounds of the peak gains of a sampled loop over all times, not over the samples only: from
-/// arbitrary faults, from f' of faults without jumps, and from what the compensation leaves of such faults.
+/// Computes upper bounds of the peak gains of a sampled loop over all times, not over the samples only: from arbitrary
+/// faults, from f' of faults without jumps, and from the part of such faults that is not compensated.
 ///
 /// ```text
 /// x(kT + t) = Phi(t) x[k] + Gamma(t) u[k] + integral of e^(A (t - s)) F_a f(kT + s) ds over s from 0 to t
@@ -37,8 +37,9 @@ pub struct SampledLoop<'a> {
 ///
 /// The fault is constant over each part, with any sequence of values, and x is read at the start of each
 /// part; with growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With
-/// N = 1 they are those of [`super::fault_gains`], that of f' times T: the fault changes only at the samples,
-/// and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
+/// N = 1 they are those of [`super::fault_gains`], where the gain from f' is multiplied by T: the fault changes only at
+/// the samples, and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and
+/// samples.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
 /// Systems, Springer (1995), chapter 10.
@@ -136,7 +137,7 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The effects of f', with one value for each part: f in part j is f[k] + h times the sum of the values before.
+    /// The effects of f', with one value for each part: f in part j is f[k] + h times the sum of the earlier values.
     fn rates(&self) -> Effects {
         let count = self.parts();
         let sum = |i: usize, r: usize| {

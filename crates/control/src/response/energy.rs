@@ -11,13 +11,13 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Energy {
-    /// The H2 norm: the root of the trace. The root-mean-square value of z under white noise of
-    /// unit intensity; also the root of the energy of z summed over an impulse at each input.
+    /// The H2 norm: the root of the trace of the covariance, see [`energy`]. The root-mean-square value of z under
+    /// white noise of unit intensity; also the root of the energy of z summed over an impulse at each input.
     pub h2: f64,
-    /// The generalised H2 norm: the root of the largest eigenvalue. The largest Euclidean length of
-    /// z that an input of unit energy can cause.
+    /// The generalised H2 norm: the root of the largest eigenvalue of the covariance. The largest Euclidean length of z
+    /// that an input of unit energy can cause.
     pub peak: f64,
-    /// The roots of the diagonal: the largest |`z_i`| that an input of unit energy can cause, p.
+    /// The roots of the diagonal of the covariance: the largest |`z_i`| that an input of unit energy can cause, p.
     pub peaks: Vec<f64>,
 }
 
@@ -54,7 +54,7 @@ pub struct Energy {
 pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     system.check()?;
     let covariance = match covariance(system) {
-        // States that w does not reach have the covariance zero; the computed one is rounding alone.
+        // The covariance of states that w does not reach is zero; rounding alone gives it a large relative residual.
         Err(error @ Error::ResidualTooLarge { .. }) => match reachable_part(system)? {
             Some(part) => covariance(&part)?,
             None => return Err(error),
