@@ -26,19 +26,19 @@ pub struct FaultBounds {
 /// |z_i| <= sum over j of min(gain_f[i,j] F_j, gain_r[i,j] R_j + gain_d[i,j] F_j)
 /// ```
 ///
-/// z = [x; e; eps]; `gain_f` is the [`super::peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that
-/// of the two halves of the inputs of [`super::fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|,
-/// above zero; `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, above zero, infinite if the fault may jump
-/// (in sampled time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
-/// rest with the commands within the limits of the actuators, and each of the two terms alone is
-/// the least upper bound for its class of faults. Unlike delta of theorem 1, each quantity has its
-/// own bound in its own unit. The bounds are the upper ends of brackets of relative width 1e-3.
+/// z = [x; e; eps]; `gain_f` has the [`super::peak_gain`] of [`fault_system`], `gain_r` and `gain_d` have the peak
+/// gains of the two halves of the inputs of [`super::fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|, above
+/// zero; `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, above zero, infinite if the fault may jump (in sampled
+/// time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for the linear loop from rest, with commands within the limits of
+/// the actuators. Each of the two terms alone is the least upper bound for its class of faults. Unlike delta of
+/// [`crate::theorem1`], each quantity has its own bound in its own unit. The bounds are the upper ends of brackets of
+/// relative width 1e-3.
 ///
-/// Comparison with a simulation of the pendulum of the paper (|f| <= 30 N, observer -1200 to -3000
-/// / s): half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in
-/// the simulation, and the bounds from |f| alone are 1.98 mm and 4.22 mrad. The bounds of the
-/// velocities are 4.3 and 6.1 times the simulated values, because the worst fault jumps. Useful
-/// bounds of the errors need a rate: without one the worst fault jumps by 60 N, and the bound of
+/// Comparison with a simulation of the pendulum of [`crate::aso`]'s source (|f| <= 30 N, observer poles -1200 to -3000
+/// / s): half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in the simulation, and
+/// the bounds from |f| alone are 1.98 mm and 4.22 mrad. The bounds of the velocities are 4.3 and 6.1 times the
+/// simulated values, because the worst fault jumps. Useful bounds of the errors need a rate: without one the worst
+/// fault jumps by 60 N, and the bound of
 /// |eps| is 60 N. In the simulation the friction reverses while the cart sticks, at up to 521 N/s;
 /// with that rate the bounds are within 1 % of the largest simulated errors.
 ///
@@ -107,9 +107,8 @@ pub struct Reversal {
 /// [`fault_system`]. The peaks of the states predict the amplitude (half of peak to peak) of the
 /// limit cycle that remains after compensation, provided that the loop settles between reversals.
 ///
-/// On the pendulum of the paper, with 2 `F_s` = 60 N, against the amplitudes of the simulation
-/// after compensation (0.96 mm, 1.75 mrad, 0.0100 m/s, 0.0205 rad/s) and its largest |eps| of 0.88
-/// N:
+/// For the pendulum of [`crate::aso`]'s source with 2 `F_s` = 60 N, the simulated amplitudes after compensation are
+/// 0.96 mm, 1.75 mrad, 0.0100 m/s, 0.0205 rad/s, and the largest |eps| is 0.88 N. The predictions are:
 ///
 /// | | cart | pendulum | cart velocity | angular velocity | eps |
 /// |---|---|---|---|---|---|

@@ -16,14 +16,13 @@ use nalgebra::DMatrix;
 /// z = [x; e; f_hat - f]
 /// ```
 ///
-/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; with integral action B `K_i` `x_i` is
-/// added to the first line, and the state has the t integrals of [`crate::tracking`], `x_i`' = -H C x + H
-/// `F_s` eps, at its end. In sampled time the left
-/// sides are the values at the next sample. With a current estimator the matrix of the second line
-/// is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the
-/// corrected ones. The commands are within the limits of the actuators. The fault f may be any
-/// function of time, jumps included. With a direct term `P_f` (see [`Gains`]) the state is [x; e; `f_hat_i`], and
-/// `f_hat` = `f_hat_i` + `P_f` C e in the first and the last line.
+/// e = x - `x_hat`, eps = `f_hat` - f; the state is [x; e; `f_hat`], 2 n + q. With integral action B `K_i` `x_i` is
+/// added to the first line, and the t integrals of [`crate::tracking`], `x_i`' = -H C x + H `F_s` eps, follow in the
+/// state. In sampled time the left sides are the values at the next sample. With a current estimator the matrix of the
+/// second line is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the corrected
+/// ones. With a direct term `P_f` (see [`Gains`]) the state is [x; e; `f_hat_i`], and `f_hat` = `f_hat_i` + `P_f` C e
+/// in the first and the last line. The commands are within the limits of the actuators. The fault f may be any function
+/// of time, jumps included.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
 ///
@@ -62,9 +61,9 @@ pub(super) fn with_integrals(gains: &Gains, b: &DMatrix<f64>, factor: f64) -> DM
 /// z = [x; e; eps]
 /// ```
 ///
-/// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts only through the part that the compensation
-/// cannot cancel. For an f without jumps this is the loop of [`fault_system`] in other coordinates. With a
-/// direct term the state eps is `f_hat_i` - f, and eps + `P_f` C e takes its place in the first and the last line.
+/// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts only through the part that the compensation cannot cancel. For an
+/// f without jumps this is the loop of [`fault_system`] in other coordinates. With a direct term the state eps is
+/// `f_hat_i` - f; the first and the last line have eps + `P_f` C e in place of eps.
 ///
 /// # Errors
 ///
@@ -100,8 +99,8 @@ pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
     }
 }
 
-/// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
-/// the part of faults that the compensation leaves.
+/// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from the part of faults
+/// that is not compensated.
 ///
 /// The first are the gains of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
 /// positions in [x; e; eps] of the outputs, at least one; each result has a row for each output and q columns.

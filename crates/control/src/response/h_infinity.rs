@@ -9,13 +9,13 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
-/// The order of the Hamiltonian matrix from which on eigenvalues with a real part above `IMAGINARY` of their
-/// modulus and above `ROUNDING` of the norm count as not imaginary.
+/// In a Hamiltonian matrix of at least this order, eigenvalues with a real part above `IMAGINARY` times their modulus
+/// and above `ROUNDING` times the norm count as not imaginary.
 const LARGE: usize = 96;
 const IMAGINARY: f64 = 1e-3;
 const ROUNDING: f64 = 1e-7;
-/// The first and the smallest logarithmic step of the frequency towards a local maximum; the smallest one
-/// relative to the root of the width, as the maximum is flat.
+/// The first and the smallest logarithmic step of the frequency towards a local maximum. The smallest step is relative
+/// to the root of the width, as the maximum is flat.
 const FIRST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 0.02;
 
@@ -33,8 +33,8 @@ pub struct HInfinity {
 
 /// Computes the H-infinity norm: the largest singular value of G over all frequencies.
 ///
-/// It is the root of the largest ratio of the energy of z to the energy of w. `width`: relative
-/// width of the result; values below 1e-10 count as 1e-10. The norm is finite when A is stable.
+/// The norm is the root of the largest ratio of the energy of z to the energy of w. `width`: relative width of the
+/// result; values below 1e-10 count as 1e-10. The norm is finite when A is stable.
 ///
 /// Method: the singular values of G equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
 ///
@@ -42,11 +42,10 @@ pub struct HInfinity {
 /// [A + B R^-1 D' C, B R^-1 B'; -C' (I + D R^-1 D') C, -(A + B R^-1 D' C)'],  R = gamma^2 I - D' D
 /// ```
 ///
-/// so that gamma, a little above the largest value known, is the norm when the largest singular
-/// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. It
-/// need not be decided which eigenvalues are imaginary; of a large matrix those that are clearly not
-/// are left out. Otherwise the largest value found, raised to
-/// the local maximum about it, replaces gamma. A sampled system is first transformed to a continuous one
+/// gamma is a little above the largest known singular value. If all singular values are below gamma at the imaginary
+/// parts of all eigenvalues and midway between them, gamma is an upper bound of the norm. Otherwise the largest value
+/// found, raised to the local maximum near it, replaces gamma. Eigenvalues are used whether they are imaginary or not,
+/// except for those of a large matrix that clearly are not. A sampled system is first transformed to a continuous one
 /// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues, a quarter of them from n = 48
 /// on, where the square of the Hamiltonian matrix is reduced (Van Loan 1984), and 4 n^2 (1 + m) for
 /// each of the 4 n frequencies in a round; usually 1 or 2 rounds.
@@ -115,8 +114,8 @@ pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Er
 }
 
 impl HInfinity {
-    /// Raises the lower bound to the local maximum about its frequency, which saves eigenvalues of Hamiltonian
-    /// matrices. Steps grow while the value rises; otherwise they turn back and shrink.
+    /// Raises the lower bound to the local maximum near its frequency, which saves eigenvalues of Hamiltonian matrices.
+    /// The steps of the frequency grow while the value rises; otherwise they change their sign and shrink.
     fn climb(&mut self, known: &KnownResponse, width: f64) -> Result<(), Error> {
         let last = original_frequency(f64::INFINITY, known.system.domain);
         if self.frequency <= 0.0 || self.frequency >= last {
@@ -166,8 +165,8 @@ pub(crate) fn continuous_equivalent(system: &StateSpace) -> Result<StateSpace, E
     })
 }
 
-/// Frequencies of a continuous system among which are all those at which a singular value of G equals `gamma`,
-/// and the midpoints between neighbours.
+/// Frequencies of a continuous system that include every frequency at which a singular value of G equals `gamma`, and
+/// the midpoints between neighbours.
 fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
     let (m, p) = (system.b.ncols(), system.c.nrows());
     let (b, c) = (&system.b / gamma.sqrt(), &system.c / gamma.sqrt());

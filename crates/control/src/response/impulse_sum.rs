@@ -6,7 +6,7 @@ use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-/// The state must shrink by half within 2 to the power of this many samples.
+/// The binary logarithm of the largest number of samples in which the state may shrink by half.
 const LONGEST: u32 = 24;
 /// The approximate number of contractions by half that a sum needs.
 const HALVINGS: f64 = 12.0;
@@ -61,7 +61,7 @@ pub(super) fn impulse_sums(
             std::mem::swap(&mut states, &mut next);
         }
         let sizes = lengths(&states);
-        // If an input does not reach an output, the sum is zero, and no bound of its tail is small beside it.
+        // If an input does not reach an output, the sum is zero, and no bound of its tail is small relative to the sum.
         let is_short = |input: usize| sizes[input] <= NEGLIGIBLE * width * initial[input];
         let is_small =
             |row: usize, input: usize| tails[row] * sizes[input] <= width * lower[(row, input)];
@@ -76,7 +76,7 @@ pub(super) fn impulse_sums(
     }
 }
 
-/// The most samples for one contraction by half with which adding all of them is cheaper than intervals.
+/// The largest number of samples per contraction by half for which adding all samples is cheaper than intervals.
 fn largest_block(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
     let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(as_number);
     let oscillations = |value: &Complex<f64>| {

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 const PER_DECADE: u32 = 60;
-/// From this order on a scaled system keeps the known responses; below, it has the same bits as a new system.
+/// From this order on, [`KnownResponse::scaled`] keeps the known responses; below, the result has the bits of a new
+/// system.
 const LARGE: usize = 48;
 
 /// The frequencies of modes, where a response may have peaks: in continuous time imaginary part and modulus.

@@ -34,8 +34,8 @@ pub struct Bracket {
 /// gain[i,j] = |D[i,j]| + sum of |h_ij[k]|,       h[k] = C A^k B           sampled
 /// ```
 ///
-/// It is the least upper bound of |`z_i`| from rest over all inputs `w_j` with |`w_j`| <= 1. With
-/// several inputs, |`z_i`| <= sum over j of `gain[i,j]` times the bound of |`w_j`|. `width`:
+/// This gain is the least upper bound of |`z_i`| from rest over all inputs `w_j` with |`w_j`| <= 1. With several
+/// inputs, |`z_i`| <= sum over j of `gain[i,j]` times the bound of |`w_j`|. `width`:
 /// relative width of the bracket, 1e-3 for example. The gain is finite when A is stable. Method:
 /// over an interval the integral of |h| lies between |integral of h| and the root of its length
 /// times the integral of h^2, both exact up to rounding; intervals of dyadic length are

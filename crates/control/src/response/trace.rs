@@ -9,7 +9,7 @@ use std::f64::consts::SQRT_2;
 
 /// A mode is followed until it has decayed to e^-25, about 1e-11.
 const FOLLOWED: f64 = 25.0;
-/// Steps per time constant, and per radian of an oscillation; the second for `LARGE` systems.
+/// Steps per time constant and per radian of an oscillation; the second value for `LARGE` systems.
 const STEPS: [f64; 2] = [10.0, 4.0];
 /// The largest number of points of a response, and the number reserved for each mode that has not been followed yet.
 const MOST_POINTS: f64 = 200_000.0;
@@ -26,7 +26,7 @@ pub struct TimeResponse {
     pub output: DMatrix<f64>,
     /// The limit of z for large times, p.
     pub final_value: DVector<f64>,
-    /// z' at these times; without columns in sampled time, and where the points do not follow every oscillation.
+    /// z' at these times; no columns in sampled time, or if the points do not follow every oscillation.
     pub(super) slope: DMatrix<f64>,
 }
 
@@ -49,7 +49,7 @@ impl TimeResponse {
 /// after 25 time constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
 /// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
 /// samples. A response has at most about 200000 points: an oscillation damped so lightly that it needs
-/// more gets fewer per radian, and a peak between them is missed. Rates 1e5 apart cost about four digits.
+/// more gets fewer per radian, and a peak between them is missed. Rates 1e5 apart lose about four digits.
 /// Cost: about 20 (n + 2 m)^3 multiplications per mode, n (n + p) per point; from 48 states on the outputs
 /// are products of large matrices, whose last bits depend on the processor.
 ///
