@@ -5,8 +5,8 @@
 //! A' P A - P - (A' P B + N) (R + B' P B)^-1 (B' P A + N') + Q = 0        sampled
 //! ```
 //!
-//! Their stabilising solution P gives the feedback u = K x that minimises the integral, or the sum,
-//! of x' Q x + 2 x' N u + u' R u. The filter is the same problem for A' and C'.
+//! Their stabilising solution P gives the feedback u = K x that minimises the integral, or the sum, of x' Q x + 2 x' N
+//! u + u' R u. The Kalman filter is the same problem for A' and C'.
 
 mod doubling;
 mod equation;
@@ -55,16 +55,16 @@ pub struct Regulator {
 
 /// The linear-quadratic regulator u = K x for x' = A x + B u, or for `x[k+1] = A x[k] + B u[k]`.
 ///
-/// `a`: n x n; `b`: n x m; `weights`: see [`Weights`], for a sampled system the cost of one sample. Solves the
-/// Riccati equation of the domain, see [`crate::riccati`]. The stabilising solution exists and is unique when (A, B)
-/// is stabilisable and every mode of A - B R^-1 N' on the stability limit appears in the weight Q - N R^-1 N'. Both
-/// are decided by the smallest singular value of [A - lambda I, B], or of [A - lambda I; Q], with these two matrices
-/// for A and Q, in balanced coordinates; it is zero below 1e-13 n of the largest; lambda are the eigenvalues of A, and
-/// those of A + B K near the limit. Method: balancing of the Hamiltonian, structured doubling (after a Cayley
-/// transform for continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About
-/// (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to 15 doublings and 2
-/// steps. The solution is returned only if A + B K is stable and every entry of the residual is below 1e-9 of the sum
-/// of its absolute terms.
+/// `a`: n x n; `b`: n x m; `weights`: see [`Weights`], for a sampled system the cost of one sample. Solves the Riccati
+/// equation of the domain, see [`crate::riccati`]. The stabilising solution exists and is unique when (A, B) is
+/// stabilisable and every mode of A - B R^-1 N' on the stability limit appears in the weight Q - N R^-1 N'. With these
+/// two matrices written as A and Q, [A - lambda I, B] and [A - lambda I; Q] in balanced coordinates must then have full
+/// rank: their singular values below 1e-13 n of the largest count as zero, and lambda are the eigenvalues of A, and the
+/// eigenvalues of A + B K near the limit. Method: balancing of the Hamiltonian, structured doubling (after a Cayley
+/// transform for continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About (20 +
+/// 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to 15 doublings and 2 steps.
+/// The solution is returned only if A + B K is stable and every entry of the residual is below 1e-9 of the sum of its
+/// absolute terms.
 ///
 /// Source: E. K.-W. Chu, H.-Y. Fan and W.-W. Lin, A structure-preserving doubling algorithm for
 /// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with

@@ -49,11 +49,11 @@ pub struct SampledDesign {
 /// |z| = e^(-q^g) for q > 1, g = ln 4 / ln max q    otherwise
 /// ```
 ///
-/// `continuous`: in 1/s; `period`: T in s, above zero. The angle of z is Im(p) T. A pole with q = 4
-/// reduces an error to 1.8 % in one sample; faster poles crowd at zero, where the eigenvectors of
-/// an observer with fewer measurements than states become parallel: for the pendulum of the paper
-/// at 10 ms the condition number would be 1e14, and the residual motion only 8 % smaller. The rule
-/// preserves the order of the poles, does not change poles with q <= 1, and maps the fastest to q = 4.
+/// `continuous`: in 1/s; `period`: T in s, above zero. The angle of z is Im(p) T. A pole with q = 4 reduces an error to
+/// 1.8 % in one sample. Faster poles would crowd at zero, where the eigenvectors of an observer with fewer measurements
+/// than states become parallel: for the pendulum of [`crate::aso`]'s source at 10 ms the condition number would be
+/// 1e14, and the residual motion only 8 % smaller. The rule preserves the order of the poles, does not change poles
+/// with q <= 1, and maps the fastest to q = 4.
 ///
 /// # Example
 ///
@@ -99,9 +99,9 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
 /// y_f[k+1]  = y_f[k] + (I - e^(-W T)) (y[k] - y_f[k])
 /// ```
 ///
-/// `extended`: in continuous time; one that is sampled with this `period` is returned unchanged; `period`: T in s,
-/// above zero. Exact for a held u and faults that follow their model, a ramp within the interval included; the
-/// measurement filter operates on samples. Method and precision: see [`FirstOrderHold`].
+/// `extended`: in continuous time; a plant that is sampled with `period` is returned unchanged; `period`: T in s, above
+/// zero. Exact for a held u and faults that follow their model, also for a ramp within the interval; the measurement
+/// filter operates on samples. Method and precision: see [`FirstOrderHold`].
 ///
 /// # Errors
 ///
@@ -161,17 +161,16 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
 /// modulus below one for a stable loop, see [`sampled_poles`]; `k_f`: m x q, or None for [`compensation_gain`], with
 /// which the held u cancels a ramp of a continuous plant on average. The design exists when the sampled plant is
 /// controllable and its augmented pair observable, for the current estimator with the output `C_0` `A_0`: `A_0` must
-/// not be singular, which very fast filters make it. Method, cost and tolerance: see [`crate::placement::place`]. Of
-/// the [`crate::placement::alternatives`] the pair of feedback and observer is chosen as in [`crate::aso::design`].
+/// not be singular, as it is with very fast filters. Method, cost and tolerance: see [`crate::placement::place`]. The
+/// pair of feedback and observer is chosen from the [`crate::placement::alternatives`] as in [`crate::aso::design`].
 ///
-/// The estimator is placed in the coordinates of [`place_estimator`], so that the condition number
-/// depends neither on the sample time nor on units.
+/// The estimator is placed in the coordinates of [`place_estimator`], so that the condition number depends neither on
+/// the sample time nor on units.
 ///
-/// Two choices matter more than the poles. The current estimator acts one sample earlier. And with
-/// the fault modelled as a ramp the command's error `K_f` eps - `K_x` e after a step of the fault
-/// is first too small, then too large, and its sum is almost zero, as the estimate of a ramp has no
-/// lag: the plant is hardly displaced. For the friction pendulum of the paper (poles of the paper,
-/// -2500 added for the ramp) the cart then moves by, half of peak to peak in mm:
+/// Two choices matter more than the poles. The current estimator acts one sample earlier. With a ramp as the fault
+/// model, the error of the command after a step of the fault, `K_f` eps - `K_x` e, changes its sign and has almost the
+/// sum zero, so that the plant is hardly displaced. For the friction pendulum of [`crate::aso`]'s source (poles of the
+/// source, -2500 added for the ramp), half of peak to peak of the cart is then, in mm:
 ///
 /// | sample time in ms | 0.1 | 0.5 | 1 | 2 | 5 | 10 |
 /// |---|---|---|---|---|---|---|
@@ -264,7 +263,7 @@ pub fn estimator_alternatives(
     place_dual(a_0, output, poles, Extent::Alternatives)
 }
 
-/// Computes the gain of [`place_estimator`], or those of [`estimator_alternatives`].
+/// Computes the gain of [`place_estimator`], or the gains of [`estimator_alternatives`].
 fn place_dual(
     a_0: &DMatrix<f64>,
     output: &DMatrix<f64>,

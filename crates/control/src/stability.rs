@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 /// Relative error of an eigenvalue near the stability limit.
 const ROUNDING: f64 = 1e-12;
 
-/// How far a matrix is beyond the stability limit; negative when it is stable.
+/// Distance of a matrix beyond the stability limit; negative when the matrix is stable.
 ///
 /// ```text
 /// max Re(lambda_i)       continuous: the spectral abscissa
@@ -38,7 +38,8 @@ pub fn instability(a: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
 
 /// Whether an eigenvalue of A is stable by more than its rounding error, 1e-12 of the largest modulus.
 ///
-/// `a`: n x n. For a mode that no gain moves: one on the limit, computed a little inside, is not stable.
+/// `a`: n x n. For modes that no gain moves: a mode on the limit that is computed a little inside does not count as
+/// stable.
 ///
 /// # Errors
 ///

@@ -1,8 +1,7 @@
 //! The singular value decomposition, by one-sided Jacobi rotations.
 //!
-//! The same decomposition gives ranks, null spaces, least-squares solutions and condition numbers.
-//! It computes the small singular values of a matrix with badly scaled columns to full relative
-//! precision, and its number of iterations is bounded.
+//! The decomposition gives ranks, null spaces, least-squares solutions and condition numbers. Small singular values of
+//! a matrix with badly scaled columns have full relative precision, and the number of iterations is bounded.
 
 use crate::Error;
 use crate::balance::power_of_two;
@@ -41,7 +40,7 @@ impl Svd {
         let mut images = m / unit;
         let mut right = DMatrix::identity(cols, cols);
         let negligible = NEGLIGIBLE * images.norm();
-        // A single column needs no rotation, so that it would pass.
+        // A single column needs no rotation; without a sweep, entries that are not finite are an error there, too.
         let sweeps = if negligible.is_finite() { SWEEPS } else { 0 };
         for _ in 0..sweeps {
             let mut rotated = false;
@@ -228,7 +227,7 @@ mod tests {
         }
     }
 
-    /// The singular values of diag(1, 1e-9, 1e-18) times a rotation are those of the diagonal.
+    /// A rotation times diag(1, 1e-9, 1e-18) has the singular values of the diagonal.
     #[test]
     fn tiny_singular_values_of_badly_scaled_columns_keep_their_relative_precision() {
         let (c, s) = (0.6, 0.8);

@@ -11,7 +11,7 @@ pub struct Transient {
     pub peak: f64,
     /// The time of the peak.
     pub peak_time: f64,
-    /// The time after which z stays within the band around its final value; zero if it always does, infinite if it
+    /// The time after which z stays within the band around its final value; zero if z always does, infinite if z
     /// is outside to the end of the response.
     pub settling_time: f64,
     /// The limit of z for large times.
@@ -24,8 +24,8 @@ impl TimeResponse {
     /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
     /// final value. In continuous time peaks between grid points are those of the cubic through both values and
     /// slopes (error 1e-6 of the peak, 1e-5 from 48 states on), and settling times are interpolated linearly
-    /// after the last point or peak outside of the band. In sampled time, and where the points do not follow every
-    /// oscillation, both are at grid points.
+    /// after the last point or peak outside of the band. In sampled time, and if the points do not follow every
+    /// oscillation, peaks and settling times are at grid points.
     ///
     /// # Panics
     ///
@@ -85,8 +85,8 @@ impl TimeResponse {
         Some((self.time[k] + part * step, begin + rise * (end - begin) + curve))
     }
 
-    /// The time at which z enters the band for the last time, infinite if it does not. `last`: time and value of the
-    /// last point or extremum outside, which is at point k or before the next one.
+    /// The time at which z enters the band for the last time, infinite if z ends outside. `last`: time and value of the
+    /// last point or extremum outside, from point k on and before point k + 1.
     fn entry(&self, output: usize, k: usize, last: (f64, f64), band: f64) -> f64 {
         if k + 1 == self.time.len() {
             return f64::INFINITY;

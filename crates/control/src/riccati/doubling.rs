@@ -12,8 +12,8 @@ const METHOD: &str = "structured doubling";
 /// Solves A' P (I + G P)^-1 A - P + Q = 0; for G and Q positive semidefinite P is the least solution that is
 /// positive semidefinite.
 ///
-/// After k steps `h` is the solution over 2^k samples of the finite horizon. For an indefinite G the caller checks
-/// whether P is the solution that it needs. The error is [`Error::NotConverged`].
+/// After k steps `h` is the solution for a horizon of 2^k samples. For an indefinite G the caller checks whether P is
+/// the solution that it needs. The error is [`Error::NotConverged`].
 pub(super) fn sampled(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,
@@ -42,10 +42,10 @@ pub(super) fn sampled(
 
 /// Solves A' P + P A - P G P + Q = 0, with P as in [`sampled`].
 ///
-/// The Cayley transform with gamma maps an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
-/// (s - gamma). With gamma the geometric mean of the smallest modulus above zero and the largest one,
-/// both converge equally fast. The errors are [`Error::NotConverged`], and [`Error::NotFinite`] if the
-/// Hamiltonian matrix is not finite.
+/// The Cayley transform with gamma maps an eigenvalue s of the Hamiltonian matrix to (s + gamma) / (s - gamma). gamma
+/// is the geometric mean of the smallest modulus above zero and the largest one, so that both eigenvalues converge
+/// equally fast. The errors are [`Error::NotConverged`], and [`Error::NotFinite`] if the Hamiltonian matrix is not
+/// finite.
 pub(super) fn continuous(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,

@@ -5,7 +5,7 @@ use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, relative, sizes};
 use nalgebra::DMatrix;
 
-/// Sums of terms below this fraction of the largest sum are rounding.
+/// Each sum of terms counts as at least this fraction of the largest sum.
 const FLOOR: f64 = 1e-6;
 
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
@@ -83,7 +83,7 @@ impl RiccatiEquation {
         };
         let terms = terms + self.q.abs();
         let least = floor * terms.amax();
-        // A term that is not a number stays one.
+        // A term that is NaN stays NaN.
         relative(&left, &terms.map(|term| if term < least { least } else { term }))
     }
 

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
 /// Relative size of a singular value that counts as zero, per state.
 const TOLERANCE_PER_STATE: f64 = 1e-13;
-/// An eigenvalue this near to the limit of stability, relative to the norm of A, is not stable.
+/// Eigenvalues closer than this to the stability limit, relative to the norm of A, do not count as stable.
 const NEAR: f64 = 1e-12;
 /// Largest distance from the limit, relative to the norm of A, to which rounding moves a mode of A + B K that does not
 /// appear in Q: about the root of the residual of P.
@@ -32,11 +32,11 @@ pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
     require_weights(problem, &all)
 }
 
-/// Checks that the modes at the eigenvalues of A + B K appear in Q if these are so near to the stability limit that
-/// rounding errors may have moved them from there; otherwise [`Error::Unweighted`] or [`Error::NotConverged`].
+/// Checks that the modes of A + B K near the stability limit appear in Q; otherwise [`Error::Unweighted`] or
+/// [`Error::NotConverged`].
 ///
-/// Rounding splits a multiple eigenvalue of A, so that [`require`] may miss a mode on the limit. A + B K keeps it as a
-/// simple eigenvalue if it does not appear in Q.
+/// Rounding splits a multiple eigenvalue of A, so that [`require`] may miss a mode on the limit. If this mode does not
+/// appear in Q, it is a simple eigenvalue of A + B K, near the limit up to rounding errors.
 pub(super) fn require_closed(
     problem: &ScaledProblem,
     closed: &[Complex<f64>],

@@ -6,7 +6,7 @@ use crate::blocks::symmetric_part;
 use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;
 
-/// Largest number of Riccati equations that are solved for one bound where doubling does not solve its equation.
+/// Largest number of Riccati equations that are solved for one bound if doubling cannot be used.
 const ITERATIONS: usize = 400;
 /// Relative change at which the iteration has converged.
 const CONVERGED: f64 = 1e-4;
@@ -48,11 +48,10 @@ pub struct NormFilterProblem<'a> {
 /// time `A_s` (I + X G)^-1; X >= 0 is equivalent to A - L C being stable.
 ///
 /// Method: doubling in balanced coordinates, if it finds the covariance of the Kalman filter, which it may not for
-/// unstable modes that no w moves. Otherwise X is the limit of a sequence of covariances of Kalman filters: each filter
-/// has the additional process noise that belongs to the X before it. The sequence starts at the covariance of the
-/// Kalman filter, grows, and stays below the solution X if there is one, so it converges if and only if gamma is above
-/// the least norm. The number of steps grows without limit towards that norm; 400 steps are enough down to about 2 %
-/// above it.
+/// unstable modes that no w moves. Otherwise X is the limit of a sequence of covariances of Kalman filters: the
+/// previous X increases the process noise of each filter. The sequence starts at the covariance of the Kalman filter,
+/// grows, and stays below the solution X if there is one, so that it converges if and only if gamma is above the least
+/// norm. The number of steps grows without limit as gamma approaches this norm; 400 steps are enough down to about 2 %
 ///
 /// Source: K. M. Nagpal, P. P. Khargonekar, Filtering and smoothing in an H-infinity setting, IEEE
 /// Trans. Autom. Control 36 (1991), theorem 3.1; sampled: B. Hassibi, A. H. Sayed, T. Kailath, Linear
@@ -129,8 +128,7 @@ impl NormFilter {
 
     /// Computes the gain of a filter whose norm is below `gamma`; None if no such filter was found.
     ///
-    /// The bound holds up to rounding errors, and up to 1e-4 of X where doubling is not possible: evaluate the norm
-    /// of the result.
+    /// The bound holds up to rounding errors, and without doubling up to 1e-4 of X: evaluate the norm of the result.
     ///
     /// # Errors
     ///

@@ -113,7 +113,7 @@ impl ScaledProblem {
         Err(Error::NotConverged { what, iterations: NEWTON_STEPS })
     }
 
-    /// Converts P to the problem without scales; [`Error::Overflow`] if it leaves the range.
+    /// Converts P to the problem without scales; [`Error::Overflow`] if P exceeds the range of double precision.
     pub(super) fn restore(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         check::in_range("P", divided(p, &self.scale))
     }
