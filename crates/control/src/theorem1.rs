@@ -40,16 +40,15 @@ pub struct Certificate {
     /// Norm of the residual of (12) relative to the norm of alpha beta I. Below 1 / sqrt(n + q) the
     /// computed P, rounding included, proves that the error dynamics are stable.
     pub defect: f64,
-    /// Radius (16): V = z' P z decreases wherever the norm of z = [e; `f_hat`] is larger. The paper
-    /// concludes that the error ends in that ball; the proof shows that it ends in the smallest
-    /// ellipsoid z' P z = constant around the ball, whose longest axis is sqrt(cond P) times as
-    /// long.
+    /// Radius (16): V = z' P z decreases wherever the norm of z = [e; `f_hat`] is larger than delta. The paper
+    /// concludes that the error ends in that ball; the proof shows that it ends in the smallest ellipsoid z' P z =
+    /// constant around the ball, whose longest axis is sqrt(cond P) times as long.
     pub delta: f64,
     /// Rank of (A, B); full.
     pub controllability: Rank,
     /// Rank of (`A_0`, `C_0`).
     pub observability: Rank,
-    /// Largest real part of the eigenvalues of A + B `K_x`; below zero `x_hat` stays bounded too.
+    /// Largest real part of the eigenvalues of A + B `K_x`; if it is below zero, `x_hat` stays bounded, too.
     pub controller_abscissa: f64,
     /// Largest real part of the eigenvalues of `A_0` - L `C_0`; below zero.
     pub observer_abscissa: f64,
@@ -63,9 +62,9 @@ pub struct Certificate {
 /// ```
 ///
 /// `alpha`: above zero; `beta`: above zero, the largest norm of the fault in its unit. P exists
-/// when `A_0` - L `C_0` is Hurwitz. P grows with alpha: with `P_1` the solution for alpha beta = 1,
-/// delta = 2 beta norm(`P_1` `F_0`) for every alpha: contrary to the paper, a larger alpha does not
-/// give a smaller region. Method, cost and tolerance: see [`lyapunov`].
+/// when `A_0` - L `C_0` is Hurwitz. P is proportional to alpha: with `P_1` the solution for alpha beta = 1, delta = 2
+/// beta norm(`P_1` `F_0`) for every alpha. Contrary to the paper, a larger alpha does not give a smaller region.
+/// Method, cost and tolerance: see [`lyapunov`].
 ///
 /// # Example
 ///

@@ -1,7 +1,7 @@
 //! Set points: integral action and feedforward for references of the measurements.
 //!
-//! t references r are set points of H y, with y = C x the measurements of x' = A x + B u. Either the
-//! distance from them is integrated, and the integral fed back,
+//! t references r are set points of H y, with y = C x the measurements of x' = A x + B u. Either the error r - H y is
+//! integrated, and the integral `x_i` fed back,
 //!
 //! ```text
 //! x_i' = r - H (y - F_s f_hat),   u = K_x x_hat + K_f f_hat + K_i x_i
@@ -12,8 +12,8 @@
 //! `F_s` f is the effect of sensor faults on y. The integral makes H y equal to a constant r for every
 //! plant for which the loop is stable; the feedforward only if A, B, C are right. Both together,
 //! u = `K_x` `x_hat` + `K_f` `f_hat` + `K_i` `x_i` + `N_r` r, are two degrees of freedom
-//! ([`integral_feedforward`]): the commands answer a reference at once, and the integrals answer what the
-//! model does not explain.
+//! ([`integral_feedforward`]): the commands react to a reference at once, and the integrals remove the error of the
+//! model from H y.
 //!
 //! K = [`K_x`, `K_i`] is the gain of the plant [x; `x_i`] of [`extended_pair`]. The estimation errors do not
 //! depend on r, `x_i` or K, so that the loop has the eigenvalues of the extended plant under K and those of
@@ -48,8 +48,8 @@ const SWEEPS: usize = 4;
 pub struct IntegralAction {
     /// H, t x p.
     pub h: DMatrix<f64>,
-    /// H C, t x n, from the states of the observer's model to H y; zero for the states of a measurement
-    /// filter, before which y is taken.
+    /// H C, t x n, from the states of the observer's model to H y; zero for the states of a measurement filter, because
+    /// y is taken before the filter.
     pub output: DMatrix<f64>,
     /// H `F_s`, t x q: the effect of the faults on H y.
     pub faults: DMatrix<f64>,
@@ -63,7 +63,7 @@ pub struct IntegralAction {
 pub struct TrackingRank {
     /// Rank of [A, B; H C, 0].
     pub rank: usize,
-    /// Number of its rows, n + t: a constant H y of any value is possible when `rank` equals it.
+    /// Number of rows of this matrix, n + t: if `rank` equals it, a constant H y of any value is possible.
     pub expected: usize,
     /// Rank of H C.
     pub outputs: usize,
@@ -153,7 +153,8 @@ pub fn extended_pair(
     ))
 }
 
-/// The factors of the integrand and of the last value in the equation of an integral: 1 and 0, or T and 1.
+/// The factors of the integrand and of the last value in an integral: 1 and 0 in continuous time, T and 1 in sampled
+/// time.
 pub(crate) fn integration(domain: Domain) -> (f64, f64) {
     match domain {
         Domain::Continuous => (1.0, 0.0),

@@ -65,9 +65,9 @@ pub struct Tuning<'a> {
     pub instability: f64,
     /// Whether the search may use these parameters.
     pub is_allowed: &'a (dyn Fn(&DVector<f64>) -> bool + Sync),
-    /// The bandwidth in rad/s: frequencies from a thousandth to a thousand times it are examined.
+    /// The bandwidth in rad/s; the search examines frequencies from a thousandth of it to a thousand times it.
     pub rate: f64,
-    /// Whether the search must end; it is asked after each step.
+    /// Whether the search must end; called after each step.
     pub is_over: &'a (dyn Fn() -> bool + Sync),
 }
 

@@ -10,9 +10,8 @@ use std::iter::successors;
 /// W(s) = (b_r p^r + ... + b_0) / (p^r + ... + a_0),  p = s / unit,  all coefficients above zero
 /// ```
 ///
-/// In sampled time s = 2 (z - 1) / (T (z + 1)): the frequency w of the sampled signal is that of
-/// s = j (2 / T) tan(w T / 2), see [`bilinear_frequency`]. Magnitudes stay the same, so a weight for
-/// the frequencies mapped in this way has the stated magnitudes in sampled time.
+/// In sampled time s = 2 (z - 1) / (T (z + 1)): the frequency w of a sampled signal corresponds to s = j (2 / T) tan(w
+/// T / 2), see [`bilinear_frequency`]. A weight for mapped frequencies has the stated magnitudes in sampled time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weight {
     /// `b_r` to `b_0`.
@@ -83,7 +82,7 @@ impl Weight {
         (self.denominator.len() == 1).then(|| self.numerator[0])
     }
 
-    /// |W(j w)|, `frequency`: w in rad/s; in sampled time the [`bilinear_frequency`] of the signal's.
+    /// |W(j w)|, `frequency`: w in rad/s; in sampled time the [`bilinear_frequency`] of the signal's frequency.
     #[must_use]
     pub fn magnitude(&self, frequency: f64) -> f64 {
         if frequency.is_infinite() {

@@ -26,9 +26,9 @@ pub struct DecayCertificate {
 /// ```
 ///
 /// `error_dynamics`: F, n x n, `A_0` - L `C_0` for the observer. The least upper bound of alpha is
-/// minus the spectral abscissa of F; the strict inequality does not attain it. Method: decay rates
-/// below it are tried, by 1e-6 of it first and by half of it last, until [`certify_region`] proves one;
-/// [`Outcome::Inconclusive`] if it proves none.
+/// minus the spectral abscissa of F; the strict inequality does not attain it. Method: this bound is reduced by 1e-6 of
+/// itself, then by larger parts up to a half, until [`certify_region`] proves the rate; [`Outcome::Inconclusive`] if it
+/// proves none.
 ///
 /// A system that is not stable is [`Outcome::Infeasible`] with the conflict "stability".
 ///

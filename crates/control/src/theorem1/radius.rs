@@ -9,7 +9,7 @@ use crate::svd::norm_2;
 use crate::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
-/// Error of the solver in the eigenvalues of a matrix of about one.
+/// Error of the solver in the eigenvalues of a matrix with a norm of about one.
 const SOLVER_ERROR: f64 = 1e-7;
 
 /// The radius of theorem 1 and its proof.
@@ -34,10 +34,9 @@ pub struct RadiusCertificate {
 /// V' < 0 for |z| > delta,  delta = 2 bound norm(P G)       as (16)
 /// ```
 ///
-/// With G = `F_0` and the bound of the fault this is theorem 1 for z = [e; `f_hat`]; the P of (12) is
-/// one of those allowed. With G = [0; I] and the bound of f' - `A_f` f it holds for z = [e; eps]. As in
-/// the paper, z ends in the smallest ellipsoid z' P z = constant around the ball of that radius, not
-/// in the ball.
+/// With G = `F_0` and the bound of the fault this is theorem 1 for z = [e; `f_hat`]; the P of (12) satisfies the
+/// inequalities. With G = [0; I] and the bound of f' - `A_f` f it holds for z = [e; eps]. As in the paper, z ends in
+/// the smallest ellipsoid z' P z = constant around the ball of that radius, not in the ball.
 ///
 /// `error_dynamics`: F, n x n, Hurwitz; `disturbance`: G, n x k; `bound`: above zero, in the unit of
 /// w. The norm depends on the units of the states, as the theorem does. Method: let

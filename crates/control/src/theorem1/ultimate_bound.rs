@@ -40,10 +40,9 @@ pub struct UltimateBound {
 /// radius = bound sqrt(largest eigenvalue of Q),  peak of state i = bound sqrt(Q[i,i])
 /// ```
 ///
-/// With G = [0; I] and the bound of f' - `A_f` f this is the ultimate bound of z = [e; eps] for a
-/// fault that changes; with G = -`F_0` and the bound of the fault that of z = [e; `f_hat`]. Unlike the
-/// ball of theorem 1, the ellipsoid is invariant: z does not leave it. It depends on the units of the
-/// states only through the meaning of `radius`.
+/// With G = [0; I] and the bound of f' - `A_f` f this is the ultimate bound of z = [e; eps] for a fault that changes;
+/// with G = -`F_0` and the bound of the fault, it is the ultimate bound of z = [e; `f_hat`]. Unlike the ball of theorem
+/// 1, the ellipsoid is invariant: z does not leave it. Only the meaning of `radius` depends on the units of the states.
 ///
 /// `error_dynamics`: F, n x n, Hurwitz; `disturbance`: G, n x k; `bound`: above zero, in the unit of
 /// w. Method: for each lambda below twice the decay rate the smallest Q solves the inequality as an

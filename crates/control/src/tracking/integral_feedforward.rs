@@ -29,19 +29,18 @@ pub struct IntegralFeedforward {
 /// ```
 ///
 /// S has the t slowest eigenvalues that the feedback moves, by real part or, sampled, by modulus; the
-/// uncontrollable modes of A, which references do not excite, are left out first. With this `N_r` the signal
-/// s = W' `x_e` obeys s' = S s for all references: they do not move it, only disturbances, faults and errors of
-/// the model do. So references excite only the other n modes, which are faster, and H y reaches a constant r for
-/// every plant for which the loop is stable, because the integrals are part of it. The response to faults and
-/// disturbances is that without `N_r`: the feedback K is the same.
+/// uncontrollable modes of A, which references do not excite, are left out first. With this `N_r` the signal s = W'
+/// `x_e` obeys s' = S s for all references: only disturbances, faults and errors of the model move it. References
+/// excite only the other n modes, which are faster. H y reaches a constant r for every plant for which the loop is
+/// stable, because the loop contains the integrals. `N_r` does not change the response to faults and disturbances.
 ///
 /// `a`, `b`, `output`: as in [`extended_pair`]; `k`: K = [`K_x`, `K_i`], m x (n + t), such that `A_e` + `B_e` K
 /// is stable. W is the left null space of the polynomial of `A_e` + `B_e` K with these t roots, from a singular
-/// value decomposition. Of several `N_r` (more commands than references) it is the one of least
-/// norm in the given units. The inner error is the reason why there is none: the t slowest eigenvalues end with
-/// half of a complex pair, or `W_x'` B has a rank below t.
+/// value decomposition. Of several `N_r` (more commands than references) the result is the one of least norm in the
+/// given units. The inner error says why no `N_r` exists: the t slowest eigenvalues end with half of a complex pair, or
+/// `W_x'` B has a rank below t.
 ///
-/// For one reference it is the zero of the classical set-point weight, which cancels the slowest pole: K. J.
+/// For one reference `N_r` is the classical set-point weight, whose zero cancels the slowest pole: K. J.
 /// Åström and T. Hägglund, PID controllers, 2nd edition (1995), section 3.4; G. F. Franklin, J. D. Powell and
 /// M. Workman (1998), section 8.5.
 ///

@@ -6,19 +6,19 @@ use crate::svd::{Svd, norm_2};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// The largest number of commands with limits: all sets of them are examined.
+/// The largest number of commands with limits, of which all sets are examined.
 const COMMANDS: usize = 10;
 /// Bisections of an interval.
 const BISECTIONS: usize = 12;
-/// Directions of the commands that are shorter than this, relative to the longest, do not count.
+/// Singular values of the gains below this, relative to the largest, count as zero.
 const TOLERANCE: f64 = 1e-9;
-/// An eigenvalue up to this distance from the stability limit, in continuous time relative to the largest entry of
-/// the coefficients, may be on it but for rounding errors.
+/// An eigenvalue up to this distance from the stability limit, in continuous time relative to the largest entry of the
+/// coefficients, may be on the limit within rounding errors.
 const NEUTRAL: f64 = 1e-9;
 /// Distance of a norm from 1, or of a decay from 0, that exceeds its rounding errors.
 const MARGIN: f64 = 1e-10;
 
-/// Whether an interpolated back-calculation is stable, by [`interpolated_windup`].
+/// The result of [`interpolated_windup`]: whether an interpolated back-calculation is stable.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterpolatedWindup {
     /// It is stable for every constant value between the points and every set of commands at their limits.
@@ -49,19 +49,19 @@ pub enum InterpolatedWindup {
 ///
 /// S selects commands at their limits. At the points `L_w` = (1 - e^(-rate T)) `K_i`^+, or rate `K_i`^+, by
 /// [`super::windup_gain`], so that the eigenvalues are between 0 and 1, or -rate and 0, for every S; between the
-/// points the product has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. A result [`InterpolatedWindup::Stable`] is a
-/// proof up to rounding, for each constant s from 0 to 1 and each constant S: no eigenvalue but those at 1, or 0, of
-/// integrals on which the commands of S do not act is on or beyond the stability limit. It says nothing of
-/// a moving s while commands are at their limits.
+/// between the points the product has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. [`InterpolatedWindup::Stable`] is a
+/// proof up to rounding, for each constant s from 0 to 1 and each constant S: all eigenvalues are within the stability
+/// limit, except those at 1, or 0, of integrals on which the commands of S do not act. It is no proof for a moving s
+/// while commands are at their limits.
 ///
 /// `k_i`: `K_i`, m x t, at the two points; `l_w`: `L_w`, t x m; `ranges`: as in [`super::windup_gain`].
 ///
 /// Method: for each set S the matrix M(s) = I - N(s), or -N(s) in continuous time, with N = Q' `K_i` `L_w` Q, Q an
-/// orthonormal basis of the columns of S `K_i0` and S `K_i1` in units of the ranges, or N = `L_w` S `K_i` where that
-/// is smaller; both have the eigenvalues of `L_w` S `K_i` other than 0. M(s) is a polynomial of degree 2, a
-/// convex combination of its Bernstein coefficients; a Lyapunov matrix P of its middle for which all
-/// three have a P norm below 1, or decrease x' P x, proves the interval. Otherwise the interval is bisected, up to
-/// 12 times. With more than 10 commands with limits the result is [`InterpolatedWindup::Undecided`].
+/// orthonormal basis of the columns of S `K_i0` and S `K_i1` in units of the ranges, or N = `L_w` S `K_i` if that is
+/// smaller; both have the eigenvalues of `L_w` S `K_i` other than 0. M(s) is a polynomial of degree 2, a convex
+/// combination of its three Bernstein coefficients. The interval is proven if, with a Lyapunov matrix P of M in its
+/// middle, all three coefficients have a P norm below 1, or decrease x' P x. Otherwise it is bisected, up to 12 times.
+/// With more than 10 commands with limits the result is [`InterpolatedWindup::Undecided`].
 ///
 /// # Errors
 ///

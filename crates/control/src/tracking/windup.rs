@@ -12,17 +12,17 @@ use nalgebra::DMatrix;
 /// x_i[k+1] = x_i[k] + T (r - H y) + L_w (u - v),   L_w = (1 - e^(-rate T)) K_i^+
 /// ```
 ///
-/// v is the command before the limits, u the one within them. `k_i`: `K_i`, m x t; `ranges`: for each
-/// command the width of its limits, None if it has none; `rate`: above zero, in 1/s. While the commands are
-/// at their limits, the part of `x_i` that acts on them follows the value for which v = u best fits, with the
-/// rate: -`L_w` S `K_i`, S with ones for the commands at a limit, has eigenvalues between -rate and 0. Only
-/// rows of `K_i` of commands with limits count, in units of their ranges; the columns of the others are zero.
-/// Without a command at a limit u = v, and the term is zero.
+/// v is the command before the limits, u the limited command. `k_i`: `K_i`, m x t; `ranges`: for each command the width
+/// of its limits, None without limits; `rate`: above zero, in 1/s. While commands are at their limits, the part of
+/// `x_i` that acts on them approaches the value of the best fit of v to u with the rate: -`L_w` S `K_i`, S with ones
+/// for the commands at a limit, has eigenvalues between -rate and 0. `K_i`^+ is the pseudoinverse of the rows of
+/// commands with limits, in units of their ranges; other commands have zero columns in `L_w`. Without a command at a
+/// limit u = v, and the term is zero.
 ///
 /// Source: K. J. Åström and L. Rundqwist, Integrator windup and how to avoid it, American Control Conference
 /// (1989); it is one of the schemes of M. V. Kothare, P. J. Campo, M. Morari and C. N. Nett, A unified
-/// framework for the study of anti-windup designs, Automatica 30 (1994). The observer needs none of it: it
-/// receives u.
+/// framework for the study of anti-windup designs, Automatica 30 (1994). The observer receives u and needs no
+/// back-calculation.
 ///
 /// # Errors
 ///

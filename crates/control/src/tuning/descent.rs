@@ -9,12 +9,12 @@ use nalgebra::{DMatrix, DVector};
 /// Largest numbers of steps between two verifications, and of verifications.
 const STEPS: usize = 150;
 const ROUNDS: usize = 12;
-/// A step uses the terms and frequencies with a value from this part of the largest one on, and at most this number.
+/// The values that a step uses: from this part of the largest value on, and at most this number.
 const ACTIVE: f64 = 0.85;
 const MOST_ACTIVE: usize = 40;
 /// Step of the differences, relative to the size of a parameter.
 const DIFFERENCE: f64 = 1e-3;
-/// The largest number of lengths of a step that are tried, and the part of the predicted decrease that it must reach.
+/// The largest number of step lengths that are tried, and the part of the predicted decrease that a step must reach.
 const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
 /// A search ends at the second step that decreases gamma by less than this part.
@@ -27,9 +27,9 @@ const BETWEEN: f64 = 2e-3;
 impl Tuning<'_> {
     /// Tunes the parameters from `start`; `scales`: the size of each parameter.
     ///
-    /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid
-    /// of frequencies, with a BFGS matrix of the sum of their multipliers; after each of these searches the
-    /// frequency of the verified norm joins the grid. The result is a local minimum at best; gamma is verified.
+    /// Method: steps of sequential quadratic programming for the maximum over the local maxima of a grid of
+    /// frequencies, with a BFGS approximation of the Hessian of the Lagrangian. After each of these searches the
+    /// frequency of the verified norm is added to the grid. The result is a local minimum at best; gamma is verified.
     ///
     /// Source: P. Apkarian and D. Noll, Nonsmooth H-infinity synthesis, IEEE Trans. Autom. Control 51
     /// (2006); J. V. Burke, D. Henrion, A. S. Lewis and M. L. Overton, HIFOO (2006).
@@ -124,7 +124,7 @@ impl Search<'_> {
             if (self.grid.tuning.is_over)() {
                 break;
             }
-            // The matrix starts again once; a flat step after that is the last one.
+            // After the first flat step the BFGS matrix starts again; the second flat step is the last one.
             if decrease <= FLAT * value {
                 if was_flat {
                     break;
@@ -145,7 +145,7 @@ impl Search<'_> {
         Some(Iterate { controller, values })
     }
 
-    /// The parameters and values after the longest of the halved steps with enough decrease; None if no step has it.
+    /// The parameters and values after the longest of the halved steps with enough decrease; None if none has enough.
     fn line_search(
         &self,
         step: &DVector<f64>,

@@ -12,7 +12,7 @@ pub(super) struct Cut {
     pub(super) gradient: DVector<f64>,
 }
 
-/// The minimum of the model max over i of `(f_i + g_i' d)` + d' W^-1 d / 2.
+/// The minimum of the model max over i of `(f_i + g_i' d)` + d' W^-1 d / 2, W the inverse Hessian.
 pub(super) struct Direction {
     /// d.
     pub(super) step: DVector<f64>,

@@ -66,7 +66,7 @@ impl<'a> Grid<'a> {
             Domain::Continuous => rate * 10_f64.powi(2 * DECADES),
             Domain::Sampled { period } => (1.0 - 1e-6) * PI / period,
         };
-        // The sampling rate counts if the bandwidth is more than six decades above it.
+        // With a bandwidth of more than six decades above the sampling rate, the sampling rate is the limit.
         let frequency = frequency.max(lowest).min(highest);
         let at = self.nodes.partition_point(|node| node.frequency < frequency);
         if self.nodes.get(at).is_some_and(|node| node.frequency <= frequency) {
@@ -136,7 +136,7 @@ impl<'a> Grid<'a> {
                 (left, right)
             }
         };
-        // The references are zero in the other transfer functions.
+        // For the other transfer functions, the part of the references is zero.
         let right = right.resize_vertically(p + t, Complex::from(0.0));
         let sign = if matches!(transfer, Transfer::Complementary(_)) { -1.0 } else { 1.0 };
         let x = forward.solve(&(&b * &right))?;

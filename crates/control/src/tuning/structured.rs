@@ -42,8 +42,8 @@ impl Structure<'_> {
     /// ```
     ///
     /// for each row k of K, where S selects the states of its free entries; in sampled time X is the covariance of the
-    /// samples. It minimises the mean square of the difference. States that no command reaches have zero gains. The
-    /// loop may be unstable.
+    /// samples. The feedback minimises the mean square of the difference of the commands. States that no command
+    /// reaches have zero gains. The loop may be unstable.
     ///
     /// `k`: m x n, such that A + B K is stable. Source: W. S. Levine, T. L. Johnson, M. Athans, Optimal limited state
     /// variable feedback controllers for linear systems, IEEE Trans. Autom. Control 16 (1971), for the covariance.
