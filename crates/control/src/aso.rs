@@ -50,9 +50,9 @@ pub struct AsoDesign {
     /// compensated. Zero up to rounding for the default `K_f` if the columns of `F_a` are in the range of B. Rows of a
     /// measurement filter are left out; if `F_a` is zero in the other rows, this is the norm of B `K_f`.
     pub cancellation_residual: f64,
-    /// Quality of the assignment for A + B `K_x`.
+    /// Quality of the pole assignment for A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the assignment for the transpose of `A_0` - L `C_0`.
+    /// Quality of the pole assignment for the transpose of `A_0` - L `C_0`.
     pub observer: Quality,
 }
 
@@ -60,8 +60,7 @@ pub struct AsoDesign {
 pub(crate) type Place =
     fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Alternatives, Error>;
 
-/// Computes `K_x` from the first `states` states, on which the other states do not act; other columns of `K_x` are
-/// zero.
+/// Computes `K_x` from the first `states` states, on which the other states do not act; its other columns are zero.
 pub(crate) fn place_controller(
     plant: &FaultyPlant,
     states: usize,

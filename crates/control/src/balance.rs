@@ -6,8 +6,7 @@ use nalgebra::{DMatrix, DVector};
 const SWEEPS: usize = 100;
 /// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
-/// In [`Balance::of_exponential`], the norm of a row or column is large above this multiple of the largest diagonal
-/// entry.
+/// In [`Balance::of_exponential`], a row or column norm above this multiple of the largest diagonal entry is large.
 const LARGE: f64 = 1024.0;
 
 /// S^-1 A S, S diagonal and positive such that row i and column i have about the same norm.
@@ -82,7 +81,7 @@ impl Balance {
         mut leaving: DVector<f64>,
     ) -> Self {
         let mut balance = Self::none(a);
-        // A column is contiguous in memory, a row is not.
+        // The columns of the transpose are the rows of A, contiguous in memory.
         let mut transposed = a.transpose();
         for _ in 0..SWEEPS {
             let mut changed = false;

@@ -94,8 +94,8 @@ fn energies(system: &StateSpace, rate: f64) -> Result<DMatrix<f64>, Error> {
 pub struct ByBandwidth<T> {
     /// Gain, solution of the Riccati equation, eigenvalues.
     pub result: T,
-    /// The largest singular value of the loop at the bandwidth: one within 1e-6; above it, if unstable modes need a
-    /// larger bandwidth; below it, if no weight of the search reaches it.
+    /// The largest singular value of the loop at the bandwidth: one to within 1e-6; larger, if unstable modes need a
+    /// larger bandwidth; smaller, if no weight of the search gives one.
     pub loop_gain: f64,
     /// The weight with this loop gain: r of [`regulator`], v of [`filter`].
     pub weight: f64,

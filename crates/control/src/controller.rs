@@ -162,8 +162,7 @@ fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpac
     Ok(StateSpace { a, b, c, d, domain: controller.domain })
 }
 
-/// Converts `controller`, designed for a plant with y = C x, for the plant with y = C x + D u: its input becomes y - D
-/// u.
+/// Converts `controller`, designed for a plant with y = C x, for y = C x + D u: its new input is y - D u.
 ///
 /// ```text
 /// continuous:  z' = (A - B D C) z + B y,            u = C z

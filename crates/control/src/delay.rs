@@ -13,7 +13,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A fraction of a sample below which a delay is a whole number of samples.
+/// A delay at most this part of a sample below a whole number of samples counts as this number.
 const WHOLE: f64 = 1e-9;
 
 /// Returns A and b of the Pade approximant of e^(-s) with numerator degree q - 1 and denominator degree q.
@@ -30,8 +30,7 @@ const WHOLE: f64 = 1e-9;
 /// m_i' = (2 i + 1) ((-1)^i u - sum over j of g_ij m_j),  g_ij = 1 for i < j, (-1)^(i - j) otherwise,  y = sum of m_i
 /// ```
 ///
-/// With `z_1` = y in place of `m_0`, all entries of A and b are small integers. A constant u leads to z = [u, 0, ...,
-/// 0].
+/// With `z_1` = y in place of `m_0`, A and b have small integer entries. A constant u leads to z = [u, 0, ..., 0].
 ///
 /// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, I. Kajic, C.
 /// Eliasmith, Legendre memory units, Advances in Neural Information Processing Systems 32 (2019), (1), for the Legendre form.

@@ -59,10 +59,9 @@ impl Detectability {
 
 /// Tests whether and how the faults of a plant appear in its measurements.
 ///
-/// `plant`: in the given `domain`. An augmented observer with arbitrary eigenvalues exists when
-/// (`A_0`, `C_0`) is observable, see [`FaultyPlant::check_observer_exists`], which stops at the
-/// first condition that fails; this function tests all of them. Methods, cost and tolerances: see
-/// [`observability`], [`zeros`], [`from_unobservable`].
+/// `plant`: in the given `domain`. An augmented observer with arbitrary eigenvalues exists when (`A_0`, `C_0`) is
+/// observable. [`FaultyPlant::check_observer_exists`] stops at the first condition that fails; this function tests all
+/// conditions. Methods, cost and tolerances: see [`observability`], [`zeros`], [`from_unobservable`].
 ///
 /// # Example
 ///

@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix};
 use reduced::ReducedPencil;
 use std::cmp::Ordering;
 
-/// Largest number of evaluations of the smallest singular value in the search of the plane.
+/// Largest number of evaluations of the smallest singular value in the search of the complex plane.
 const EVALUATIONS: usize = 1000;
 /// A distance below this is within rounding; its lower bound is not searched for.
 const ROUNDING: f64 = 1e-14;

@@ -18,9 +18,9 @@ const QR_ALGORITHM: &str = "the QR algorithm for eigenvalues";
 /// Largest number of QR iterations per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;
 
-/// An entry below the diagonal counts as zero below this fraction of its neighbours on the
-/// diagonal. The second value is tried if the first is never reached: between equal eigenvalues the
-/// rounding errors are relative to the norm of the matrix.
+/// Fractions of the neighbours on the diagonal below which an entry below the diagonal counts as zero. The second one
+/// is used if the QR algorithm does not converge with the first one: between equal eigenvalues the rounding errors are
+/// relative to the norm of the matrix.
 const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 
 /// From this order on eigenvalues are computed without the Schur form.

@@ -1,7 +1,7 @@
 //! Laws that estimate faults: alternatives to the augmented state observer of [`crate::aso`].
 //!
-//! With e = y - C `x_hat`. Every law can be written as [`crate::aso::Gains`], so that the controller and all analyses
-//! of this crate apply. For constant faults, without the feedback:
+//! e is the innovation y - C `x_hat`. Every law can be written as [`crate::aso::Gains`], so that the controller and all
+//! analyses of this crate apply. For constant faults, without the feedback:
 //!
 //! | law | estimate of the fault | exists if |
 //! |---|---|---|

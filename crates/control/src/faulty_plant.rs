@@ -75,7 +75,7 @@ impl FaultyPlant {
 
     /// The `K_f`, m x q, of least norm among those that minimise the norm of B `K_f` + `F_a`.
     ///
-    /// It always exists. The compensation is complete if the columns of `F_a` are in the range of
+    /// This gain always exists. The compensation is complete if the columns of `F_a` are in the range of
     /// B; [`crate::aso::AsoDesign::cancellation_residual`] measures the part that is not cancelled.
     /// Singular values of B, its columns scaled to length one, below 1e-12 of the largest count as zero.
     ///

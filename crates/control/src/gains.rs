@@ -42,7 +42,7 @@ pub struct Gains {
     pub l_f: DMatrix<f64>,
     /// `P_f`, q x p; None without a direct term.
     pub p_f: Option<DMatrix<f64>>,
-    /// The integral action for references; None without.
+    /// The integral action for references, if any.
     pub integral: Option<IntegralAction>,
 }
 

@@ -120,9 +120,9 @@ pub fn zero_order_hold(
 /// Computes A and B of the plant x' = A x + B u whose samples have Phi and Gamma: inverts [`zero_order_hold`].
 ///
 /// `phi`: n x n; `gamma`: n x m; `h`: the sample time, above 0. Of all such plants, the result is the one whose
-/// eigenvalues
-/// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: states
-/// balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I], [`logarithm_of_one_plus`].
+/// eigenvalues have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative.
+/// Method: states balanced, inputs scaled to the size of phi - I, then the logarithm of [phi, gamma; 0, I],
+/// [`logarithm_of_one_plus`].
 ///
 /// # Example
 ///

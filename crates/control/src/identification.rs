@@ -7,11 +7,13 @@
 //! is the innovation form: e is white, K the gain of the Kalman predictor. The method is predictor-based subspace
 //! identification; it needs no iteration, estimates K too, and holds for unstable plants and in closed loop:
 //!
-//! 1. A long autoregressive model predicts `y[k]` from s earlier samples `z = [u; y]`, and `u[k]` if there is D: least squares.
-//! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their block Toeplitz matrix times the s
+//! 1. A long autoregressive model predicts `y[k]` from s earlier samples `z = [u; y]`, and `u[k]` if there is D: least
+//!    squares.
+//! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`. Their block Toeplitz matrix times the s
 //!    earlier samples is the extended observability matrix times `x[k]`, if (A - K C)^s is negligible.
-//! 3. The singular value decomposition of this product gives `x[k]` = T z, in the order of what the states explain.
 //! 3. The singular value decomposition of this product gives `x[k]` = T z, the states ordered by their singular values.
+//! 4. Least squares of `y[k]` on `x[k]`, `u[k]` gives C, D, d and `e[k]`; of `x[k+1]` on `x[k]`, `u[k]`, `e[k]` A, B,
+//!    K, b.
 //!
 //! The samples enter only by one triangular factor of constant size, [`Windows`]. Factors of parts of a record, and of
 //! several records, can be [joined](Windows::joined).

@@ -5,14 +5,14 @@
 //! | task | module |
 //! |---|---|
 //! | assign the poles of a state feedback or an observer | [`placement`] |
-//! | linear-quadratic regulator, Kalman filter | [`riccati`], by their bandwidth [`bandwidth`] |
+//! | linear-quadratic regulator, Kalman filter | [`riccati`]; designed for a bandwidth: [`bandwidth`] |
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
 //! | extended and unscented Kalman filters for nonlinear plants | [`nonlinear_filter`] |
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
 //! | commands after the failure of an actuator: control allocation, equilibrium | [`allocation`] |
 //! | test which faults can be estimated | [`detectability`] |
 //! | a plant from samples of its inputs and outputs: subspace identification | [`identification`] |
-//! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
+//! | controllability, observability, the distance from their loss, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
 //! | residuals that isolate faults: decoupled from commands, disturbances, other faults | [`isolation`] |
 //! | white residuals, tests with a stated rate of false alarms, predicted delays | [`detection`] |

@@ -40,7 +40,7 @@ pub struct Solution {
 /// `a`: n x n, Hurwitz; `q`: n x n, symmetric. The solution exists and is unique, and is symmetric
 /// positive definite when Q is. Method: balancing of A, complex Schur form, substitution (Bartels
 /// and Stewart), refinement; about 100 n^3 multiplications. From 48 states on, doubling after a Cayley transform (R. A.
-/// Smith, SIAM J. Appl. Math. 16, 1968) is tried first: about 15 matrix doublings of 3 n^3 multiplications each. If the
+/// Smith, SIAM J. Appl. Math. 16, 1968) is tried first: about 15 doublings of 3 n^3 multiplications each. If the
 /// residual is above 1e-12, the other method is used, too, and the result with the smaller residual is returned. Every
 /// entry of the residual is at most 1e-9 of the sum of its absolute terms.
 ///

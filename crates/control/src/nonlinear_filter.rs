@@ -215,7 +215,7 @@ impl NonlinearFilter {
         }
         self.s += &self.v;
         symmetrise(&mut self.s);
-        // Without correlation and innovation a measurement changes nothing.
+        // A measurement without correlation and innovation changes nothing.
         for k in (0..y.len()).filter(|&k| !is_due(k)) {
             self.innovation[k] = 0.0;
             self.cross.row_mut(k).fill(0.0);

@@ -115,7 +115,7 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<(
     Err(Error::NotObservable { rank: rank.rank, n: rank.n })
 }
 
-/// The uncontrollable modes of x' = A x + B u, n minus the rank of them.
+/// The uncontrollable modes of x' = A x + B u; their number is n minus the rank.
 ///
 /// `a`: n x n; `b`: n x m. They are the eigenvalues of the uncontrollable block of the staircase
 /// form, so that their number agrees with [`controllability`]. A multiple eigenvalue with a single
@@ -130,7 +130,7 @@ pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mo
     modes_of(&Staircase::new(a, b)?)
 }
 
-/// The unobservable modes of x' = A x, y = C x, n minus the rank of them.
+/// The unobservable modes of x' = A x, y = C x; their number is n minus the rank.
 ///
 /// `a`: n x n; `c`: p x n. Method: [`uncontrollable_modes`] of (A', C').
 ///
@@ -157,7 +157,7 @@ pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode
     modes_of(&Staircase::new(&a.transpose(), &c.transpose())?)
 }
 
-/// The uncontrollable modes of the pair of a staircase form; none if it is controllable.
+/// The uncontrollable modes of the pair of a staircase form; none if the pair is controllable.
 fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
     if staircase.decision.is_full() {
         return Ok(Vec::new());

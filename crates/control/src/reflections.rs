@@ -4,7 +4,7 @@ use nalgebra::{ComplexField, DMatrix, DVector};
 
 /// The Q of M = Q R, as the product of the reflections H = I - tau v v*.
 ///
-/// The signs are those of LAPACK, so that all columns of Q are the same, also those orthogonal to M.
+/// Signs and all columns of Q, also those orthogonal to M, are those of LAPACK.
 pub(crate) struct Reflections<T> {
     rows: usize,
     /// tau and v of each reflection; v of reflection k lacks its first k entries, which are zero, and

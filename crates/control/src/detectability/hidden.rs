@@ -7,8 +7,7 @@
 //! (A - s I) x_0 + F_a f_0 = 0,   C x_0 = 0
 //! ```
 //!
-//! With N a basis of the eigenvectors of `A_f` for s and `f_0` = N v this is the null space of the
-//! matrix
+//! With N a basis of the eigenvectors of `A_f` for s and `f_0` = N v, [`x_0`; v] is in the null space of
 //!
 //! ```text
 //! R(s) = [A - s I, F_a N; C, 0],   R(s) [x_0; v] = 0          (n + p) x (n + columns of N)

@@ -116,7 +116,7 @@ pub(super) fn normal_density(x: f64) -> f64 {
 struct Terms {
     /// x / 2, above 0.
     half: f64,
-    /// The probability of the present degrees of freedom.
+    /// The probability for the present degrees of freedom.
     survival: f64,
     /// Half of the present degrees of freedom.
     shape: f64,

@@ -56,9 +56,9 @@ pub struct Cusum {
 impl Cusum {
     /// Returns the test with this drift whose mean number of samples between false alarms is `samples`.
     ///
-    /// `drift`: above 0; `samples`: at least 2. With a large drift, false alarms may be rarer at every threshold: the
-    /// threshold is then close to 0 and [`Cusum::between_false_alarms`] larger than `samples`, 1.7e6 for a drift of 5.
-    /// Method: bisection, relative accuracy of the threshold 1e-12.
+    /// `drift`: above 0; `samples`: at least 2. With a large drift, false alarms may be rarer than required at every
+    /// threshold: the threshold is then close to 0 and [`Cusum::between_false_alarms`] larger than `samples`, 1.7e6 for
+    /// a drift of 5. Method: bisection, relative accuracy of the threshold 1e-12.
     ///
     /// # Example
     ///
@@ -167,8 +167,8 @@ impl Cusum {
         Delay { missed }
     }
 
-    /// The number N of samples in a group, and the test for their sum divided by N^(1/2); up to a threshold of 40, N =
-    /// 1 and the test itself.
+    /// The number N of samples in a group, and the test for their sum divided by N^(1/2). Up to a threshold of 40, N is
+    /// 1 and the test unchanged.
     fn grouped(&self) -> (usize, Self) {
         if self.threshold <= LARGE {
             return (1, *self);
@@ -180,7 +180,7 @@ impl Cusum {
         (group, Self { drift: self.drift * root, threshold })
     }
 
-    /// Nodes and weights between 0 and the threshold.
+    /// Nodes and weights of the quadrature from 0 to the threshold.
     fn quadrature(&self) -> (Vec<f64>, Vec<f64>) {
         // A node for each 0.2 standard deviations keeps the accuracy for large thresholds.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 200")]

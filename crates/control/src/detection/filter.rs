@@ -1,4 +1,4 @@
-//! The filter of the residuals: a Kalman filter behind an unknown-input observer.
+//! The detection filter: a Kalman filter behind an unknown-input observer.
 
 use crate::balance::{divide_columns, unit_columns};
 use crate::blocks::symmetric_part;
@@ -272,9 +272,9 @@ impl DetectionFilter {
 
 /// Gain of the Kalman filter for correlated noise, and covariance (continuous: intensity V) of its innovation.
 ///
-/// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v, in continuous
-/// time intensities. Method: the plant with A - S V^-1 C and W - S V^-1 S' has uncorrelated noise; S V^-1 is added to
-/// the gain of its filter.
+/// W = E w w', V = E v v', S = E w v' of the process noise w and the measurement noise v (intensities in continuous
+/// time). Method: the plant with A - S V^-1 C and W - S V^-1 S' has uncorrelated noise; S V^-1 is added to the gain of
+/// its filter.
 fn correlated_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix};
 
 /// Largest number of sweeps for one eigenvalue; two or three are usual.
 const SWEEPS: usize = 120;
-/// Number of sweeps without a result after which an exceptional shift is used, again and again.
+/// Interval between exceptional shifts, in sweeps without a result.
 const EXCEPTIONAL: usize = 10;
 /// Number of sweeps after which an entry that is small relative to the norm of the matrix counts as zero.
 const PATIENCE: usize = 20;

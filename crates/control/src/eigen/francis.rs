@@ -6,7 +6,7 @@ use std::ops::Range;
 
 /// Largest number of sweeps for one eigenvalue or pair; three or four are usual.
 const SWEEPS: usize = 120;
-/// Number of sweeps without a result after which an exceptional shift is used, again and again.
+/// Interval between exceptional shifts, in sweeps without a result.
 const EXCEPTIONAL: usize = 10;
 
 /// Computes the eigenvalues of an upper Hessenberg matrix, in no particular order; None if the

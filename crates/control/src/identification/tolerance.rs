@@ -10,7 +10,7 @@ use crate::{Error, StateSpace, check};
 /// Relative change of an entry in a difference quotient.
 const STEP: f64 = 1e-6;
 
-/// Where and in which units frequency responses are compared.
+/// The frequencies and units in which frequency responses are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseUnits {
     /// The frequencies in rad per unit of time.
@@ -70,7 +70,7 @@ pub fn equivalent_tolerance(
     Ok(2.0 * (variance / sensitivity).sqrt())
 }
 
-/// The positions of the entries that vary in A, B, C or D, the matrix with this number from 0.
+/// The positions of the varying entries of A, B, C or D; `number`: the matrix, from 0.
 fn varying(model: &StateSpace, number: usize) -> Vec<(usize, usize)> {
     let matrix = [&model.a, &model.b, &model.c, &model.d][number];
     let is_zero = |value: f64| value.abs() <= 0.0;

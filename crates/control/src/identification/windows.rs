@@ -42,7 +42,7 @@ impl Record {
         check::shape("y", &self.outputs, (self.outputs.nrows(), self.len()))
     }
 
-    /// The signal of this number, from 0, of [u; y] in a sample.
+    /// Entry `number`, from 0, of [u; y] in a sample.
     fn signal(&self, number: usize, sample: usize) -> f64 {
         let inputs = self.inputs.nrows();
         if number < inputs {
@@ -56,7 +56,7 @@ impl Record {
 /// All windows of s + 1 successive samples of a record, as the triangular factor R of the matrix whose rows are
 /// [1, `z[k-s]`', ..., `z[k-1]`', `u[k]`', `y[k]`'], z = [u; y].
 ///
-/// R' R has all sums of products that least squares need. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
+/// R' R has all sums of products for least squares. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Windows {
     /// s.

@@ -79,7 +79,7 @@ impl DecoupledPart {
         let (basis, blocks) = observable_states(&dynamics, &(&h * &c * &v), tolerance, &mut gap)?;
         let (z, k) = (basis.tr_mul(&v.transpose()), basis.tr_mul(&k));
         let (dynamics, output) = (basis.tr_mul(&dynamics) * &basis, &h * &c * &v * &basis);
-        // Back to the units of the plant.
+        // Converts K and H to the units of the plant.
         let k = multiply_columns(&(k * size), &outputs);
         let h = multiply_columns(&h, &outputs);
         let b_f = &z * &plant.b_f - &k * &plant.d_f;

@@ -171,7 +171,7 @@ pub fn residual_generator(
     if !pattern.contains(&true) {
         return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
     }
-    // All modes, in balanced coordinates.
+    // The tolerance 0 keeps all modes.
     let (balanced, _) = plant.reachable_part(0.0)?;
     let verified = |tolerance: f64| {
         let mut residual = with_tolerance(plant, pattern, requirements, tolerance)?;

@@ -1,5 +1,4 @@
-//! A loop whose actuators lose effectiveness: for which losses it is stable, and what is proven about
-//! losses that vary.
+//! A loop whose actuators lose effectiveness: stability for constant losses, proofs for losses that vary.
 
 #[cfg(feature = "lmi")]
 mod certified;
@@ -42,7 +41,7 @@ pub struct LossyLoop {
     pub domain: Domain,
 }
 
-/// The limit of constant losses.
+/// The limit of constant losses up to which a loop is stable.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ConstantLimit {
@@ -195,8 +194,8 @@ pub(super) fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
     })
 }
 
-/// The points on the far faces of the box, those where an input has its largest loss, of a grid with at most 11
-/// points for each input; fewer if there were more than 70.
+/// The points on the far faces of the box, where an input has its largest loss, of a grid with up to 11 points for each
+/// input, such that the faces have at most 70 points.
 fn directions(largest: &[f64]) -> Vec<Vec<f64>> {
     let lossy = largest.iter().filter(|loss| **loss > 0.0).count();
     let power = |base: usize| base.pow(u32::try_from(lossy).unwrap_or(u32::MAX));

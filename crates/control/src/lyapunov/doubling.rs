@@ -30,8 +30,7 @@ pub(super) fn solve_by_doubling(
     let (first, cayley) = match domain {
         Domain::Sampled { .. } => (a.clone(), None),
         Domain::Continuous => {
-            // With the geometric mean of the slowest and the fastest rate as gamma, both modes decay equally fast in
-            // M^k.
+            // With gamma the geometric mean of the slowest and the fastest rate, both decay equally fast in M^k.
             let slowest = 1.0 / a.clone().try_inverse()?.norm();
             let gamma = (slowest * a.norm()).sqrt();
             let inverse = (a - &identity * gamma).try_inverse()?;

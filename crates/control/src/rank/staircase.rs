@@ -28,8 +28,8 @@ pub(crate) struct Staircase {
 }
 
 impl Staircase {
-    /// Computes the form in balanced coordinates. If the rank without balancing is larger, returns the form without
-    /// balancing, which scales states that do not act on each other without end.
+    /// Computes the form in balanced coordinates, or without balancing if the rank is then larger, because balancing
+    /// scales states that do not act on each other without end.
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
         let balanced = Self::in_coordinates(Balance::new(a), b)?;
         if balanced.decision.is_full() {

@@ -35,11 +35,10 @@ pub struct SampledLoop<'a> {
 /// the samples, where the estimates are computed; `width`: see [`peak_gain`]. Each result has a row for each
 /// output and q columns.
 ///
-/// The fault is constant over each part, with any sequence of values, and x is read at the start of each
-/// part; with growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With
-/// N = 1 they are those of [`super::fault_gains`], where the gain from f' is multiplied by T: the fault changes only at
-/// the samples, and x is read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and
-/// samples.
+/// The fault is constant over each part, with any sequence of values, and x is read at the start of each part; with
+/// growing N the gains approach those of arbitrary faults, with an error of the order of 1/N. With N = 1 they are the
+/// gains of [`super::fault_gains`], the gain from f' multiplied by T: the fault changes only at the samples, and x is
+/// read only there. Entry (i, j) is an upper bound of the sum of |`h_ij`| over all parts and samples.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
 /// Systems, Springer (1995), chapter 10.

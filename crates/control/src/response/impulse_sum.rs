@@ -6,7 +6,7 @@ use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-/// The binary logarithm of the largest number of samples in which the state may shrink by half.
+/// The binary logarithm of the largest number of samples within which the state must shrink by half.
 const LONGEST: u32 = 24;
 /// The approximate number of contractions by half that a sum needs.
 const HALVINGS: f64 = 12.0;

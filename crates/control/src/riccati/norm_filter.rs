@@ -51,7 +51,8 @@ pub struct NormFilterProblem<'a> {
 /// unstable modes that no w moves. Otherwise X is the limit of a sequence of covariances of Kalman filters: the
 /// previous X increases the process noise of each filter. The sequence starts at the covariance of the Kalman filter,
 /// grows, and stays below the solution X if there is one, so that it converges if and only if gamma is above the least
-/// norm. The number of steps grows without limit as gamma approaches this norm; 400 steps are enough down to about 2 %
+/// norm. The number of steps grows without limit as gamma approaches this norm; 400 steps are enough from about 2 %
+/// above it on.
 ///
 /// Source: K. M. Nagpal, P. P. Khargonekar, Filtering and smoothing in an H-infinity setting, IEEE
 /// Trans. Autom. Control 36 (1991), theorem 3.1; sampled: B. Hassibi, A. H. Sayed, T. Kailath, Linear

@@ -49,7 +49,7 @@ pub enum InterpolatedWindup {
 ///
 /// S selects commands at their limits. At the points `L_w` = (1 - e^(-rate T)) `K_i`^+, or rate `K_i`^+, by
 /// [`super::windup_gain`], so that the eigenvalues are between 0 and 1, or -rate and 0, for every S; between the
-/// between the points the product has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. [`InterpolatedWindup::Stable`] is a
+/// points the product has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. [`InterpolatedWindup::Stable`] is a
 /// proof up to rounding, for each constant s from 0 to 1 and each constant S: all eigenvalues are within the stability
 /// limit, except those at 1, or 0, of integrals on which the commands of S do not act. It is no proof for a moving s
 /// while commands are at their limits.

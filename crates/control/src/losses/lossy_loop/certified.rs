@@ -27,7 +27,7 @@ impl LossyLoop {
     /// `largest`: as in [`LossyLoop::constant_limit`]; `most`: the largest t that is tried, in
     /// practice the factor of `constant_limit`. `most` itself is tried first. Method: bisection,
     /// relative accuracy 1 %; every certificate is verified by eigenvalues
-    /// ([`certify_common`]). A larger factor may be stable without such a proof.
+    /// ([`certify_common`]). The loop may be stable for a larger factor without such a proof.
     ///
     /// # Errors
     ///
