@@ -53,8 +53,9 @@ pub struct Allocation {
 /// If the columns of B are in the range of `B_r`, the effect is exact, and a feedback `u_d` = K x closes the same loop
 /// as before the failure. Singular values below 1e-12 of the largest count as zero.
 ///
-/// Source: W. C. Durham, Constrained control allocation, J. Guidance, Control and Dynamics 16 (1993); M. Bodson, Evaluation of
-/// optimization methods for control allocation, J. Guidance, Control and Dynamics 25 (2002), the weighted pseudo-inverse.
+/// Source: W. C. Durham, Constrained control allocation, J. Guidance, Control and Dynamics 16 (1993); M. Bodson,
+/// Evaluation of optimization methods for control allocation, J. Guidance, Control and Dynamics 25 (2002), the weighted
+/// pseudo-inverse.
 ///
 /// # Example
 ///

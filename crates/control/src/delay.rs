@@ -32,8 +32,9 @@ const WHOLE: f64 = 1e-9;
 ///
 /// With `z_1` = y in place of `m_0`, A and b have small integer entries. A constant u leads to z = [u, 0, ..., 0].
 ///
-/// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, I. Kajic, C.
-/// Eliasmith, Legendre memory units, Advances in Neural Information Processing Systems 32 (2019), (1), for the Legendre form.
+/// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, I.
+/// Kajic, C. Eliasmith, Legendre memory units, Advances in Neural Information Processing Systems 32 (2019), (1), for
+/// the Legendre form.
 ///
 /// # Example
 ///

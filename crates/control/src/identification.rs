@@ -18,9 +18,9 @@
 //! The samples enter only by one triangular factor of constant size, [`Windows`]. Factors of parts of a record, and of
 //! several records, can be [joined](Windows::joined).
 //!
-//! Source: A. Chiuso, The role of vector autoregressive modeling in predictor-based subspace identification, Automatica 43
-//! (2007); M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge (2007), chapter 9; P. Van Overschee
-//! and B. De Moor, Subspace Identification for Linear Systems, Kluwer (1996).
+//! Source: A. Chiuso, The role of vector autoregressive modeling in predictor-based subspace identification, Automatica
+//! 43 (2007); M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge (2007), chapter 9; P. Van
+//! Overschee and B. De Moor, Subspace Identification for Linear Systems, Kluwer (1996).
 
 mod coordinates;
 mod model;

@@ -9,13 +9,13 @@
 //! where faults are part of z, both filters keep the mean z and the covariance P of the estimate. They differ in how
 //! mean and covariance pass g and h:
 //!
-//! * **extended**: g and h are replaced by their tangents at the mean, with the Jacobians G and H:
-//!   P becomes G P G' + W, the gain is P H' (H P H' + V)^-1 (A. H. Jazwinski, Stochastic Processes and Filtering Theory, 1970,
-//!   section 8.3);
-//! * **unscented**: g and h are evaluated at 2 N points, z plus and minus the columns of a square root of N P; means and
-//!   covariances are those of the values (S. J. Julier, J. K. Uhlmann, H. F. Durrant-Whyte, American Control Conference 1995,
-//!   without a point at the mean, so that all weights are positive and no variance is negative. I. Arasaratnam and
-//!   S. Haykin, IEEE Trans. Autom. Control 54 (2009), derive the same points from a cubature rule).
+//! * **extended**: g and h are replaced by their tangents at the mean, with the Jacobians G and H: P becomes G P G' +
+//!   W, the gain is P H' (H P H' + V)^-1 (A. H. Jazwinski, Stochastic Processes and Filtering Theory, 1970, section
+//!   8.3);
+//! * **unscented**: g and h are evaluated at 2 N points, z plus and minus the columns of a square root of N P; means
+//!   and covariances are those of the values (S. J. Julier, J. K. Uhlmann, H. F. Durrant-Whyte, American Control
+//!   Conference 1995, without a point at the mean, so that all weights are positive and no variance is negative. I.
+//!   Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009), derive the same points from a cubature rule).
 //!
 //! For a linear plant both are the Kalman filter whose stationary form is [`crate::riccati::kalman`].
 

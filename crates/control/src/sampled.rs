@@ -34,9 +34,9 @@ pub struct SampledDesign {
     pub filter: Option<Vec<f64>>,
     /// The gains. `L_x`, `L_f` correct the next estimate (prediction estimator) or the present one (current).
     pub gains: Gains,
-    /// Quality of the assignment for A + B `K_x`.
+    /// Quality of the pole assignment for A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the assignment for the error dynamics, in the coordinates of [`place_estimator`].
+    /// Quality of the pole assignment for the error dynamics, in the coordinates of [`place_estimator`].
     pub observer: Quality,
     /// Largest modulus of the eigenvalues of the closed loop; below one it is stable.
     pub radius: f64,
@@ -296,8 +296,8 @@ pub fn filter(extended: &ExtendedPlant, domain: Domain) -> Option<Vec<f64>> {
     extended.filter.as_ref().map(|rates| coefficients(rates, domain))
 }
 
-/// Computes `K_f` for a controller in `domain`: [`FaultyPlant::compensation_gain`], for a continuous plant with a
-/// sampled controller times the mean of the modelled fault over the interval.
+/// Computes `K_f` for a controller in `domain`: [`FaultyPlant::compensation_gain`]; for a continuous plant with a
+/// sampled controller, this gain times the mean of the modelled fault over the interval.
 ///
 /// # Errors
 ///

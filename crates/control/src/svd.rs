@@ -40,7 +40,7 @@ impl Svd {
         let mut images = m / unit;
         let mut right = DMatrix::identity(cols, cols);
         let negligible = NEGLIGIBLE * images.norm();
-        // A single column needs no rotation; without a sweep, entries that are not finite are an error there, too.
+        // A single column needs no rotation: without this check, entries that are not finite would give no error.
         let sweeps = if negligible.is_finite() { SWEEPS } else { 0 };
         for _ in 0..sweeps {
             let mut rotated = false;
@@ -127,7 +127,7 @@ impl ComplexSvd {
         self.real.values.iter().step_by(self.repeats).copied().collect()
     }
 
-    /// Number of singular values above `tolerance` times the largest; one copy of a value above it suffices.
+    /// Number of singular values above `tolerance` times the largest; one of the copies of a value above it suffices.
     pub(crate) fn rank(&self, tolerance: f64) -> usize {
         self.real.rank(tolerance).div_ceil(self.repeats)
     }

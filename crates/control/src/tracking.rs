@@ -116,7 +116,7 @@ fn sizes(a: &DMatrix<f64>, b: &DMatrix<f64>, output: &DMatrix<f64>) -> Result<[u
 fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
     let mut m = m.clone();
     let unit = |length: f64| if length.is_normal() { 1.0 / length } else { 1.0 };
-    // By the largest entries first: then no square in a length overflows or vanishes.
+    // Largest entries are scaled to one first, so that no square in a length overflows or vanishes.
     m.row_iter_mut().for_each(|mut row| row *= unit(row.amax()));
     m.column_iter_mut().for_each(|mut column| column *= unit(column.amax()));
     for _ in 0..SWEEPS {

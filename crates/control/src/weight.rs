@@ -10,7 +10,7 @@ use std::iter::successors;
 /// W(s) = (b_r p^r + ... + b_0) / (p^r + ... + a_0),  p = s / unit,  all coefficients above zero
 /// ```
 ///
-/// In sampled time s = 2 (z - 1) / (T (z + 1)): the frequency w of a sampled signal corresponds to s = j (2 / T) tan(w
+/// In sampled time s = 2 (z - 1) / (T (z + 1)): the frequency w of a sampled signal corresponds to s = (2 j / T) tan(w
 /// T / 2), see [`bilinear_frequency`]. A weight for mapped frequencies has the stated magnitudes in sampled time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weight {
@@ -76,7 +76,7 @@ impl Weight {
         Ok(Self { numerator, denominator, unit: frequency })
     }
 
-    /// The magnitude of a constant weight; None for any other.
+    /// The magnitude of a constant weight; None for other weights.
     #[must_use]
     pub fn as_constant(&self) -> Option<f64> {
         (self.denominator.len() == 1).then(|| self.numerator[0])

@@ -30,9 +30,9 @@ pub struct SlidingMode {
 /// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is the effect of the error
 /// of the other states. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho /
 /// delta. The default of delta makes this e^(-rate T). With lambda = 1 - 0.01 (1 - e^(-rate T)), the estimate of a
-/// small constant fault is 1 % too small; the relative error is rho / (rho - |f|) times as large for a larger fault. In the
-/// linearisation, the gain of the correction of `x_hat` is M with A M = L, and `L_f` is (rho / delta) F; the observer
-/// itself uses F and the nonlinear nu.
+/// small constant fault is 1 % too small; the relative error of a larger fault is rho / (rho - |f|) times as large. In
+/// the linearisation, the gain of the correction of `x_hat` is M with A M = L, and `L_f` is (rho / delta) F; the
+/// observer itself uses F and the nonlinear nu.
 ///
 /// Each estimate stays between -rho and rho. The error stays bounded if every |`f_i`| is below `rho_i`.
 ///

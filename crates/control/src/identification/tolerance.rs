@@ -38,8 +38,8 @@ pub struct ResponseUnits {
 /// For one input and one output d is the chordal distance of the responses. It gives the most weight to frequencies
 /// near a gain of one, where a feedback acts.
 ///
-/// Source: B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), equation 3.6; G. Vinnicombe, Frequency
-/// domain uncertainty and the graph topology, IEEE Trans. Autom. Control 38 (1993).
+/// Source: B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), equation 3.6; G. Vinnicombe,
+/// Frequency domain uncertainty and the graph topology, IEEE Trans. Autom. Control 38 (1993).
 ///
 /// # Errors
 ///

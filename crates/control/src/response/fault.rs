@@ -38,9 +38,8 @@ pub struct FaultBounds {
 /// / s): half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in the simulation, and
 /// the bounds from |f| alone are 1.98 mm and 4.22 mrad. The bounds of the velocities are 4.3 and 6.1 times the
 /// simulated values, because the worst fault jumps. Useful bounds of the errors need a rate: without one the worst
-/// fault jumps by 60 N, and the bound of
-/// |eps| is 60 N. In the simulation the friction reverses while the cart sticks, at up to 521 N/s;
-/// with that rate the bounds are within 1 % of the largest simulated errors.
+/// fault jumps by 60 N, and the bound of |eps| is 60 N. In the simulation the friction reverses while the cart sticks,
+/// at up to 521 N/s; with that rate the bounds are within 1 % of the largest simulated errors.
 ///
 /// # Errors
 ///

@@ -102,9 +102,9 @@ pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from the part of faults
 /// that is not compensated.
 ///
-/// The first are the gains of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
-/// positions in [x; e; eps] of the outputs, at least one; each result has a row for each output and q columns.
-/// `width`: see [`peak_gain`]. Both systems have the same dynamics; one call of [`peak_gain`] serves both.
+/// The first result has the gains of [`fault_system`], the others have those of [`fault_rate_system`]. `rows`: the
+/// positions in [x; e; eps] of the outputs, at least one; each result has a row for each output and q columns. `width`:
+/// see [`peak_gain`]. Both systems have the same dynamics; one call of [`peak_gain`] serves both.
 ///
 /// # Errors
 ///

@@ -44,11 +44,11 @@ pub struct HInfinity {
 ///
 /// gamma is a little above the largest known singular value. If all singular values are below gamma at the imaginary
 /// parts of all eigenvalues and midway between them, gamma is an upper bound of the norm. Otherwise the largest value
-/// found, raised to the local maximum near it, replaces gamma. Eigenvalues are used whether they are imaginary or not,
-/// except for those of a large matrix that clearly are not. A sampled system is first transformed to a continuous one
-/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues, a quarter of them from n = 48
-/// on, where the square of the Hamiltonian matrix is reduced (Van Loan 1984), and 4 n^2 (1 + m) for
-/// each of the 4 n frequencies in a round; usually 1 or 2 rounds.
+/// found, raised to the local maximum near it, replaces gamma. All eigenvalues are used, imaginary or not; in a large
+/// matrix, those that are clearly not imaginary are left out. A sampled system is first transformed to a continuous one
+/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues, a quarter of them from n = 48 on, where
+/// the square of the Hamiltonian matrix is reduced (Van Loan 1984), and 4 n^2 (1 + m) for each of the 4 n frequencies
+/// in a round; usually 1 or 2 rounds.
 ///
 /// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a
 /// transfer function matrix, Systems & Control Letters 14 (1990); S. Boyd and V. Balakrishnan, 15

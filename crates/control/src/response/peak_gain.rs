@@ -117,7 +117,7 @@ fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
 /// The states after an impulse, which all outputs share.
 struct Trajectory {
     start: Rc<DVector<f64>>,
-    /// The states by their time, in shortest intervals.
+    /// The states; the key is their time in shortest intervals.
     states: HashMap<u128, Rc<DVector<f64>>>,
 }
 

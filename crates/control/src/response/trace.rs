@@ -138,7 +138,7 @@ struct Modes {
 }
 
 struct Mode {
-    /// The time at which it has decayed.
+    /// The time at which the mode has decayed.
     end: f64,
     /// The modulus of its eigenvalue in continuous time, in 1 / time.
     rate: f64,
@@ -211,7 +211,7 @@ impl Modes {
             let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
             if self.period == 0.0 && until + spacing < end {
-                // Powers of two: neighbours share a step and its propagator. The last one may end after `until`.
+                // Steps are powers of two, so that neighbours share a propagator. The last step may end after `until`.
                 let step = power_of_two(spacing / SQRT_2);
                 let count = ((until - from) / step).ceil();
                 left -= count;

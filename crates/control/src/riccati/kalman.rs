@@ -26,9 +26,9 @@ pub struct KalmanFilter {
 /// The Kalman filter for x' = A x + w, y = C x + v, in sampled time for
 /// `x[k+1] = A x[k] + w[k]` and the same y.
 ///
-/// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the
-/// process noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, the
-/// intensity of the measurement noise (in sampled time its covariance). Solves the equation of [`lqr`] for A', C', W, V:
+/// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the process noise (in sampled
+/// time its covariance); `v`: p x p, symmetric positive definite, the intensity of the measurement noise (in sampled
+/// time its covariance). Solves the equation of [`lqr`] for A', C', W, V:
 ///
 /// ```text
 /// A P + P A' - P C' V^-1 C P + W = 0              L = P C' V^-1

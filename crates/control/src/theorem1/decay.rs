@@ -5,7 +5,7 @@ use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// Fractions of the decay rate that are given up, one after the other, until a certificate is found.
+/// Fractions by which the decay rate is reduced, one after the other, until a certificate is found.
 const CONCESSIONS: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5];
 
 /// A decay rate and its proof.

@@ -16,7 +16,7 @@ const SOLVER_ERROR: f64 = 1e-7;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RadiusCertificate {
-    /// Radius: V = z' P z decreases wherever the norm of z is larger.
+    /// Radius: V = z' P z decreases wherever the norm of z is larger than delta.
     pub delta: f64,
     /// P, n x n, symmetric positive definite.
     pub p: DMatrix<f64>,
@@ -122,7 +122,7 @@ fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64
     let scaled_y = scaled_y.evaluate(&unknowns);
     Ok(Some(DMatrix::from_fn(n, n, |i, j| {
         let reserve = if i == j { SOLVER_ERROR } else { 0.0 };
-        // The product of both factors first: the result is symmetric to the last digit.
+        // The factors are multiplied first, so that the result is exactly symmetric.
         (scaled_y[(i, j)] + reserve) * (d[i] * d[j])
     })))
 }
