@@ -7,7 +7,7 @@ use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
 /// The part of a constant fault, small compared with rho, by which the boundary layer makes the estimate too small.
-const LEFT: f64 = 0.01;
+const SHORTFALL: f64 = 0.01;
 
 /// The parameters of [`sliding_mode`], one number for each fault, in the unit of the fault.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +66,7 @@ pub fn sliding_mode(
     }
     check::positive("rate", rate)?;
     let fast = eigenvalue(rate, domain);
-    let pole = domain.constant() - LEFT * (domain.constant() - fast);
+    let pole = domain.constant() - SHORTFALL * (domain.constant() - fast);
     let slope = pole - fast;
     let delta = law.delta.clone();
     let delta = delta.unwrap_or_else(|| law.rho.iter().map(|rho| rho / slope).collect());

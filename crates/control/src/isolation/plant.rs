@@ -89,8 +89,8 @@ impl DisturbedPlant {
         let dual = (&matrix / size).transpose();
         let (basis, _) = observable_states(&dual, &inputs, tolerance, &mut gap)?;
         // If all modes are reachable, only the scale of the coordinates changes.
-        let left = n - basis.ncols();
-        let basis = if left == 0 { DMatrix::identity(n, n) } else { basis };
+        let unreachable = n - basis.ncols();
+        let basis = if unreachable == 0 { DMatrix::identity(n, n) } else { basis };
         let part = Self {
             a: basis.tr_mul(&matrix) * &basis,
             b_u: basis.tr_mul(&b_u),
@@ -99,6 +99,6 @@ impl DisturbedPlant {
             c: multiply_columns(&self.c, &scale) * basis,
             ..self.clone()
         };
-        Ok((part, left))
+        Ok((part, unreachable))
     }
 }

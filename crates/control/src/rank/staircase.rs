@@ -57,12 +57,12 @@ impl Staircase {
             }
             margin = margin.min(step.values[rank - 1] / reference);
             let transformed = step.right.transpose() * &uncontrollable * &step.right;
-            let left = transformed.nrows() - rank;
-            link = transformed.view((rank, 0), (left, rank)).into();
-            uncontrollable = transformed.view((rank, rank), (left, left)).into();
+            let remaining = transformed.nrows() - rank;
+            link = transformed.view((rank, 0), (remaining, rank)).into();
+            uncontrollable = transformed.view((rank, rank), (remaining, remaining)).into();
             let new_basis: DMatrix<f64> = basis * step.right;
             controllable.extend((0..rank).map(|column| new_basis.column(column).into_owned()));
-            basis = new_basis.columns(rank, left).into();
+            basis = new_basis.columns(rank, remaining).into();
             reference = size;
         }
         let rank = controllable.len();

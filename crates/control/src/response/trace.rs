@@ -196,7 +196,7 @@ impl Modes {
     /// Steps from 0 to `end`, or to the end of the slowest mode if `end` is infinite.
     fn segments(&self, end: f64) -> Vec<Segment> {
         let mut segments = Vec::new();
-        let (mut from, mut left) = (0.0, MOST_POINTS);
+        let (mut from, mut remaining) = (0.0, MOST_POINTS);
         for first in 0..self.list.len() {
             let is_last = first + 1 == self.list.len();
             let mode_end = self.list[first].end;
@@ -208,13 +208,13 @@ impl Modes {
             let rate = self.list[first..].iter().map(|mode| mode.rate).fold(0.0_f64, f64::max);
             let resolving = 1.0 / (STEPS[usize::from(self.list.len() >= LARGE)] * rate);
             let reserved = RESERVED * as_number(self.list.len() - first);
-            let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
+            let spacing = resolving.max((until - from) / (remaining - reserved).max(RESERVED));
             let is_coarse = spacing > resolving;
             if self.period == 0.0 && until + spacing < end {
                 // Steps are powers of two, so that neighbours share a propagator. The last step may end after `until`.
                 let step = power_of_two(spacing / SQRT_2);
                 let count = ((until - from) / step).ceil();
-                left -= count;
+                remaining -= count;
                 from += count * step;
                 segments.push(Segment { step, count: as_count(count), is_coarse });
                 continue;
@@ -225,7 +225,7 @@ impl Modes {
             } else {
                 ((until - from) / spacing).ceil()
             };
-            left -= count;
+            remaining -= count;
             self.push(&mut segments, until - from, count, is_coarse);
             from = until;
         }
@@ -358,20 +358,20 @@ fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
     let Domain::Sampled { period } = *domain else {
         return FirstOrderHold::new(a, b, step);
     };
-    let mut left = as_count((step / period).round());
+    let mut remaining = as_count((step / period).round());
     let (n, m) = b.shape();
     let (zero, identity) = (DMatrix::zeros(n, m), DMatrix::identity(n, n));
     let mut total = FirstOrderHold { phi: identity, gamma_0: zero.clone(), gamma_1: zero.clone() };
     let mut power = FirstOrderHold { phi: a.clone(), gamma_0: b.clone(), gamma_1: zero };
     let (mut power_time, mut time) = (period, 0.0);
-    while left > 0 {
-        if left % 2 == 1 {
+    while remaining > 0 {
+        if remaining % 2 == 1 {
             total = chained(&total, time, &power);
             time += power_time;
         }
         power = chained(&power, power_time, &power);
         power_time *= 2.0;
-        left /= 2;
+        remaining /= 2;
     }
     Ok(total)
 }
