@@ -4,9 +4,9 @@ use crate::{CallError, EventInfo};
 
 /// A slave whose events its master handles, after [`Slave::hand_over_events`](crate::Slave::hand_over_events).
 ///
-/// An instant is superdense (E. A. Lee and H. Zheng, HSCC 2005): all slaves are brought to it, then the master
-/// repeats at this time: read the outputs, set the inputs that follow from them, update the discrete states, until
-/// nothing changes any more (FMI 3.0.2, sections 2.3.5 and 4.2; FMI 2.0.5, section 3.2).
+/// Time is superdense (E. A. Lee and H. Zheng, HSCC 2005). When all slaves have reached the time of an event, the
+/// master repeats: read outputs, set the connected inputs, update the discrete states, until nothing changes
+/// (FMI 3.0.2, sections 2.3.5 and 4.2; FMI 2.0.5, section 3.2).
 #[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
 pub trait Events {
     /// Returns the time in s of the next event that is known before it happens: a time event, or the tick of an input
@@ -17,8 +17,8 @@ pub trait Events {
     /// already in event mode, the clocks tick without a change of mode.
     fn enter_event_mode(&mut self) -> Result<(), CallError>;
 
-    /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. Clocks do not tick any more
-    /// after it, but for those that it gives an interval of 0 s: they tick for the next iteration.
+    /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. It ends the ticks of all
+    /// clocks. A clock to which it gives an interval of 0 s ticks again in the next iteration.
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError>;
 
     /// `fmi3EnterStepMode`, `fmi2EnterContinuousTimeMode`, after the last iteration of an event.

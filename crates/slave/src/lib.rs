@@ -1,4 +1,4 @@
-//! The trait [`Slave`]: the interface through which a co-simulation master calls an FMU, or anything that it steps
+//! The trait [`Slave`]: the interface through which a co-simulation master calls an FMU, or a model that runs
 //! together with FMUs: a model in Rust, a proxy for a process, a test double.
 //!
 //! `fmu-import` implements it for FMUs; `master` couples slaves.
@@ -23,7 +23,7 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 /// The functions are named after FMI 2.0.5, sections 2.1 and 4.2. A slave of another version maps them
 /// to its own:
 ///
-/// * `get_real` and `set_real` access `Float64` and `Float32`; a value of a `Float32` is rounded to it.
+/// * `get_real` and `set_real` access `Float64` and `Float32`; a `Float32` gets the value in single precision.
 /// * `get_integer` and `set_integer` access all integer types and enumerations as `i64`. A value that
 ///   the type of the variable cannot represent is an error.
 /// * `get_boolean` and `set_boolean` also access clocks: see [`Slave::get_boolean`].
@@ -45,7 +45,7 @@ pub trait Slave: Send {
     /// Only [`Slave::configure`] changes it.
     fn description(&self) -> &ModelDescription;
 
-    /// Whether the outputs depend on the present inputs only, with no state in between. The Jacobi
+    /// Whether the slave has no states: its outputs depend on the present inputs only. The Jacobi
     /// method steps such a slave after all others, when its inputs are known.
     fn is_function(&self) -> bool {
         false
@@ -105,8 +105,8 @@ pub trait Slave: Send {
         Err(absent("fmi2SetInteger"))
     }
 
-    /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks, otherwise if it has ticked in
-    /// the last step or in the instant at its end.
+    /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks. Otherwise it is true if it has
+    /// ticked in the last step or at the end of that step.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
         Err(absent("fmi2GetBoolean"))
     }
@@ -193,8 +193,8 @@ pub trait Slave: Send {
         Err(absent("fmi2DeSerializeFMUstate"))
     }
 
-    /// Sets Real inputs and their derivatives, steps, and reads Real outputs and their derivatives, also after a partial
-    /// step. It is one call, so that a slave in another process receives one request.
+    /// Sets Real inputs and their derivatives, makes the step, and reads Real outputs and their derivatives, also
+    /// after a partial step. One function, so that a slave in another process receives one request.
     fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         if !request.inputs.is_empty() {
             self.set_real(request.inputs, request.input_values)?;
@@ -221,7 +221,7 @@ pub trait Slave: Send {
         Ok(done)
     }
 
-    /// [`Slave::advance`] without derivatives, the fastest form: sets the inputs (references and
+    /// [`Slave::advance`] without derivatives, which is faster: sets the inputs (references and
     /// values), makes the step, reads the outputs (references and values).
     fn pass(
         &mut self,
@@ -249,19 +249,19 @@ pub trait Slave: Send {
         None
     }
 
-    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
-    /// status, results and the end of the line after it. Returns false if the slave cannot do so; the
-    /// caller then logs the functions of this trait.
+    /// Logs the C calls of this slave: passes to `sink` the text of each call before the call, and status, results
+    /// and the end of the line after the call. Returns false if the slave cannot log C calls; the caller then logs
+    /// the functions of this trait.
     fn log_calls(&mut self, sink: CallSink) -> bool {
         false
     }
 
-    /// Lets the FMU get copies of arrays in its calls from now on, with canaries around them: a write past an array or
-    /// into a constant one is an error of the call. Does nothing if the slave calls no C functions in this process.
+    /// From now on passes copies of arrays to the FMU, with canaries around them: a call fails if it writes past an
+    /// array or into a `const` array. Does nothing if the slave calls no C functions in this process.
     fn guard_arrays(&mut self) {}
 
-    /// Returns what the FMU has changed for its whole process, a phrase each: environment, working directory, rounding
-    /// mode, locale, process group. Empty unless the FMU is alone in a process.
+    /// Returns the settings of its process that the FMU has changed, one phrase each: environment, working directory,
+    /// rounding mode, locale, process group. Empty unless the FMU is alone in a process.
     fn process_changes(&mut self) -> Result<Vec<String>, CallError> {
         Ok(Vec::new())
     }
@@ -304,7 +304,7 @@ pub trait Background {
 ///
 /// # Errors
 ///
-/// The [`CallError`] of that function.
+/// The [`CallError`] of the function called.
 pub fn finish(
     slave: &mut dyn Slave,
     request: &mut StepRequest<'_>,

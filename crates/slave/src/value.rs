@@ -24,8 +24,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// Reads `text` as a value of a variable of that kind, without the blanks around it unless it is a
-    /// String. An Enumeration is any integer, or the name of an item of its type in `types`.
+    /// Reads `text` as a value of a variable of type `kind`; blanks around it are ignored, except in a String.
+    /// An Enumeration is any integer, or the name of an item of its type in `types`.
     ///
     /// # Errors
     ///
@@ -66,7 +66,7 @@ fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
     })
 }
 
-/// The types between which a master distinguishes: the functions of a slave that access a variable.
+/// The types that a master distinguishes, by the functions of [`crate::Slave`] that access a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ValueType {
     /// `get_real` and `set_real`: Real, `Float64`, `Float32`.
@@ -82,7 +82,7 @@ pub enum ValueType {
 }
 
 impl ValueType {
-    /// Returns the type of the values of a variable of that kind.
+    /// Returns the type by which a master accesses a variable of type `kind`.
     #[must_use]
     pub fn of(kind: &Kind) -> Self {
         match kind {
@@ -133,8 +133,8 @@ pub fn from_hex(text: &str) -> Option<Vec<u8>> {
 }
 
 impl Value {
-    /// Returns the start value in a model description; `None` without one, for a String, a binary and a
-    /// clock, and for an integer above `i64::MAX`.
+    /// Returns the start value that the model description states. `None` if there is none, for a String, a
+    /// Binary and a Clock, and for an integer above `i64::MAX`.
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
