@@ -28,12 +28,12 @@ impl SizeBounds {
     }
 }
 
-/// The control law of all controllers, for an error proportional to `H^q`:
+/// The control law of all controllers, for a step of size H with an error e proportional to `H^q`:
 ///
 /// `H_next / H = (e / e_0)^(-0.7/q) (e_before / e_0)^(0.4/q)`, `e_0 = 0.9^q`,
 ///
-/// a PI controller in log H and log e. Its steady state is `e = e_0`, at 0.9 times the step for
-/// which `e = 1`. Gustafsson 1991, "Control theoretic techniques for stepsize selection in explicit
+/// a PI controller in log H and log e, with the error `e_before` of the previous step. Its steady state is `e = e_0`,
+/// 0.9 times the step with `e = 1`. Gustafsson 1991, "Control theoretic techniques for stepsize selection in explicit
 /// Runge-Kutta methods"; exponents: Hairer and Wanner 1996, section IV.2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Law {
@@ -87,7 +87,7 @@ pub enum Verdict {
 
 /// Step size control by an error estimate; a step with too large an error is repeated.
 ///
-/// A step with `e <= 1`, e being relative to the tolerance, is accepted ([`super::Scale::distance`]).
+/// A step is accepted if its error relative to the tolerance ([`super::Scale::distance`]) is at most 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorControl {
     bounds: SizeBounds,
@@ -108,8 +108,8 @@ impl ErrorControl {
 
     /// Accepts or rejects a step of `size` s with this error; NaN counts as infinite.
     ///
-    /// The step after a repeated one is not larger than it. A step that was shortened to end at an event or a stop
-    /// time does not shorten the following steps.
+    /// The step after a repeated step is not larger than the repeated one. A step that was shortened to end at an
+    /// event or a stop time does not shorten the following steps.
     pub fn judge(&mut self, size: f64, error: f64) -> Verdict {
         if error.is_nan() || error > 1.0 {
             return self.reject(size, error);
@@ -162,8 +162,8 @@ impl ForwardControl {
         Self { bounds, law: Law::new(exponent.max(1.0)), requested: bounds.smallest }
     }
 
-    /// Returns the size of the next step in s after a step of `size` s with this measure, whose target is at most 1; NaN
-    /// counts as infinite.
+    /// Returns the size of the next step in s after a step of `size` s with this `measure`. The law aims at a measure of
+    /// at most 1; NaN counts as infinite.
     ///
     /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {
@@ -213,7 +213,7 @@ impl Bond {
 ///
 /// The measure is `e = sqrt(1/n sum_k (dP_k / (absolute N_k + relative P_k))^2)` with the power
 /// residual `dP_k` of [`Bond::residual`], the largest power `P_k` of bond k so far, and the product
-/// `N_k` of the nominals of its signals. The energy error of a bond until t is then about
+/// `N_k` of the nominals of its signals. The energy error of a bond from t0 to t is then about
 /// `relative P_k (t - t0)`. Sadjina, Kyllingstad, Skjong and Pedersen 2017, "Energy conservation and
 /// power bonds in co-simulations: non-iterative adaptive step size control and error estimation",
 /// relate the energy `dP_k H` to an energy given by the user; here the largest power replaces it.

@@ -9,7 +9,7 @@ pub struct Factors {
     n: usize,
     /// L below the diagonal, U on and above it, column by column.
     entries: Vec<f64>,
-    /// For each column the row that was swapped with its diagonal.
+    /// For each column k the row that was swapped with row k.
     pivots: Vec<usize>,
     /// Memory for a column of the inverse.
     unit: Vec<f64>,

@@ -55,7 +55,7 @@ pub struct Newton {
     /// The merit ([`Convergence::merit`]) at the start of the last step.
     before: f64,
     stage: Stage,
-    /// The residual of the linear system, then its correction of the direction.
+    /// The residual of the linear system, then the correction of the direction by iterative refinement.
     left: Vec<f64>,
 }
 

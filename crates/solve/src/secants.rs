@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Ratio of the changes of residual and values below which the change of the residual is rounding.
+/// A residual whose change is below this fraction of the change of the values changes only by rounding.
 const ROUNDING: f64 = 1e-11;
 
 /// Pairs of differences, dR of residuals and dG of values, the newest first.
 ///
-/// The least squares problem `min |r - dR c|` in the weighted norm is solved by Gram-Schmidt
-/// orthogonalisation, done twice, from the newest column to the oldest. A column whose norm falls
-/// below a given ratio by orthogonalisation against the newer ones is linearly dependent and is
+/// The least squares problem `min |r - dR c|`, r the residual, in the weighted norm is solved by Gram-Schmidt
+/// orthogonalisation, done twice, from the newest column to the oldest. If orthogonalisation against the newer
+/// columns reduces the norm of a column below a given ratio, the column is linearly dependent and is
 /// dropped: the filter QR2 of Haelterman, Bogaers, Scheufele, Uekermann and Mehl 2016, "Improving the
 /// performance of the partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -154,8 +154,8 @@ impl Secants {
         }
     }
 
-    /// Computes column `rank` of Q and R from `slot`; returns false if its norm falls below the ratio
-    /// `filter`, is rounding beside the change of the values, or is NaN.
+    /// Computes column `rank` of Q and R from the pair in `slot`. Returns false if its norm falls below the ratio
+    /// `filter`, is a rounding error of the change of the values, or is NaN.
     fn orthogonalise(&mut self, slot: usize, rank: usize, weights: &[f64], filter: f64) -> bool {
         let n = self.n;
         let (done, rest) = self.orthonormal.split_at_mut(rank * n);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Returns the solution and the end of the iteration; `matrix` computes column j of dG/du at u.
+/// Returns the solution and the last progress. Difference quotients of `g` give the matrix dG/du.
 fn solve(
     solver: &mut dyn Solver,
     start: &[f64],

@@ -114,7 +114,7 @@ fn a_resting_system_reaches_the_largest_step_and_an_error_of_zero_is_no_obstacle
 
 #[test]
 fn the_residual_of_a_bond_is_the_power_given_less_the_power_got() {
-    // One FMU took the force 10 N and moved with 2 m/s; the force was 11 N, the other took 1.5 m/s.
+    // One FMU received the force 10 N and computed 2 m/s; the other computed 11 N and received 1.5 m/s.
     let bond = Bond { first: (10.0, 11.0), second: (1.5, 2.0) };
     assert!((bond.residual() - (10.0 * 2.0 - 11.0 * 1.5)).abs() < 1e-15);
     assert!((bond.power() - 22.0).abs() < 1e-15);
@@ -127,10 +127,10 @@ fn energy_control_measures_the_residuals_by_the_largest_power_so_far() {
     let mut control = EnergyControl::new(BOUNDS, 1.0, 0.01, 0.0, &[1.0, 1.0]);
     let strong = Bond { first: (100.0, 100.0), second: (1.0, 1.0) };
     assert!(control.measure(&[strong, strong]).abs() < 1e-15);
-    // Both lose 0.5 W of at most 100 W, the first one at rest: 0.5 / (0.01 * 100) each.
+    // Both bonds have a residual of 0.5 W and a largest power of 100 W: 0.5 / (0.01 * 100) each.
     let loses = Bond { first: (1.0, 0.5), second: (0.0, 0.5) };
     assert!((control.measure(&[loses, loses]) - 0.5).abs() < 1e-12);
-    // One of two right: the root of the mean square.
+    // One of two bonds has no residual: the measure is the root of the mean square.
     assert!((control.measure(&[loses, strong]) - f64::sqrt(0.125)).abs() < 1e-12);
 }
 
