@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Computes the lower triangular L with L L' = A, A given by its lower triangle.
 ///
-/// The error is the order, from 1, of the first leading minor that is not positive, or NaN.
+/// The error is the order, from 1, of the first leading minor that is NaN or not positive.
 pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     let n = a.nrows();
     let mut l = DMatrix::zeros(n, n);
@@ -59,7 +59,7 @@ pub(crate) struct Elimination {
 }
 
 impl Elimination {
-    /// Factors a square A, to the end also if a pivot is zero.
+    /// Factors a square A; continues after a pivot of zero.
     pub(crate) fn new(a: &DMatrix<f64>) -> Self {
         let n = a.nrows();
         let mut lu = Self { factors: a.clone(), swaps: Vec::with_capacity(n), singular: None };

@@ -79,7 +79,7 @@ impl Layout {
     pub(crate) unsafe fn read<T: Number>(self, from: *const T, part: Part) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows, self.cols, |row, col| {
             if part.holds(row, col) {
-                // SAFETY: the entry is inside of the array, see above.
+                // SAFETY: the caller guarantees that the array has this entry.
                 unsafe { from.add(row + col * self.step).read() }.wide()
             } else {
                 0.0
@@ -97,7 +97,7 @@ impl Layout {
         for (at, value) in m.iter().enumerate() {
             let (row, col) = (at % self.rows, at / self.rows);
             if part.holds(row, col) {
-                // SAFETY: the entry is inside of the array, see above.
+                // SAFETY: the caller guarantees that the array has this entry.
                 unsafe { to.add(row + col * self.step).write(T::narrow(*value)) }
             }
         }
@@ -118,7 +118,7 @@ impl<P> Vector<P> {
         (increment != 0).then_some(Self { data, length, increment })
     }
 
-    /// The distance of entry `at`, from 0, from the pointer of the vector, in entries.
+    /// The offset of entry `at`, counted from 0, from the pointer of the vector.
     fn offset(&self, at: usize) -> usize {
         let step = self.increment.unsigned_abs() as usize;
         if self.increment < 0 { (self.length - 1 - at) * step } else { at * step }
@@ -133,7 +133,7 @@ impl<T: Number> Vector<*const T> {
     /// The pointer is valid for reads of the entries.
     pub(crate) unsafe fn read(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.length, 1, |at, _| {
-            // SAFETY: the entry belongs to the vector, see above.
+            // SAFETY: the caller guarantees that the vector has this entry.
             unsafe { self.data.add(self.offset(at)).read() }.wide()
         })
     }
@@ -144,10 +144,10 @@ impl<T: Number> Vector<*mut T> {
     ///
     /// # Safety
     ///
-    /// The pointer is valid for reads and writes of the entries; `product` is a column of them.
+    /// The pointer is valid for reads and writes of the entries; `product` is a column of the same length.
     pub(crate) unsafe fn update(&self, product: &DMatrix<f64>, beta: T) {
         for (at, &value) in product.iter().enumerate() {
-            // SAFETY: the entry belongs to the vector, see above.
+            // SAFETY: the caller guarantees that the vector has this entry.
             unsafe {
                 let entry = self.data.add(self.offset(at));
                 let before =

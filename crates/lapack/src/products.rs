@@ -32,7 +32,7 @@ impl<T: Number> Operand<T> {
     unsafe fn read(&self) -> Option<DMatrix<f64>> {
         let array = |rows, cols| {
             let layout = Layout::new(rows, cols, self.leading)?;
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             Some(unsafe { layout.read(self.data, Part::All) })
         };
         match self.transpose.to_ascii_uppercase() {
@@ -43,7 +43,7 @@ impl<T: Number> Operand<T> {
     }
 }
 
-/// The output array C, the part of it that is written, and the two factors.
+/// The output array C, the part of C that is written, and the factors alpha and beta.
 pub(crate) struct Target<T> {
     pub(crate) data: *mut T,
     pub(crate) leading: i32,
@@ -64,10 +64,10 @@ impl<T: Number> Target<T> {
         let (layout, part) = (Layout::new(rows, cols, self.leading)?, self.part?);
         let mut sum = product * self.alpha.wide();
         if self.beta.wide() != 0.0 {
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             sum += unsafe { layout.read(self.data, part) } * self.beta.wide();
         }
-        // SAFETY: the caller guarantees it.
+        // SAFETY: the caller guarantees valid pointers.
         unsafe { layout.write(self.data, &sum, part) };
         Some(())
     }
@@ -80,7 +80,7 @@ pub(crate) unsafe fn general<T: Number>(
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         let (left, right) = (a.read()?, b.read()?);
         c.update(a.rows, b.cols, left * right)
@@ -90,7 +90,7 @@ pub(crate) unsafe fn general<T: Number>(
 /// A triangle of C := alpha op(A) op(A)' + beta C with C of n x n and op(A) of n x k; None, with C unchanged,
 /// if an argument is illegal.
 pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<()> {
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         let left = a.read()?;
         c.update(a.rows, a.rows, &left * left.transpose())
@@ -104,7 +104,7 @@ pub(crate) unsafe fn rank_2k<T: Number>(
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         let (left, right) = (a.read()?, b.read()?);
         let half = left * right.transpose();
@@ -128,7 +128,7 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
     [alpha, beta]: [T; 2],
 ) -> Option<()> {
     let (x, y) = x.zip(y)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { y.update(&(a.read()? * x.read() * alpha.wide()), beta) };
     Some(())
 }
@@ -143,7 +143,7 @@ pub(crate) unsafe fn symmetric_vector<T: Number>(
 ) -> Option<()> {
     let (part, layout) = (Part::triangle(a.triangle)?, Layout::new(a.n, a.n, a.leading)?);
     let (x, y) = x.zip(y)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         let half = layout.read(a.data, part);
         let mut whole = &half + half.transpose();

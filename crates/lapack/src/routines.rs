@@ -1,7 +1,7 @@
 //! The routines of LAPACK on arrays. Their error is the code INFO.
 //!
-//! -i: argument i, from 1, is illegal; above 0: see the routine. The callers guarantee that the pointers are valid for
-//! the sizes that the arguments state.
+//! INFO -i: argument i, counted from 1, is illegal. Each routine states the meaning of INFO above 0. The callers
+//! guarantee that the pointers are valid for the sizes that the arguments state.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::factor::{Elimination, backward, cholesky, forward};
@@ -42,12 +42,12 @@ fn from_one(index: usize) -> i32 {
 pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Result<(), i32> {
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 4)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     let half = unsafe { layout.read(a.at, part) };
     let lower = if part == Part::Lower { half } else { half.transpose() };
     let l = cholesky(&lower).map_err(from_one)?;
     let factor = if part == Part::Lower { l } else { l.transpose() };
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { layout.write(a.at, &factor, part) };
     Ok(())
 }
@@ -63,11 +63,11 @@ pub(crate) unsafe fn potrs<T: Number>(
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 5)?;
     let right = b.layout(n, size(right_sides, 3)?, 7)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     let (factor, right_side) = unsafe { (layout.read(a.at, part), right.read(b.at, Part::All)) };
     let l = if part == Part::Lower { factor } else { factor.transpose() };
     let x = backward(&l.transpose(), &forward(&l, &right_side));
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { right.write(b.at, &x, Part::All) };
     Ok(())
 }
@@ -82,11 +82,11 @@ pub(crate) unsafe fn gesv<T: Number>(
 ) -> Result<(), i32> {
     let layout = a.layout(size(n, 1)?, n, 4)?;
     let right = b.layout(n, size(right_sides, 2)?, 7)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     let (matrix, right_side) =
         unsafe { (layout.read(a.at, Part::All), right.read(b.at, Part::All)) };
     let elimination = Elimination::new(&matrix);
-    // SAFETY: the caller guarantees it; there are n pivots.
+    // SAFETY: the caller guarantees valid pointers; there are n pivots.
     unsafe {
         layout.write(a.at, &elimination.factors, Part::All);
         for (step, &pivot) in elimination.swaps.iter().enumerate() {
@@ -96,7 +96,7 @@ pub(crate) unsafe fn gesv<T: Number>(
     if let Some(pivot) = elimination.singular {
         return Err(from_one(pivot));
     }
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { right.write(b.at, &elimination.solve(&right_side), Part::All) };
     Ok(())
 }
@@ -131,12 +131,12 @@ pub(crate) unsafe fn syevr<T: Number>(
     }
     let part = Part::triangle(triangle).ok_or(-3)?;
     let layout = a.layout(size(n, 4)?, n, 6)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     let half = unsafe { layout.read(a.at, part) };
     let upper = if part == Part::Upper { half } else { half.transpose() };
     let vectors = compute_vectors.then(|| to.vectors.layout(n, n, 15)).transpose()?;
     let (values, directions) = symmetric_eigen(&upper).ok_or(NOT_CONVERGED)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         to.count.write(n);
         for (at, &value) in values.iter().enumerate() {
@@ -195,13 +195,13 @@ pub(crate) unsafe fn singular_values<T: Number>(
     let layout = a.layout(size(m, first)?, size(n, first + 1)?, first + 3)?;
     let u_layout = to.left.array.layout(if left == 0 { 0 } else { m }, left, first + 6)?;
     let vt_layout = to.right.array.layout(right, if right == 0 { 0 } else { n }, first + 8)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     let matrix = unsafe { layout.read(a.at, Part::All) };
     if matrix.iter().any(|entry| entry.is_nan()) {
         return Err(-(first + 2));
     }
     let svd = Svd::new(&matrix).ok_or(NOT_CONVERGED)?;
-    // SAFETY: the caller guarantees it.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
         for (at, &value) in svd.values.iter().enumerate() {
             to.values.add(at).write(T::narrow(value));
@@ -212,7 +212,7 @@ pub(crate) unsafe fn singular_values<T: Number>(
     Ok(())
 }
 
-/// The leading rows and columns, in the size of the layout.
+/// The leading block of `m` with the size of `layout`.
 fn corner(m: &DMatrix<f64>, layout: Layout) -> DMatrix<f64> {
     m.view((0, 0), (layout.rows, layout.cols)).into_owned()
 }

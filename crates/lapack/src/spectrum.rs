@@ -35,7 +35,7 @@ pub(crate) fn symmetric_eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix
 /// without a rotation.
 fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) -> bool {
     let coupling = m[(p, q)];
-    // Neither sum nor difference of the diagonal overflows in these forms.
+    // These forms of the sum and of the difference of diagonal entries do not overflow.
     let negligible = f64::EPSILON * m[(p, p)].abs() + f64::EPSILON * m[(q, q)].abs();
     if coupling.abs() <= negligible {
         (m[(p, q)], m[(q, p)]) = (0.0, 0.0);

@@ -17,7 +17,7 @@ fn code(answer: Result<(), i32>) -> i32 {
     answer.err().unwrap_or(0)
 }
 
-/// Exports functions, each with its first line of documentation.
+/// Exports C functions and adds a section on safety to their documentation.
 macro_rules! exported {
     ($(#[doc = $operation:literal] fn $name:ident($($argument:ident: $type:ty),* $(,)?) $body:block)*) => {$(
         #[doc = $operation]
@@ -56,7 +56,7 @@ macro_rules! symbols {
             let right = Operand { data: b, leading: *ldb, transpose: *transb, rows: *k, cols: *n };
             let part = Some(Part::All);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             unsafe { general(&left, &right, &target) };
         }
 
@@ -77,7 +77,7 @@ macro_rules! symbols {
             let matrix = Operand::of_array(a, *lda, *trans, *m, *n);
             let input = Vector::new(x, matrix.cols, *incx);
             let output = Vector::new(y, matrix.rows, *incy);
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             unsafe { matrix_vector(&matrix, input, output, [*alpha, *beta]) };
         }
 
@@ -96,7 +96,7 @@ macro_rules! symbols {
         ) {
             let matrix = Symmetric { data: a, leading: *lda, triangle: *uplo, n: *n };
             let (input, output) = (Vector::new(x, *n, *incx), Vector::new(y, *n, *incy));
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             unsafe { symmetric_vector(&matrix, input, output, [*alpha, *beta]) };
         }
 
@@ -116,7 +116,7 @@ macro_rules! symbols {
             let left = Operand { data: a, leading: *lda, transpose: *trans, rows: *n, cols: *k };
             let part = Part::triangle(*uplo);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             unsafe { rank_k(&left, &target) };
         }
 
@@ -139,7 +139,7 @@ macro_rules! symbols {
             let right = Operand { data: b, leading: *ldb, transpose: *trans, rows: *n, cols: *k };
             let part = Part::triangle(*uplo);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             unsafe { rank_2k(&left, &right, &target) };
         }
 
@@ -151,7 +151,7 @@ macro_rules! symbols {
             lda: &i32,
             info: &mut i32,
         ) {
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             *info = code(unsafe { potrf(*uplo, *n, Array { at: a, leading: *lda }) });
         }
 
@@ -168,7 +168,7 @@ macro_rules! symbols {
         ) {
             let factor = Array { at: a.cast_mut(), leading: *lda };
             let right = Array { at: b, leading: *ldb };
-            // SAFETY: the caller guarantees it; the factor is only read.
+            // SAFETY: the caller guarantees valid pointers; the factor is only read.
             *info = code(unsafe { potrs(*uplo, *n, *nrhs, factor, right) });
         }
 
@@ -184,7 +184,7 @@ macro_rules! symbols {
             info: &mut i32,
         ) {
             let (matrix, right) = (Array { at: a, leading: *lda }, Array { at: b, leading: *ldb });
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             *info = code(unsafe { gesv(*n, *nrhs, matrix, ipiv, right) });
         }
 
@@ -221,7 +221,7 @@ macro_rules! symbols {
             let vectors = Array { at: z, leading: *ldz };
             let matrix = Array { at: a, leading: *lda };
             let to = Spectrum { count: m, values: w, vectors, support: isuppz };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             *info = code(unsafe { syevr([*jobz, *range, *uplo], *n, matrix, &to) });
         }
 
@@ -252,7 +252,7 @@ macro_rules! symbols {
             let right = Vectors { option: *jobz, array: Array { at: vt, leading: *ldvt } };
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             *info = code(unsafe { singular_values(*m, *n, matrix, &to, 2) });
         }
 
@@ -283,7 +283,7 @@ macro_rules! symbols {
             let right = Vectors { option: *jobvt, array: Array { at: vt, leading: *ldvt } };
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
-            // SAFETY: the caller guarantees it.
+            // SAFETY: the caller guarantees valid pointers.
             *info = code(unsafe { singular_values(*m, *n, matrix, &to, 3) });
         }
     } };
