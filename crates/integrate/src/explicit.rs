@@ -64,7 +64,7 @@ impl Explicit {
         }
     }
 
-    /// Attempts the step from `start` over `size`; sets the end and the error. An error of `derivative` ends it.
+    /// Attempts a step of `size` s from `start`; sets `end` and `error`. Returns an error of `derivative`.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
@@ -96,7 +96,7 @@ impl Explicit {
         if states > 0.0 { size * (slopes / states).sqrt() } else { 0.0 }
     }
 
-    /// Computes the states at the fraction `part` of the step from `start` over `size`.
+    /// Computes the states at the fraction `part` of the last step, which began at `start` and had `size` s.
     pub(crate) fn interpolate(&self, part: f64, size: f64, start: &[f64], states: &mut [f64]) {
         let rest = 1.0 - part;
         for (i, state) in states.iter_mut().enumerate() {

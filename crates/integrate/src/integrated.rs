@@ -39,7 +39,7 @@ enum Mode {
     Continuous,
 }
 
-/// The present point, except for the arrays of states, indicators and inputs.
+/// The state of the integration at the present time, except for the arrays of states, indicators and inputs.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Point {
     /// The time in s.
@@ -49,7 +49,7 @@ struct Point {
     next_event: Option<f64>,
     /// Whether the FMU requested the end of the simulation.
     ends: bool,
-    /// Whether an event has happened here, before event mode is entered.
+    /// Whether an event has happened at this time and event mode must be entered.
     event: bool,
     /// Whether inputs may have changed since the event indicators were read.
     input_changed: bool,
@@ -91,11 +91,11 @@ fn clocks_of(description: &ModelDescription) -> Vec<u32> {
 ///
 /// The relative tolerance is that of `setup_experiment` if it is finite and above zero, otherwise 1e-6; the absolute
 /// tolerance of a state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets
-/// follow their derivatives within the step. Other variables that it changes after initialization cause an event, as
-/// the standard demands, if the value is a new one.
+/// follow their derivatives within the step. A new value of any other variable after initialization causes an event, as
+/// FMI requires.
 ///
-/// Where an event coincides with the end of a step, it belongs to this step: the outputs are those after
-/// the event. A master that handles the events ([`Slave::hand_over_events`]) reads them after its iteration.
+/// An event at the end of a step belongs to this step: the outputs are those after the event. A master that
+/// handles the events ([`Slave::hand_over_events`]) reads the outputs after it has iterated the event.
 pub struct Integrated {
     instance: Box<dyn ModelExchange>,
     description: ModelDescription,
@@ -108,7 +108,7 @@ pub struct Integrated {
     clocks: Vec<u32>,
     /// Whether the master handles the events.
     hands_over: bool,
-    /// Whether a step then ends at the first event.
+    /// Whether a step ends at its first event if the master handles the events.
     stops: bool,
     /// Whether the present event has changed the nominal values of the states.
     nominals_changed: bool,
@@ -170,7 +170,7 @@ impl Integrated {
         self.clocks = clocks_of(&self.description);
     }
 
-    /// Allocates what depends on the numbers of states and event indicators.
+    /// Allocates the arrays whose lengths are the numbers of states and event indicators.
     fn allocate(&mut self) -> Result<(), CallError> {
         self.states = vec![0.0; self.instance.number_of_continuous_states()?];
         self.indicators = vec![0.0; self.instance.number_of_event_indicators()?];
@@ -193,7 +193,7 @@ impl Integrated {
         Ok(Scale::new(self.tolerance, ABSOLUTE * self.tolerance, nominals))
     }
 
-    /// Returns words for a continuous state: with the name of its derivative, otherwise with its number, from 1.
+    /// Describes a continuous state for messages: by the name of its derivative, otherwise by its number, from 1.
     fn name_of_state(&self, index: usize) -> String {
         let variables = &self.description.variables;
         let at = |index: u32| variables.get((index as usize).checked_sub(1)?);

@@ -75,7 +75,7 @@ pub(crate) struct Rosenbrock {
     slope: Vec<f64>,
     /// Column by column.
     jacobian: Vec<f64>,
-    /// `I / (gamma size)` less the Jacobian, column by column.
+    /// `I / (gamma size)` minus the Jacobian, column by column.
     matrix: Vec<f64>,
     factors: Factors,
     /// The derivative of the right-hand side with respect to time.
@@ -98,7 +98,7 @@ impl Rosenbrock {
     }
 
     /// Computes the Jacobian and the derivative with respect to time at the start of a step of about
-    /// `size`. `typical` is the least size of a component for its difference quotient.
+    /// `size` s. The perturbation of a component is relative to its absolute value, but at least to `typical`.
     pub(crate) fn linearise<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
@@ -120,7 +120,7 @@ impl Rosenbrock {
             }
             self.argument[column] = value;
         }
-        // Within the step, because the time may not pass an event.
+        // The perturbed time is within the step, because it must not pass an event.
         let change = (f64::EPSILON * time.abs().max(1e-5)).sqrt().min(1e-3 * size);
         let there = time + change.max(4.0 * f64::EPSILON * time.abs());
         derivative(there, states, &mut self.with_time)?;
@@ -140,7 +140,7 @@ impl Rosenbrock {
         (0..n).map(row).fold(0.0, f64::max)
     }
 
-    /// Attempts the step from `start` over `size` after [`Rosenbrock::linearise`]; false for a singular matrix.
+    /// Attempts a step of `size` s from `start` after [`Rosenbrock::linearise`]; false for a singular matrix.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,

@@ -18,8 +18,8 @@ const GROW: f64 = 5.0;
 const RETREAT: f64 = 0.25;
 /// A remaining distance that exceeds the step by less than this factor is made in one step.
 const STRETCH: f64 = 1.01;
-/// The size of a state below which its difference quotients do not depend on it, relative to its nominal
-/// value. Reactions have states far below their nominal value that matter.
+/// The perturbation of a state for a difference quotient is relative to its absolute value, but at least to this
+/// fraction of its nominal value. The fraction is small for states of reactions far below their nominal value.
 const SMALL: f64 = 1e-3;
 /// `size |lambda|` at the border of stability of the explicit method.
 const BORDER: f64 = 3.25;
@@ -32,7 +32,7 @@ const STABLE: f64 = 2.0;
 /// Number of steps within [`STABLE`], in a row, after which the explicit method is used again.
 const STABLE_STEPS: u32 = 5;
 
-/// What one step leaves to the next one.
+/// Results of the last steps on which the size and the method of the next step depend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Memory {
     /// The proposed step in s; 0: none.
@@ -74,7 +74,6 @@ impl From<CallError> for StepError {
 
 /// Makes steps; keeps the last one for its continuous extension.
 pub(crate) struct Stepper {
-    /// What the last step leaves to the next one.
     pub(crate) memory: Memory,
     method: Method,
     scale: Scale,
@@ -184,7 +183,7 @@ impl Stepper {
         }
     }
 
-    /// Attempts a step; returns its error relative to the tolerance, not finite if the step has none.
+    /// Attempts a step; returns its error relative to the tolerance, which is not finite if the step failed.
     fn attempt(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
@@ -225,7 +224,7 @@ impl Stepper {
         let target = SAFETY.powf(order);
         let ratio = (error / target).powf(-0.7 / order) * (before / target).powf(0.4 / order);
         let ratio = ratio.clamp(SHRINK, if rejected { 1.0 } else { GROW });
-        // A step that a limit shortened says nothing against the proposed size.
+        // A step that was shortened to end at a limit does not reduce the proposed size.
         let shortened = size < memory.size && !rejected;
         memory.size = if shortened { memory.size.max(size * ratio) } else { size * ratio };
         memory.error = error;
@@ -303,7 +302,7 @@ impl Stepper {
         for (i, end) in explicit.end.iter_mut().enumerate() {
             *end = start[i] + guess * slope[i];
         }
-        // The memory of end and error is free until the next attempt.
+        // `explicit.end` and `explicit.error` are free until the next attempt.
         let bend = match derivative(time + guess, &explicit.end, &mut explicit.error) {
             Ok(()) => {
                 for (difference, slope) in explicit.error.iter_mut().zip(slope) {

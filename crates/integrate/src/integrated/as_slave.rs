@@ -6,8 +6,8 @@ use slave::{CallError, CallSink, Events, Slave, StepResult};
 use super::step::rounding;
 use super::{Integrated, Mode, TOLERANCE, failed};
 
-/// Largest difference between the start of a step and the end of the last one, relative to the step. It may also be
-/// rounding, or an event that is later than the end by rounding.
+/// Largest accepted difference between the start of a step and the end of the last one, relative to the step. A
+/// larger difference is accepted if it is rounding: an event may be later than the end of a step by rounding.
 const GAP: f64 = 1e-6;
 
 impl Integrated {

@@ -11,7 +11,7 @@ use super::{Integrated, Mode, failed};
 const EVENTS: u32 = 100_000;
 /// Difference of times that counts as rounding, relative to the time and the step.
 const ROUNDING: f64 = 1e-12;
-/// Largest difference in s that counts as rounding: what is integrated over it is lost.
+/// Largest difference of times in s that counts as rounding. The states are not integrated over it.
 const MOST: f64 = 1e-6;
 /// Width to which a state event is located, relative to the step of the integrator.
 const WIDTH: f64 = 1e-12;
@@ -90,7 +90,7 @@ impl Integrated {
                 let reached = self.point.time;
                 let at_end = reached >= end - rounding;
                 if self.hands_over && (at_end || self.stops && reached > start) {
-                    // Up to rounding, an event at the end is not before it.
+                    // An event that is earlier than the end by rounding is at the end.
                     let reached = if at_end { reached.max(end) } else { reached };
                     return Ok(StepResult::Event { reached });
                 }

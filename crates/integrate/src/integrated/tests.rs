@@ -150,7 +150,7 @@ fn steps_of_a_millisecond_in_seconds_since_1970_lose_neither_time_nor_events() {
     assert!((events - 4.0).abs() < 0.5, "{events}");
 }
 
-/// As of an FMU that adds its period again and again.
+/// The times of events of an FMU that adds up its period have such rounding errors.
 #[test]
 fn an_event_that_is_later_than_the_end_of_a_step_by_rounding_belongs_to_this_step() {
     let [x, events] = steps(&mut timer(|_| 1.0, 1e3, [0.01, 1.6e-10]), 1e3, 1e-4, 500);
@@ -158,7 +158,7 @@ fn an_event_that_is_later_than_the_end_of_a_step_by_rounding_belongs_to_this_ste
     assert!((events - 5.0).abs() < 0.5, "{events}");
 }
 
-/// The master takes an earlier event for one within the step.
+/// A reported time before the end of the step would mean an event within the step.
 #[test]
 fn an_event_that_is_earlier_than_the_end_of_a_step_by_rounding_is_at_this_end() {
     let mut slave = timer(|_| 1.0, 1e3, [0.01, -1.6e-10]);

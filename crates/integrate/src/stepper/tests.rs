@@ -100,7 +100,7 @@ fn a_state_without_a_derivative_ends_the_run_by_its_name() {
     assert!((time - 0.5).abs() < 1e-9, "{time}");
 }
 
-/// The FMU refuses long steps; the derivative of shorter ones is NaN, and it is the reason.
+/// The FMU refuses long steps. Shorter steps fail because their derivative is NaN, which is the cause.
 #[test]
 fn a_refusal_before_the_last_trial_step_is_not_the_cause() {
     let mut stepper = Stepper::new(Method::Explicit, Scale::new(1e-6, 1e-8, vec![1.0]));
