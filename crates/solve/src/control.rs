@@ -162,8 +162,8 @@ impl ForwardControl {
         Self { bounds, law: Law::new(exponent.max(1.0)), requested: bounds.smallest }
     }
 
-    /// Returns the size of the next step in s after a step of `size` s with this `measure`. The law aims at a measure of
-    /// at most 1; NaN counts as infinite.
+    /// Returns the size of the next step in s after a step of `size` s with this `measure`. The target of the measure
+    /// is at most 1; NaN counts as infinite.
     ///
     /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {
