@@ -19,7 +19,7 @@ const TRIAL: f64 = 1e-2;
 /// Smallest and largest height of a pulse, relative to the typical size of the input.
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 0.1;
-/// The drift over a record, relative to the typical sizes, above which the fit includes it.
+/// Drift of the states without pulses over a record, relative to the typical sizes, above which the fit includes it.
 const DRIFT: f64 = 1e-6;
 /// Number of pulse heights for the extrapolation to height zero; each is half of the previous one.
 const HEIGHTS: usize = 3;

@@ -28,8 +28,8 @@ impl Side {
     }
 }
 
-/// Returns on which side of `value` and by how much, at most `size`, `part` can be changed within `min` and `max`.
-/// If one side has less room than `size`, only the side with more room is used; without room it is an error.
+/// Returns the side of `value` on which `part` can be changed within its `min` and `max`, and the largest change, at
+/// most `size`. If one side has less room than `size`, only the side with more room is used; no room is an error.
 pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), LineariseError> {
     let (below, above) = (value - part.min, part.max - value);
     if below.max(above) <= 0.0 {
@@ -53,9 +53,9 @@ pub(super) type Estimate = (f64, f64);
 
 /// Returns the limit h -> 0 of a sequence whose value k belongs to the step h / ratio^k.
 ///
-/// The errors are powers `exponent`(1), `exponent`(2), ... of h; `noise`(k) is the rounding error
-/// of value k. The result is the entry of the extrapolation table with the smallest error; a single value has an
-/// infinite error, without values the result is NaN.
+/// The error of a value is a series in the powers `exponent`(1), `exponent`(2), ... of its step; `noise`(k) is the
+/// rounding error of value k. The result is the entry of the extrapolation table with the smallest error. The error
+/// of a single value is infinite; without values the result is NaN.
 ///
 /// C. J. F. Ridders, Accurate computation of F'(x) and F'(x) F''(x), Adv. Eng. Softw. 4 (1982).
 pub(super) fn extrapolate(
@@ -82,7 +82,7 @@ pub(super) fn extrapolate(
     best
 }
 
-/// Difference quotients of a vector function at a point, for steps from the first one down.
+/// Difference quotients of a vector function at a point, for decreasing steps.
 struct Samples {
     side: Side,
     /// The function at the point.
@@ -91,7 +91,7 @@ struct Samples {
     widths: Vec<f64>,
     /// For each component, the difference quotient of each step.
     slopes: Vec<Vec<f64>>,
-    /// For each component, the right slope minus the left slope of each step; of no use with one side.
+    /// For each component, the right slope minus the left slope of each step; only valid for [`Side::Both`].
     kinks: Vec<Vec<f64>>,
 }
 
@@ -143,7 +143,8 @@ impl Samples {
     }
 }
 
-/// The Jacobian of state derivatives and outputs by states and inputs, its errors, the first step of each column.
+/// The Jacobian of state derivatives and outputs with respect to states and inputs, its errors, and the first step
+/// of each column.
 pub(super) struct Differences {
     pub(super) jacobian: DMatrix<f64>,
     pub(super) errors: DMatrix<f64>,

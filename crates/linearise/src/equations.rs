@@ -1,4 +1,4 @@
-//! A plant's FMU as functions of time, states and inputs, for an estimator that carries the plant.
+//! A plant's FMU as functions of time, states and inputs, for an estimator that uses the equations of the plant.
 
 use fmu_import::Fmu;
 use nalgebra::DMatrix;
@@ -8,7 +8,7 @@ use super::parts::{Part, Parts, State};
 use super::point::{NAME, all_settable, finite, initialise, nominals, row_name, settle};
 use super::{Linearise, LineariseError, directional};
 
-/// Relative steps of differences: the cube root of the machine epsilon, which is the best one of two-sided differences.
+/// Relative step of two-sided differences: the cube root of the machine epsilon, which has the smallest error.
 const DIFFERENCE: f64 = 6e-6;
 
 /// The equations x' = f(t, x, u), y = h(t, x, u) of an FMU for model exchange.
@@ -19,8 +19,8 @@ const DIFFERENCE: f64 = 6e-6;
 /// remember earlier trajectories. An FMU that cannot save its state keeps its discrete variables instead. The states x
 /// have the order of the FMU; u has the inputs and then the faults of the request, y its outputs.
 ///
-/// A [`LineariseError`] of any function: a function of the FMU fails or returns a number that is not finite, events do
-/// not end, or the FMU asks for the end of the simulation.
+/// All functions return a [`LineariseError`] if a function of the FMU fails or returns a number that is not finite, if
+/// events do not end, or if the FMU requests the end of the simulation.
 pub struct PlantEquations {
     component: Box<dyn ModelExchange>,
     names: Names,
@@ -28,13 +28,13 @@ pub struct PlantEquations {
     next_event: Option<f64>,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// The states and inputs, by which the rows are differentiated.
+    /// The states and inputs, with respect to which the rows are differentiated.
     knowns: Vec<u32>,
     /// The rows (derivatives of the states, outputs) whose variable is none of `knowns`.
     unknown_rows: Vec<usize>,
     /// The variables of these rows.
     unknowns: Vec<u32>,
-    /// Their directional derivatives by one known.
+    /// The directional derivatives of `unknowns` with respect to one known.
     derivatives: Vec<f64>,
     /// The other rows, with the position of their variable in `knowns`.
     known_rows: Vec<(usize, usize)>,
@@ -62,7 +62,7 @@ struct Names {
 
 #[expect(clippy::missing_errors_doc, reason = "the type says them")]
 impl PlantEquations {
-    /// Creates the equations of `fmu` with the parameters of `request`, whose `states` do not matter: x has all.
+    /// Creates the equations of `fmu` with the parameters of `request`. Ignores its `states`: x has all states.
     ///
     /// # Errors
     ///
@@ -247,7 +247,7 @@ impl PlantEquations {
         all_finite(&self.names.rows[x.len()..], y)
     }
 
-    /// Sets `jacobian` to the derivatives of [f; h], n + p rows, by [x; u], n + m columns.
+    /// Sets `jacobian` to the derivatives of [f; h], n + p rows, with respect to [x; u], n + m columns.
     pub fn jacobian(
         &mut self,
         time: f64,
@@ -268,7 +268,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `column` to the directional derivatives by the known at `at`. A row that is itself a known needs no call.
+    /// Sets `column` to the derivatives with respect to known number `at`. A row that is itself a known needs no call.
     fn derivatives_by(&mut self, at: usize) -> Result<(), LineariseError> {
         let Self { component, knowns, unknowns, derivatives, column, .. } = self;
         if !unknowns.is_empty() {
@@ -283,7 +283,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets `column` to difference quotients by the known at `at`, one-sided at its `min` or `max`.
+    /// Sets `column` to difference quotients with respect to known number `at`, one-sided at its `min` or `max`.
     fn differences_by(&mut self, at: usize, x: &[f64], u: &[f64]) -> Result<(), LineariseError> {
         let n = x.len();
         let value = *x.get(at).unwrap_or_else(|| &u[at - n]);
@@ -303,7 +303,7 @@ impl PlantEquations {
         Ok(())
     }
 
-    /// Sets the known at `at` to `value` in the FMU, with `x` as the other states; `column` is a buffer.
+    /// Sets known number `at` to `value` in the FMU, with `x` as the other states; `column` is a buffer.
     fn change(&mut self, at: usize, n: usize, value: f64, x: &[f64]) -> Result<(), LineariseError> {
         if at >= n {
             self.component.set_real(&[self.inputs[at - n]], &[value])?;
@@ -317,12 +317,12 @@ impl PlantEquations {
     }
 }
 
-/// Returns the ends of a difference quotient: `step` below and above `value`, or `value` itself on the side on which
-/// only the end is beyond its limit.
+/// Returns the two points of a difference quotient: `step` below and above `value`. A point beyond a limit that
+/// `value` respects is replaced by `value`.
 fn ends(value: f64, step: f64, [min, max]: [f64; 2]) -> [f64; 2] {
     let low = if value - step < min && value >= min { value } else { value - step };
     let high = if value + step > max && value <= max { value } else { value + step };
-    // Without room on either side, the FMU decides.
+    // Without room on either side, the FMU decides whether it accepts values beyond the limits.
     if low < high { [low, high] } else { [value - step, value + step] }
 }
 

@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_solution_is_the_line_through_scattered_points() {
-        // The scatter is at right angles to the line and to the constant.
+        // The scatter is orthogonal to both columns of x.
         let x = DMatrix::from_row_slice(4, 2, &[1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 1.0, 3.0]);
         let line = DMatrix::from_column_slice(4, 1, &[0.1, 1.0, 1.9, 2.8]);
         let scatter = DMatrix::from_column_slice(4, 1, &[0.1, -0.1, -0.1, 0.1]);

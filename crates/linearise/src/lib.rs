@@ -1,9 +1,9 @@
-//! Linearises an FMU about an operating point.
+//! Linearises an FMU with states x, inputs u, faults f and outputs y about an operating point, which has the index 0.
 //!
 //! x' = A (x - `x_0`) + B (u - `u_0`) + F (f - `f_0`) + x'_0, y = `y_0` + C (x - `x_0`) + D (u - `u_0`) + G (f - `f_0`)
 //!
-//! Three methods; an FMU with model exchange is linearised there, by the first or the second method, any other FMU in
-//! co-simulation by the first or the third:
+//! There are three methods. An FMU for model exchange is linearised in model exchange by the first or the second
+//! method, any other FMU in co-simulation by the first or the third:
 //!
 //! 1. `fmi2GetDirectionalDerivative`, if the interface has it. In model exchange the result is compared with the
 //!    second method.
@@ -51,9 +51,9 @@ pub struct Linearise {
     pub faults: Vec<String>,
     /// The measurements y: outputs, or local variables that can be differentiated.
     pub outputs: Vec<String>,
-    /// The states x in the requested order. If empty, all continuous states in the order of the
+    /// The states x in the requested order; empty for all continuous states in the order of the
     /// FMU. States that are not named are left out; it is an error if a remaining state or output
-    /// depends on them. The third method needs all states by name.
+    /// depends on them. The third method needs the names of all states.
     pub states: Vec<String>,
     /// The operating point as names and values: parameters, start values, inputs, and in model
     /// exchange the continuous states. All other variables have their start values.
@@ -73,7 +73,7 @@ pub struct Linearise {
 ///
 /// The [crate documentation](crate) says which method is used; [`Linearisation::method`] names it.
 ///
-/// * Directional derivatives: as exact as those of the FMU. One call per state and input.
+/// * Directional derivatives: the values of the FMU. One call per state and input.
 /// * Differences in model exchange: two-sided (one-sided at `min` or `max`), eight steps from 1 % of
 ///   the typical size down by factors of 4, extrapolated (Ridders 1982). The error estimate of each
 ///   entry is the sum of the extrapolation error, the rounding error and half of a jump of the slope;

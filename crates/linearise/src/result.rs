@@ -80,7 +80,7 @@ pub enum Method {
     },
 }
 
-/// The quantity that finite differences are taken of.
+/// The quantity that is differentiated by finite differences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Differences {
     /// `fmi2GetDerivatives` and outputs in model exchange.

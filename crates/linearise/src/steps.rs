@@ -44,8 +44,8 @@ struct Map {
     deviations: DMatrix<f64>,
 }
 
-/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]], both at the start of the
-/// record.
+/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]]. The matrices are those at
+/// the start of the record.
 struct Discrete {
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
@@ -108,7 +108,7 @@ fn lengths(states: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(Some(first), |count| Some(2 * count).filter(|next| *next <= MAX_STEPS))
 }
 
-/// Linearises by records of `count` steps; of `benches`, which differ in their step, the last has the shortest.
+/// Linearises by records of `count` steps. The last of `benches` has the shortest step.
 fn of_count(
     benches: &mut [Bench],
     parts: &Parts,
@@ -164,8 +164,8 @@ fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -
     }
 }
 
-/// Returns the continuous systems of the step sizes up to the first that has none, at least two, the shortest step
-/// last. `bench` has the shortest step, `longer` the others, the longest first.
+/// Returns the continuous systems of `bench`, last, and of the benches `longer`, whose steps descend. Leaves out a step
+/// size that has no continuous system, and all longer ones; it is an error if fewer than two step sizes remain.
 fn maps(
     bench: &Bench,
     longer: &mut [Bench],
@@ -266,8 +266,8 @@ fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map
     Some(Map { values, deviations })
 }
 
-/// Extrapolates each entry to step zero; returns the values and their errors. An exact FMU gives the same entry for
-/// every step; the error of an integration method of order q is of order h^q.
+/// Extrapolates each entry to step zero; returns the values and their errors. An FMU without integration error gives
+/// the same entry for every step h; the error of an integration method of order q is of order h^q.
 fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
     let (rows, columns) = maps[0].values.shape();
     let mut values = DMatrix::zeros(rows, columns);
