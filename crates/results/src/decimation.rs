@@ -33,7 +33,7 @@ pub struct Due {
 }
 
 impl Due {
-    /// Creates the decision by `decimation`, whose instants start at `start` in s.
+    /// Creates the schedule of `decimation` for a run that starts at `start` in s.
     #[must_use]
     pub fn new(decimation: Decimation, start: f64) -> Self {
         Self { decimation, start, next: 0.0, points: 0 }

@@ -2,7 +2,7 @@
 
 use std::fs::Metadata;
 
-/// Device and number of a file.
+/// Device and inode of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Identity {
     pub(super) device: u64,
@@ -16,7 +16,7 @@ impl Identity {
         Self { device: metadata.dev(), inode: metadata.ino() }
     }
 
-    /// The same for all files: while the file is open, nobody can delete or replace it.
+    /// Returns the same identity for all files: nobody can delete or replace an open file.
     #[cfg(not(unix))]
     pub(super) fn new(_: &Metadata) -> Self {
         Self { device: 0, inode: 0 }

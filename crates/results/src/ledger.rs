@@ -19,7 +19,7 @@ pub const WORDS: usize = ROWS + (1 << 16);
 const STATE: usize = 0;
 const DEVICE: usize = 1;
 const INODE: usize = 2;
-/// Length of the file in bytes, at the end of a row.
+/// Length of the file in bytes; the file ends with a whole row.
 const LENGTH: usize = 3;
 /// Number of bytes of the pending rows: whole rows that are not in the file yet.
 const PENDING: usize = 4;
@@ -37,15 +37,15 @@ const WORD: usize = size_of::<u64>();
 
 static SHARED: OnceLock<&'static [AtomicU64]> = OnceLock::new();
 
-/// Describes the next results file in `memory`, which a supervising process shares and whose words are zero. Has no
-/// effect if `memory` has fewer than [`WORDS`] words, or after a call that had one.
+/// Describes the next results file in `memory`, which a supervising process shares and whose words are zero. Ignores
+/// `memory` if it has fewer than [`WORDS`] words, or if an earlier call has set the shared memory.
 pub fn share(memory: &'static [AtomicU64]) {
     if memory.len() >= WORDS {
         let _ = SHARED.set(memory);
     }
 }
 
-/// The shared memory, as the process that writes the file uses it.
+/// The shared memory in the process that writes the file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ledger(&'static [AtomicU64]);
 
@@ -125,7 +125,7 @@ pub struct LeftFile {
     pub path: PathBuf,
     /// Whether the process had completed it.
     pub was_complete: bool,
-    /// What is wrong with it; `None` if it has all rows.
+    /// What is wrong with the file; `None` if it has all rows.
     pub damage: Option<String>,
 }
 
@@ -181,7 +181,7 @@ fn append(
         return Ok(Some("another file took its place during the run".to_owned()));
     }
     let (size, whole) = (metadata.len(), length + rows.len() as u64);
-    // The last write of a Parquet file may be unfinished: then the write before it counts. It never has rows here.
+    // A Parquet file never has pending rows. If its last write is unfinished, it has the rows of the write before.
     let is_unfinished = size > whole && rows.is_empty() && !was_complete;
     if size < length || size > whole && !is_unfinished {
         return Ok(Some(format!(
@@ -211,7 +211,7 @@ mod tests {
         std::iter::repeat_with(|| AtomicU64::new(0)).take(ROWS + 64).collect()
     }
 
-    /// Memory as a process leaves it that wrote `length` bytes to a file and had `rows` pending.
+    /// Returns the memory of an ended process that wrote `length` bytes to a file and had `rows` pending.
     fn left(path: &Path, length: u64, rows: &[u8]) -> Vec<AtomicU64> {
         let memory = memory();
         let Identity { device, inode } = Identity::new(&std::fs::metadata(path).unwrap());

@@ -79,7 +79,7 @@ pub struct Row<'a> {
     pub booleans: &'a [i32],
     /// Values of the String columns.
     pub strings: &'a [String],
-    /// For each clocked column, in their order, whether it has a value in this row; columns beyond the end have one.
+    /// For each clocked column, in order, whether it has a value in this row; columns beyond the end have a value.
     pub present: &'a [bool],
 }
 
@@ -196,7 +196,7 @@ pub enum ResultsError {
         /// The path.
         path: PathBuf,
     },
-    /// The process is a copy of the one that writes the file.
+    /// The process is a copy (fork) of the process that writes the file.
     #[error(
         "{}: an FMU has duplicated the process of the run (fork) and returned in both; only the first \
          process writes the results",

@@ -92,8 +92,8 @@ impl Columns {
         })
     }
 
-    /// Adds a row. An integer beyond the type of its column is limited to it. A value that `row` lacks
-    /// is 0, false or empty.
+    /// Adds a row. An integer beyond the range of its column's type is limited to that range. A value that
+    /// `row` lacks is 0, false or empty.
     fn push(&mut self, time: f64, row: &Row<'_>) {
         self.time.push(time);
         let mut reals = row.reals.iter().copied();
@@ -153,12 +153,12 @@ pub(super) fn limited(value: i64) -> i32 {
     i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
-/// The place where a [`MemorySink`] leaves its rows.
+/// The rows of a [`MemorySink`] that was finished or dropped.
 #[derive(Debug, Clone, Default)]
 pub struct Recorded(Arc<Mutex<Columns>>);
 
 impl Recorded {
-    /// Takes the rows of a sink that was finished or dropped; no rows before that, nor in a second call.
+    /// Moves the rows out. Returns no rows before the sink is finished or dropped, and in a second call.
     #[must_use]
     pub fn take(&self) -> Columns {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
@@ -262,7 +262,7 @@ mod tests {
         );
         kept.write(&later).unwrap();
         let read = |path| std::fs::read_to_string(path).unwrap();
-        // The file has the integer as the row had it; the memory limits it to the column's type.
+        // The file has the integer in full; the memory limits it to the range of the column's type.
         let limited = read(&direct).replace(&i64::MAX.to_string(), &i32::MAX.to_string());
         assert_eq!(read(&later), limited);
     }

@@ -110,9 +110,9 @@ impl OutputFile {
     /// Checks that this process created the file, that it is still the same file, and that its length and position
     /// are those after the last write.
     ///
-    /// Opens the file again if only the descriptor is lost. Cuts off what others have appended and resets the
-    /// position, so that later writes succeed; this interference is an error once. A file that others have shortened
-    /// remains an error. Length and position of a pipe or a device are not checked.
+    /// Opens the file again if only the descriptor is lost. Cuts off bytes that others have appended and resets the
+    /// position, so that later writes succeed; one call returns the error. For a file that others have shortened, every
+    /// call returns an error. Length and position of a pipe or a device are not checked.
     pub(super) fn verify(&mut self) -> Result<(), ResultsError> {
         if process::id() != self.process {
             return Err(ResultsError::Forked { path: self.path.clone() });
@@ -135,7 +135,7 @@ impl OutputFile {
             return Ok(());
         }
         if size >= self.length {
-            // The rows that are not yet in the file can be added after that.
+            // Later writes then append at the right place.
             let length = self.length;
             self.set_length(length)?;
         }
@@ -158,7 +158,7 @@ impl OutputFile {
         }
         let mut file = with_high_descriptor(file);
         file.seek(SeekFrom::Start(self.length)).map_err(|error| self.failed(error))?;
-        // By now the number of the former descriptor may belong to a file of the FMU.
+        // Not closed: the number of the former descriptor may by now belong to a file of the FMU.
         forget(std::mem::replace(&mut self.file, file));
         if !std::mem::replace(&mut self.reopened, true) {
             tracing::warn!(
@@ -179,7 +179,7 @@ impl OutputFile {
             return written.map_err(|error| self.failed(error));
         }
         if let Err(error) = self.file.write_all(bytes) {
-            // A reader could take an incomplete line for a row.
+            // Without the incomplete line, which a reader could take for a row.
             let length = self.length;
             let _ = self.set_length(length);
             return Err(self.failed(error));
@@ -188,7 +188,7 @@ impl OutputFile {
         Ok(())
     }
 
-    /// Writes `bytes` at `offset`, and leaves the position of the file behind them.
+    /// Writes `bytes` at `offset`. The position of the file is then behind these bytes.
     pub(super) fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), ResultsError> {
         #[cfg(test)]
         if let Some(changes) = &mut self.changes {

@@ -105,7 +105,7 @@ impl ParquetSink {
         let end = self.end + (self.bytes.len() + footer.len() + 8) as u64;
         let fits = end <= self.tail.start();
         let is_partial = self.written > 0;
-        // Not before `end`: the next tail, or this one again, then fits in front of the one at this offset.
+        // At or behind `end`, so that a tail at `self.end` fits in front of the tail at this offset.
         let offset = self.tail.file.length().max(end);
         if !fits && !is_partial {
             self.tail.move_footer(offset)?;

@@ -180,11 +180,11 @@ mod tests {
             (&["ctrl.x_hat[1]"], &[], &["ctrl.x_hat[1]"]),
             (&["*.x_hat[?]"], &[], &["ctrl.x_hat[1]", "ctrl.x_hat[2]"]),
             (&["*[2]"], &[], &["ctrl.x_hat[2]"]),
-            // A star crosses points, and a question mark is one letter.
+            // A star also matches dots, and a question mark is one character.
             (&["ctrl.*y"], &[], &["ctrl.inner.y"]),
             (&["plant.?_p"], &[], &["plant.x_p"]),
             (&["*theta*"], &[], &["plant.theta", "der(plant.theta)"]),
-            // A name with a star in it means that name.
+            // A pattern that equals a name selects only this name.
             (&["'a*b'"], &[], &["'a*b'"]),
             (&[], &["*theta*", "*.x_hat[*]"], &["plant.x_p", "ctrl.inner.y", "'a*b'"]),
         ];

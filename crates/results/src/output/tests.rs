@@ -2,7 +2,7 @@ use super::*;
 use crate::tests::{give, mixed};
 use crate::{Table, create};
 
-/// What an FMU could do to the file, and the start of the reason for which the next write fails.
+/// An action of an FMU on the file, and the start of the error message of the next write.
 type Deed = (fn(&Path), &'static str);
 
 fn open(path: &Path) -> File {

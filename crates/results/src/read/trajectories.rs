@@ -16,7 +16,7 @@ use crate::ColumnKind;
 /// Largest number of bytes of a matrix that is read as a whole.
 const WHOLE: u64 = 1 << 30;
 
-/// Where the values of a file are.
+/// The places of the values in a file.
 #[derive(Debug)]
 pub(super) struct Layout {
     /// The matrix of the values that vary.
@@ -42,7 +42,7 @@ struct Matrix {
     precision: Precision,
 }
 
-/// The form of the numbers of a matrix.
+/// The format of the numbers of a matrix.
 #[derive(Debug, Clone, Copy)]
 struct Precision {
     /// Number of bytes of a number.
@@ -52,7 +52,7 @@ struct Precision {
 }
 
 impl Precision {
-    /// Returns the form for the digit that a header states for it.
+    /// Returns the format for the digit that the header of a matrix states.
     fn of(digit: u32) -> Option<Self> {
         fn number<const N: usize, T: Into<f64>>(bytes: &[u8], number: fn([u8; N]) -> T) -> f64 {
             bytes.try_into().map_or(f64::NAN, |bytes| number(bytes).into())
@@ -249,7 +249,7 @@ pub(super) fn visit(
 ) -> Result<(), ResultsError> {
     let Layout { varying, places } = layout;
     if varying.size() == Some(0) {
-        // No byte of the file then limits the stated number of rows or columns.
+        // An empty matrix may state any number of columns, so they are not read.
         return Ok(());
     }
     let mut source = Source::open(path)?;
