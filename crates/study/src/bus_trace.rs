@@ -34,7 +34,7 @@ struct Writer {
     path: PathBuf,
     /// `None` until the FMUs are initialised.
     file: Option<File>,
-    /// What the file gets next. With a file it is written at once, so that a run that is killed loses no frame.
+    /// Bytes for the file. Once the file exists, they are written at once, so that a killed run loses no frame.
     bytes: Vec<u8>,
     format: Format,
     /// The present time in s, and the frames of this instant with their bus: several terminals of a bus may send
@@ -80,7 +80,7 @@ impl BusTrace {
     }
 
     /// Creates the file and its folder, and writes the frames so far. Call it after the initialisation, so that a run
-    /// that fails in it keeps the trace of an earlier one.
+    /// whose initialisation fails keeps the trace of an earlier run.
     pub(crate) fn create(&self) -> Result<(), Error> {
         let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let path = writer.path.clone();
@@ -149,8 +149,8 @@ struct Node {
     input: Option<String>,
 }
 
-/// Returns the terminals whose frames are traced: of a bus that an FMU simulates the terminals of this FMU, of other
-/// buses all terminals. The buses are numbered from 0.
+/// Returns the terminals whose frames are traced: the terminals of the FMU that simulates the bus or, without such an
+/// FMU, all terminals of the bus. The buses are numbered from 0.
 fn senders(system: &System) -> Vec<Sender> {
     let nodes = nodes(system);
     let links = links(system, &nodes);
@@ -181,7 +181,7 @@ fn is_simulation(system: &System, slave: usize) -> bool {
     system.slaves[slave].1.description().is_bus_simulation
 }
 
-/// Returns all terminals of CAN buses; each has a bus number that no other has.
+/// Returns all terminals of CAN buses, each with a different bus number.
 fn nodes(system: &System) -> Vec<Node> {
     let mut nodes = Vec::new();
     for (slave, (_, instance)) in system.slaves.iter().enumerate() {

@@ -27,15 +27,15 @@ use fmu_description::limits::{HELP, in_force};
 /// Largest size of a file in bytes. Reading takes 40 times as much memory.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// The content of a `system.toml`. Settings that are not stated are chosen for the system; TOML leaves out what is
-/// `None`.
+/// The content of a `system.toml`. Settings that are not stated are chosen for the system; `None` has no entry in
+/// the file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Config {
     /// A system structure on which the configuration builds: an SSP, an SSD, an `OspSystemStructure.xml`, or a folder
     /// with an SSD or an `OspSystemStructure.xml`.
     pub system: Option<PathBuf>,
-    /// Shared libraries loaded first, whose symbols are visible to the FMUs.
+    /// Shared libraries that are loaded before the FMUs, which see their symbols.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub preload: Vec<String>,
     /// Whether the libraries of FMUs that have source code only are built.

@@ -129,7 +129,7 @@ fn choose_interface(
     };
     match stated {
         Some(interface) if offers(interface) => Ok(interface),
-        // The system structure stated it for an FMU that the configuration has replaced.
+        // The system structure stated the interface for another FMU, which the configuration has replaced.
         Some(_) if config.interface.get(&element.name).is_none() => Ok(default),
         Some(interface) => Err(Error::Invalid(format!(
             "interface.{}: {} offers {} only, found {}",
@@ -168,8 +168,8 @@ impl<'a> FmuOpener<'a> {
         Ok(content)
     }
 
-    /// Creates an instance in a separate process: for co-simulation, or for model exchange if there is a `method`,
-    /// which then integrates it there. Returns an error for model exchange with a log of calls.
+    /// Creates an instance in a separate process: for model exchange, integrated there, if there is a `method`,
+    /// otherwise for co-simulation. Returns an error for model exchange with a log of calls.
     fn isolated(
         &self,
         element: &Element,
@@ -233,7 +233,7 @@ impl<'a> FmuOpener<'a> {
     }
 }
 
-/// Returns the path of the FMU of an element with a library for this platform, built if it has source code only.
+/// Returns the path of the FMU of an element. Builds its library first if the FMU has source code only.
 fn compiled(element: &Element) -> Result<PathBuf, Error> {
     let compiled = fmu_import::compile(&element.fmu);
     compiled.map_err(|error| as_shown(Error::from(error).within(&element.name), element))

@@ -18,8 +18,8 @@ const ROWS: f64 = 1e4;
 const LENGTH: f64 = 1.0;
 /// A step of fewer spacings between neighbouring floating-point times gives a warning.
 const STEP_RESOLUTION: f64 = 50.0;
-/// Relative tolerance: of a proposed step to a multiple of the communication step, and of the length of a run to
-/// [`ROWS`] steps.
+/// Relative difference up to which a proposed step counts as a multiple of the communication step, and the length of a
+/// run as [`ROWS`] steps.
 const NEAR: f64 = 1e-6;
 
 /// All settings of a run, stated or chosen.

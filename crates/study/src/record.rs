@@ -18,7 +18,7 @@ use crate::store::lock;
 
 /// All open results files, so that their rows can be written when the process ends.
 static FILES: Mutex<Files> = Mutex::new(Files { open: Vec::new(), is_watched: false });
-/// Longest time that a row stays in memory while the run makes no further one.
+/// Longest time that a row stays in memory while the run records no further row.
 const STALL: Duration = Duration::from_millis(250);
 /// Number of attempts to lock a file when the process ends.
 const TRIES: u32 = 50;

@@ -41,7 +41,7 @@ pub struct PreparedRun {
     scenario: Scenario,
     /// The tables in memory that the scenario reads.
     tables: Vec<(PathBuf, Table)>,
-    /// The system structure, whose folders are removed after the system.
+    /// The system structure, whose folders are removed after the system is dropped.
     opened: Option<Arc<Opened>>,
 }
 
@@ -302,7 +302,7 @@ pub struct Run {
     trace: Option<BusTrace>,
     /// The tables in memory that the scenario reads.
     tables: Vec<(PathBuf, Table)>,
-    /// The system structure, whose folders are removed after the simulation.
+    /// The system structure, whose folders are removed after the simulation is dropped.
     _opened: Option<Arc<Opened>>,
 }
 
@@ -364,7 +364,7 @@ impl Run {
             }
         }
         self.save()?;
-        // From here on, an FMU may end the process.
+        // Before `terminate`, in which an FMU may end the process.
         self.recorder.as_mut().map_or(Ok(()), Recorder::flush)?;
         self.simulation.terminate()?;
         self.simulation.free()?;

@@ -107,7 +107,7 @@ pub struct FaultEntry {
     pub gain: Option<Spanned<Gain>>,
     /// The added value grows linearly with time.
     pub drift: Option<Spanned<Drift>>,
-    /// The value sticks.
+    /// The value remains constant.
     pub stuck: Option<Spanned<Stuck>>,
     /// Values are lost.
     pub dropout: Option<Spanned<Dropout>>,

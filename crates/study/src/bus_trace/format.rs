@@ -261,7 +261,7 @@ mod tests {
             let fields: Vec<&str> = line.split_whitespace().collect();
             assert_eq!(fields[..5], ["0.500000", "CANFD", "1", "Rx", "1Ax"]);
             assert_eq!(fields[7..9], ["9", "12"]);
-            // After 12 bytes, the duration and the length of the message.
+            // Behind the 12 data bytes, the fields are the duration and the length of the message.
             [fields[5], fields[6], fields[23]].map(str::to_owned)
         };
         assert_eq!(flags(false, false), ["0", "0", "1000"]);

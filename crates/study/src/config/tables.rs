@@ -110,7 +110,7 @@ impl Isolation {
 pub struct CheckpointSettings {
     /// The file.
     pub file: Option<PathBuf>,
-    /// Simulated time in s between two checkpoints, beside the one at the end; default: only the one at the end.
+    /// Simulated time in s between two checkpoints; default: only a checkpoint at the end, which is written anyway.
     pub every: Option<Spanned<f64>>,
 }
 

@@ -21,8 +21,7 @@ const UNUSED: &str = "the first one that the run has not used yet";
 pub struct Intervention {
     /// Time in s that the run had reached when the entries were added.
     pub time: f64,
-    /// The earliest time in s at which the change can take effect, and at which it does unless an
-    /// entry states a later one.
+    /// The earliest time in s at which the change can take effect: the default time of an entry.
     pub from: f64,
     /// The entries with all times, as in a `system.toml` below `scenario`.
     pub text: String,

@@ -116,7 +116,7 @@ impl Literal {
     }
 }
 
-/// The largest magnitude of an integer whose double no other integer rounds to, 2^53 - 1.
+/// 2^53 - 1, the largest magnitude up to which no two integers round to the same double.
 const EXACT: i128 = (1 << f64::MANTISSA_DIGITS) - 1;
 
 /// Returns the smallest and largest integer that a signal can give to a variable of this type; `None` if its values are

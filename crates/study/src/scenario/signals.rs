@@ -100,8 +100,8 @@ impl<'a> Resolver<'a> {
         column_signal(&path, &table, &name, target, csv.hold)
     }
 
-    /// Resolves an entry of `[[scenario.table]]`. Skips columns of variables that entries of `set` or `signal`
-    /// drive: their drives precede the position `first_table_drive`; also columns of further aliases of a variable.
+    /// Resolves an entry of `[[scenario.table]]`. Skips columns of variables that an entry of `set` or `signal` drives:
+    /// drives before the position `first_table_drive`. Also skips columns of further aliases of a variable.
     /// Returns an error if no column has the name of a variable that can be driven.
     pub(super) fn table(
         &mut self,
