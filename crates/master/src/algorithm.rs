@@ -45,8 +45,8 @@ macro_rules! choice {
 choice! {
     /// The order in which the slaves step within a communication step.
     Method {
-        /// All slaves step from the values at the start of the step. Functions
-        /// ([`crate::Slave::is_function`]) step last, from the values at its end.
+        /// All slaves step with the values at the start of the step. Slaves without states
+        /// ([`crate::Slave::is_function`]) step last, with the values at its end.
         Jacobi = "jacobi",
         /// The slaves step one after the other, in the order of their direct dependencies. A slave
         /// uses the values that earlier slaves have reached at the end of the step.
@@ -272,7 +272,7 @@ impl Algorithm {
         self.repeated_by().is_some()
     }
 
-    /// Returns what may repeat steps, for a message; `None` if nothing does.
+    /// Names the setting that may repeat steps, for a message; `None` if there is none.
     fn repeated_by(&self) -> Option<String> {
         let is_crossing = |event: &EventSource| matches!(event, EventSource::Crossing(_));
         match (self.coupling, self.control) {

@@ -37,8 +37,8 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
     refused
 }
 
-/// Returns `algorithm`, without iteration if it allows a fallback, nothing else repeats steps, and the
-/// state of an FMU cannot be restored although its description promises it.
+/// Returns `algorithm`. Removes its iteration if an FMU cannot restore its state although its description
+/// promises it, provided that a fallback is allowed and nothing else repeats steps.
 pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
     let once = Algorithm { coupling: Coupling::Once, ..algorithm.clone() };
     if !algorithm.fallback || algorithm.coupling == Coupling::Once || once.repeats() {

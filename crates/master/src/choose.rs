@@ -36,7 +36,7 @@ pub struct AlgorithmRequest {
     pub step: Option<f64>,
     /// Relative tolerance.
     pub relative_tolerance: Option<f64>,
-    /// Absolute tolerance, in nominal values.
+    /// Absolute tolerance, as a fraction of nominal values.
     pub absolute_tolerance: Option<f64>,
     /// Smallest step of the step control in s.
     pub smallest_step: Option<f64>,

@@ -38,13 +38,13 @@ pub(crate) struct Coupler {
     pub(crate) iterated: Option<Iterated>,
 }
 
-/// Iterated coupling: solves `u = G(u)`, where G(u) are the connected values that the slaves return
-/// at the end of a step if they assume the values u there.
+/// Iterated coupling: solves `u = G(u)`. u are the connected values assumed at the end of a step, G(u) those
+/// that the slaves compute there if their inputs end at u.
 pub(crate) struct Iterated {
     pub(crate) iteration: Iteration,
     /// Connected values that the slaves assume at the end of the step.
     u: Vec<f64>,
-    /// Connected values that the slaves return there.
+    /// Connected values that the slaves compute there.
     g: Vec<f64>,
     /// Connected values of the next evaluation.
     next: Vec<f64>,
@@ -64,7 +64,7 @@ pub(crate) struct Iterated {
 /// Count of the communication steps in which the iteration failed, so that a step was made once without iteration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fallbacks {
-    /// Number of such steps; one that step control or an event repeats counts once.
+    /// Number of these steps. A step that step control or an event repeats counts once.
     pub count: u64,
     /// Reason and time of the first failure; empty if there is none.
     pub first: String,
@@ -197,7 +197,7 @@ impl Iterated {
 
     /// Computes the Jacobian `dG/du` by finite differences of whole steps. If a step with a perturbed value ends
     /// early, its outputs belong to another time: the value is perturbed to the other side. If that step ends early
-    /// too, the column is 0; a wrong column costs iterations only, as whole steps decide about convergence.
+    /// too, the column is 0. A wrong column costs iterations only, because convergence is tested with whole steps.
     fn differentiate(
         &mut self,
         engine: &mut Engine,

@@ -9,8 +9,8 @@ use crate::system::{Port, System};
 use fmu_description::Version;
 use slave::ValueType;
 
-/// Returns a time before `time`, in s, and before all times that are equal to it up to rounding ([`near`]): the start
-/// of a search for breaks at `time`.
+/// Returns a time in s before all times that equal `time` up to rounding ([`near`]). A search from there finds the
+/// jumps, kinks and starts at `time`.
 pub(crate) fn just_before(time: f64) -> f64 {
     time - (10.0 * rounding(time)).max(f64::MIN_POSITIVE)
 }
@@ -20,8 +20,8 @@ pub(crate) fn just_before(time: f64) -> f64 {
 pub struct Scenario {
     /// Driven variables.
     pub drives: Drives,
-    /// Faults on connections, each with the input of its connection, of which each has one chain. A fault acts on the
-    /// value after the transformation of the connection.
+    /// Faults on connections: the chain of each input that has faults. A fault acts on the value after the
+    /// transformation of the connection.
     pub faults: Vec<(Port, FaultChain)>,
 }
 
@@ -50,7 +50,7 @@ pub enum DriveKind {
     Integer {
         /// Smallest value of the type.
         least: i64,
-        /// Largest value of the type, or that of 64 bits with a sign.
+        /// Largest value of the type, at most `i64::MAX`.
         largest: i64,
     },
     /// Boolean: 0 is false.
@@ -72,9 +72,9 @@ pub struct Drive {
     cursor: Cursor,
     /// The sample set last.
     written: Option<Sample>,
-    /// The sample that was the last one at the last commit.
+    /// The value of `written` at the last commit.
     accepted: Option<Sample>,
-    /// The time in s of the last commit.
+    /// The time in s of the last commit, the last final communication point.
     committed: Option<f64>,
 }
 
@@ -115,7 +115,7 @@ impl Drive {
         reached(time, *start).then(|| signal.at(time, &mut self.cursor))
     }
 
-    /// Returns the faults with the memory of those in `saved`; `None` if faults that had begun there differ.
+    /// Returns the faults with their memory in `saved`; `None` if faults differ that had begun when it was saved.
     pub(crate) fn resumed_faults(&self, saved: &DriveState) -> Option<FaultChain> {
         let time = saved.committed.unwrap_or(f64::NEG_INFINITY);
         let mut faults = self.faults.clone().unwrap_or_default();
@@ -128,7 +128,7 @@ impl Drive {
         self.faults = Some(faults);
     }
 
-    /// Whether the sample is constant and was set before the last commit, and no other one since.
+    /// Whether `sample` is constant and was set before the last commit, and no other sample was set since.
     fn is_settled(&self, sample: Sample) -> bool {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
     }
@@ -142,7 +142,7 @@ impl Drive {
         }
     }
 
-    /// Whether a clock ticks at `time`, in s, or has done so since the last commit, in a step that could not end there.
+    /// Whether a clock ticks at `time`, in s, or after the last commit within a step that could not end at the tick.
     fn ticks(&mut self, time: f64) -> bool {
         let mut after = self.committed.unwrap_or(just_before(time));
         while let Some(next) = self.break_between(after, time) {
@@ -154,7 +154,7 @@ impl Drive {
         false
     }
 
-    /// Returns the first break after `after` and not after `time`, all in s.
+    /// Returns the first jump, kink or start after `after` and not after `time`, all in s.
     fn break_between(&self, after: f64, time: f64) -> Option<f64> {
         self.next_break(after).filter(|next| reached(time, *next))
     }
@@ -256,8 +256,8 @@ impl Drives {
         self.write_to(system, time, |_| true)
     }
 
-    /// Makes those driven clocks of `slave` tick, in event mode, whose signal has jumped to another value than 0 since the
-    /// last commit or jumps to one at `time`, in s, or starts with one.
+    /// Makes driven clocks of `slave` tick, in event mode: those whose signal starts with a value other than 0, or has
+    /// jumped to one between the last commit and `time`, in s.
     pub(crate) fn tick(
         &mut self,
         system: &mut System,
@@ -380,7 +380,7 @@ impl Drives {
     }
 
     /// Takes over the state of the drives of `earlier`. Returns false if a variable of `earlier` is not
-    /// driven here, or if its faults are not the first ones of its drive here.
+    /// driven here, or if its faults in `earlier` are not its first faults here.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
         earlier.all.iter().all(|old| {
             let Some(new) = self.all.iter_mut().find(|new| new.port == old.port) else {
@@ -411,7 +411,7 @@ impl Drives {
     ///
     /// # Errors
     ///
-    /// Returns an error if the checkpoint has another number of driven variables, or if faults that had begun differ.
+    /// Returns an error if the checkpoint has another number of driven variables, or if faults differ that had begun.
     pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), SystemError> {
         let (expected, actual) = (self.all.len(), state.len());
         if actual != expected {

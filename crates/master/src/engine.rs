@@ -37,7 +37,7 @@ pub(crate) struct Engine {
     pub(crate) drives: Drives,
     pub(crate) grid: Grid,
     pub(crate) instants: Instants,
-    /// Why steps end on the grid only; `None` if they may end at any time.
+    /// Why steps end only at the grid points `start + k H`; `None` if they may end at any time.
     rigid: Option<Rigid>,
     division: Division,
     /// Whether steps may be repeated; every slave can then restore its state. Otherwise a slave
@@ -55,18 +55,18 @@ pub(crate) struct Engine {
     passes: bool,
 }
 
-/// What happens to a step with an event, or a jump or kink of a signal or fault, within it.
+/// What happens to a step with a change within it: an event, or a jump or kink of a signal or fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Division {
-    /// Nothing.
+    /// The step is made as planned.
     Never,
-    /// It ends there.
+    /// The step ends at the change.
     AtChanges,
-    /// The first change is reported, because it takes effect late.
+    /// The step is made as planned; the first change is reported, because it takes effect late.
     Report,
 }
 
-/// Why steps end on the grid only.
+/// Why steps end only at grid points.
 struct Rigid {
     why: String,
     /// Whether a change that took effect late has been reported.
@@ -89,7 +89,7 @@ impl Rigid {
     }
 }
 
-/// The result of a sweep.
+/// The result of a sweep, in which every slave steps once.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Swept {
     /// All slaves completed the step.
@@ -169,8 +169,8 @@ impl Engine {
         };
     }
 
-    /// Returns where a step from `time` that was planned to end at `end` ends earlier: at the first known event, jump
-    /// or kink within it; all in s. `None` if it ends at `end`; warns of the first change that then takes effect late.
+    /// Returns the first known event, jump or kink within the planned step from `time` to `end`, all in s, at which the
+    /// step must end. `None` if it ends at `end`; then warns of the first change, which takes effect late.
     #[inline]
     pub(crate) fn earlier_end(&mut self, time: f64, end: f64) -> Option<f64> {
         match self.division {
@@ -223,7 +223,7 @@ impl Engine {
         );
     }
 
-    /// Iterates the instant at the time reached, if there is an event.
+    /// Iterates the events of all slaves at the time reached, if there are any.
     #[inline]
     pub(crate) fn settle(&mut self) -> Result<InstantEnd, SystemError> {
         if self.instants.is_empty() { Ok(InstantEnd::default()) } else { self.settle_instant() }
@@ -276,8 +276,8 @@ impl Engine {
         self.drives.commit(self.grid.time);
     }
 
-    /// Returns the times after `after`, all in s, of the next break of a driven variable and of the next
-    /// start or end of a fault on a connection.
+    /// Returns the times after `after`, all in s, of the next start, jump or kink of a driven variable and of the
+    /// next start or end of a fault on a connection.
     pub(crate) fn next_breaks(&self, after: f64) -> impl Iterator<Item = f64> {
         [self.drives.next_break(after), self.exchange.next_break(after)].into_iter().flatten()
     }
@@ -455,8 +455,8 @@ impl Engine {
         self.exchange.check_finite(&self.system, slave, time + size)
     }
 
-    /// Handles a slave that completed only a part of its step, `done`. If steps may be repeated, shortens the sweep to
-    /// this part, otherwise steps the slave on to the end of the step.
+    /// Handles a slave that completed only the part `done` of its step. If steps may be repeated, shortens the sweep to
+    /// this part, otherwise repeats `fmi2DoStep` until the slave reaches the end of the step.
     #[cold]
     fn finish_in_parts(
         &mut self,

@@ -10,9 +10,9 @@ use crate::system::Port;
 use slave::time_rounding;
 use solve::Bracket;
 
-/// Slot of the FMU states to which the location of a crossing returns.
+/// Slot of the FMU states from which a step is repeated to locate a crossing.
 const SLOT: usize = 2;
-/// Relative width, as a part of a step, within which a crossing is located.
+/// Width to which a crossing is located, as a fraction of the step.
 const WIDTH: f64 = 1e-9;
 /// An event that is less than this fraction of the step after its start is at the start.
 const LEAST: f64 = 1e-9;

@@ -40,7 +40,7 @@ pub(crate) use tasks::Task;
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
     pub(crate) reals: Reals,
-    /// The other connections, whose inputs are set before a step.
+    /// The connections whose values are held during a step; their inputs are set before it.
     held: Channels,
     /// The connections to discrete and clocked inputs of slaves whose events the master handles. These inputs are
     /// set in event mode only.
@@ -246,7 +246,7 @@ impl Exchange {
             system.perform(position, time, |slave| self.set_held(position, slave))?;
         }
         let results = self.reals.advance_all(system, slaves, step, run);
-        // Not collected: a list of unknown length grows, and allocates again.
+        // `collect` into a `Result` does not know the length, and would allocate several times.
         let mut steps = Vec::with_capacity(slaves.len());
         for (&position, result) in slaves.iter().zip(results) {
             steps.push(system.perform(position, step(position).time, |slave| {

@@ -138,7 +138,7 @@ pub enum FaultError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultChain {
     stages: Vec<Stage>,
-    /// The smallest and the largest value of the input, if it is an Integer of a system.
+    /// The smallest and the largest value of the input, if it is an Integer input of a system.
     range: Option<(i64, i64)>,
 }
 
@@ -193,8 +193,8 @@ impl FaultChain {
     }
 
     /// As [`FaultChain::apply`], for Integers; the result is rounded, and in a simulation limited to the range of the
-    /// input. Otherwise the result for a value of 32 bits is limited to the range of 32 bits, any other to the range of
-    /// 64 bits.
+    /// input. Without a simulation, the limits are the range of 32 bits for a `value` within it, otherwise that of 64
+    /// bits.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i64) -> i64 {
@@ -247,8 +247,8 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
-    /// Takes over the memory of the faults of `saved`, a chain of the same input at `time` in s; other faults have no
-    /// memory. Returns false, and changes nothing, if one of them has begun by then.
+    /// Takes over the memory of the faults that `saved`, the chain of the same input at `time` in s, has too; the other
+    /// faults have no memory. Returns false, and changes nothing, if a fault of only one chain has begun by then.
     pub(crate) fn resume(&mut self, saved: &Self, time: f64) -> bool {
         let begun = |stages: &[Stage]| stages.iter().any(|stage| stage.has_begun(time));
         let (mut resumed, mut rest) = (self.stages.clone(), saved.stages.as_slice());

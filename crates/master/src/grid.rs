@@ -13,7 +13,7 @@ use slave::{Slave, time_rounding};
 /// of its own.
 const ROUNDING: f64 = 1e-6;
 
-/// The communication points of a run, and the one reached.
+/// The grid of communication points `start + k step` of a run, and the time reached.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     start: f64,
@@ -28,8 +28,8 @@ pub(crate) struct Grid {
     pub(crate) time: f64,
 }
 
-/// The reason why a run ends before its stop time: an FMU that takes equal steps only, with its
-/// last whole step.
+/// The reason why a run ends before its stop time: an FMU takes equal steps only, and the stop time
+/// is within one of its steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EarlyEnd {
     /// Name of the FMU.
@@ -77,7 +77,7 @@ pub(crate) fn is_rigid(slave: &dyn Slave) -> bool {
 ///
 /// # Errors
 ///
-/// Returns [`SystemError::Time`] if they are not.
+/// Returns [`SystemError::Time`] otherwise.
 pub fn check_stop_time(start: f64, stop: f64) -> Result<(), SystemError> {
     for (what, value) in [("the start time", start), ("the stop time", stop)] {
         if !value.is_finite() {
@@ -130,7 +130,7 @@ impl Grid {
         let is_whole =
             (steps - steps.round()).abs() * self.step <= self.negligible(self.step, stop);
         let most = if is_whole { steps.round() } else { steps.floor() } as u64;
-        // All of these slaves meet at the common multiples of their steps.
+        // All slaves that take equal steps only meet at the common multiples of their steps.
         let together = rigid().fold(1, |all, (_, &multiple)| least_common(all, multiple.into()));
         let ends = |multiple: u64| is_whole && most.is_multiple_of(multiple);
         let ((name, _), &multiple) = rigid().find(|(_, multiple)| !ends((**multiple).into()))?;
@@ -228,8 +228,8 @@ impl Grid {
         (self.count, self.points) = (count, (self.point(count), self.point(count + 1)));
     }
 
-    /// Resumes at `time` after `count` grid points. The end of the first run may have been counted
-    /// without lying on the grid.
+    /// Resumes at `time` after `count` grid points. The end of the first run may have been counted as
+    /// a grid point although it is not on the grid.
     pub(crate) fn resume(&mut self, time: f64, count: u64) {
         self.set_count(count);
         if count > 0 && self.points.0 > time + self.negligible(self.step, time) {

@@ -71,7 +71,7 @@ impl Limits {
         Some(Self { min, max, nominal: nominal.unwrap_or(1.0).abs(), rounding, items })
     }
 
-    /// Says why `value` is not allowed; `None` if it is allowed.
+    /// Returns the reason why `value` is not allowed; `None` if it is allowed.
     fn refuse(&self, value: f64) -> Option<String> {
         let rounding = |limit: f64| self.rounding * self.nominal.max(limit.abs());
         let is_item =
@@ -170,7 +170,7 @@ impl Watched {
     }
 }
 
-/// The connected inputs with limits that have had allowed values only, until [`NAMED`] others are reported.
+/// The connected inputs with limits that have not been reported yet; empty after [`NAMED`] reports.
 #[derive(Default)]
 pub(crate) struct Watch {
     watched: Vec<Watched>,

@@ -42,7 +42,7 @@ pub fn by_direct_dependencies(system: &System) -> Order {
     Order { sequence: components.sequence().to_vec(), looped }
 }
 
-/// Whether a connection passes values at ticks of clocks only: within an instant, not by the order of the steps.
+/// Whether a connection passes values at ticks of clocks only, so that the order of the steps does not matter.
 fn is_clocked(system: &System, connection: &Connection) -> bool {
     system.signal_type(connection.to) == SignalType::Clocked
 }
@@ -89,8 +89,8 @@ impl<'a> Rows<'a> {
         rows.collect()
     }
 
-    /// Returns the entry of the output at position `output` in the first of `lists` that has one. In FMI 3.0 an alias
-    /// has no entry, but that of [`System::holder`]. `None` if it is no output.
+    /// Returns the entry of the output at position `output` in the first of `lists` that has one; for an alias of FMI
+    /// 3.0, which has no entry, that of its [`System::holder`]. `None` if it is no output.
     fn entry(&self, lists: &[&HashMap<u32, &'a Unknown>], output: usize) -> Option<&'a Unknown> {
         let entry = |position: usize| {
             let index = u32::try_from(position + 1).ok()?;
@@ -103,21 +103,21 @@ impl<'a> Rows<'a> {
         self.system.holder(Port { slave: self.slave, variable }).variable
     }
 
-    /// Returns the positions of the variables on which `unknown` depends, as [`System::holder`] returns them; `None`:
-    /// possibly all.
+    /// Returns the positions of the variables on which `unknown` depends, with [`System::holder`] for an alias;
+    /// `None`: possibly all.
     fn dependencies(&self, unknown: &Unknown) -> Option<HashSet<usize>> {
         let list = unknown.dependencies.as_ref()?;
         Some(list.iter().map(|&index| self.holder(index as usize - 1)).collect())
     }
 
-    /// Returns the positions of the variables on which the output at position `output` depends directly, as
-    /// [`System::holder`] returns them; `None`: possibly all, or it is no output.
+    /// Returns the positions of the variables on which the output at position `output` depends directly, with
+    /// [`System::holder`] for an alias; `None`: possibly all, or it is no output.
     pub(crate) fn direct_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
         self.dependencies(self.entry(&[&self.outputs], output)?)
     }
 
     /// Returns the positions of the variables on which the output at position `output` depends in initialization mode,
-    /// as [`System::holder`] returns them; `None`: possibly all, or it is no output.
+    /// with [`System::holder`] for an alias; `None`: possibly all, or it is no output.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<HashSet<usize>> {
         self.dependencies(self.entry(&[&self.initial, &self.outputs], output)?)
     }

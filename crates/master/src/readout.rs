@@ -28,7 +28,7 @@ pub struct Readout {
     pub present: Vec<bool>,
     /// The clocks of these variables.
     clocks: Vec<ClockRead>,
-    /// The inputs that are known without asking an FMU, with the positions of their values.
+    /// The inputs whose values are known without a call of an FMU, with the positions of the values.
     known: Vec<(Port, usize)>,
     /// `System::changes` when the known values were read last.
     changes: u64,
@@ -140,8 +140,8 @@ impl Readout {
         }
     }
 
-    /// Writes a value that is known without asking an FMU to its position; returns false, and does nothing, without one
-    /// and for texts.
+    /// Writes a value that is known without a call of an FMU to its position. Returns false, and does nothing, if there
+    /// is no value or if it is a text.
     fn put_known(&mut self, value: Option<&Value>, position: usize) -> bool {
         match value {
             Some(Value::Real(value)) => self.reals[position] = *value,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Relative difference below which two times are equal; as in FMPy (Python's `math.isclose`).
 const SAME: f64 = 1e-9;
-/// Largest difference in s of two equal times: seconds since 1970 differ by less than a relative 1e-9.
+/// Largest difference in s of two equal times, for times in seconds since 1970, of which 1e-9 is more than 1 s.
 const MOST: f64 = 1e-6;
 
 /// Returns the largest difference in s of a time that is equal to `time` up to rounding.
@@ -88,7 +88,7 @@ pub enum Signal {
         phase: f64,
         /// Mean.
         offset: f64,
-        /// Time in s.
+        /// Start time of the sine in s.
         from: f64,
     },
     /// A sampled signal.

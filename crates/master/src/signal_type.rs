@@ -71,7 +71,7 @@ impl System {
     }
 }
 
-/// How the values of a connection pass.
+/// How a connection passes its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Way {
     /// As a Real, which may be extrapolated, before a step.

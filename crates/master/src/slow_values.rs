@@ -11,9 +11,9 @@ use slave::ValueType;
 
 /// The outputs and local variables of the slaves that step every several communication steps.
 ///
-/// Such a slave is ahead of the others within its step. A row of results contains values at its own
-/// time: continuous Reals are interpolated between start and end of the slave's step; all others
-/// have their value at its start.
+/// Such a slave is ahead of the others within its step. A row of results contains its values at the
+/// time of the row: continuous Reals are interpolated between start and end of the slave's step; all
+/// others have their value at its start.
 #[derive(Debug, Default)]
 pub struct SlowValues {
     slaves: Vec<SlowSlave>,

@@ -200,7 +200,7 @@ impl SizeControl {
                 Swept::Whole => match self.judge(size, error) {
                     // With rounded times, the retry may be as long as the last attempt.
                     Verdict::Rejected { retry } if time + retry < end => time + retry,
-                    // After a break, values jump in a step of any size; accept the step.
+                    // A signal or fault that changes at the start makes values jump in a step of any size.
                     Verdict::Rejected { .. } | Verdict::Stuck if is_break(engine, time) => {
                         engine.exchange.reals.clear_history();
                         self.clear_history();

@@ -36,7 +36,7 @@ impl Groups {
             neighbours[to].push(from);
         }
         let mut starts = vec![0];
-        // For each slave, the last group that contains a neighbour of it.
+        // For each slave, the last group that contains a slave connected to it.
         let mut excluded_from = vec![usize::MAX; count];
         for (position, &slave) in order.sequence.iter().enumerate() {
             if excluded_from[slave] == starts.len() {

@@ -53,7 +53,7 @@ pub(crate) struct Parts<'a> {
 }
 
 impl Instants {
-    /// Returns the slaves of `system` that have handed over their events. They are in event mode.
+    /// Collects the slaves of `system` whose events the master handles; they are in event mode.
     pub(crate) fn new(system: &System) -> Self {
         let count = system.slaves.len();
         let mut connected = vec![false; count];
@@ -71,12 +71,12 @@ impl Instants {
         }
     }
 
-    /// Whether no slave has handed over its events.
+    /// Whether the master handles the events of no slave.
     pub(crate) fn is_empty(&self) -> bool {
         self.members.is_empty()
     }
 
-    /// Whether a slave with events is connected to another one.
+    /// Whether a slave whose events the master handles has a connection.
     pub(crate) fn are_connected(&self) -> bool {
         self.members.iter().any(|&slave| self.connected[slave])
     }
@@ -98,7 +98,7 @@ impl Instants {
             })
     }
 
-    /// Whether a driven variable of a slave with events has a break at `time`: its drive starts, or its signal or a
+    /// Whether a driven variable of one of these slaves has a break at `time`: its drive starts, or its signal or a
     /// fault on it jumps or has a kink.
     fn has_break(&self, drives: &Drives, time: f64) -> bool {
         !drives.is_empty()
@@ -145,8 +145,8 @@ impl Instants {
         Ok(())
     }
 
-    /// Enters event mode of slaves with a break of a driven variable; sets the driven variables and clocks of all
-    /// slaves in event mode.
+    /// Enters event mode of slaves with a driven variable that starts, jumps or has a kink at `time`; sets the driven
+    /// variables and clocks of all slaves in event mode.
     fn drive(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<(), SystemError> {
         if parts.drives.is_empty() {
             return Ok(());
@@ -169,7 +169,7 @@ impl Instants {
     fn exchange(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<bool, SystemError> {
         let mut any = false;
         // As many passes as there are slaves carry a continuous signal through all of them. An algebraic loop of
-        // such signals is left as it then is: the coupling of the next step solves it.
+        // such signals is not iterated further: the coupling of the next step solves it.
         for pass in 0..MOST {
             for slave in 0..self.in_event.len() {
                 if self.in_event[slave] {
@@ -284,7 +284,7 @@ impl Instants {
         self.pending.fill(f64::INFINITY);
     }
 
-    /// Returns the error that names what still changes.
+    /// Returns the error that names the variables that still change.
     #[cold]
     fn unsettled(&self, parts: &mut Parts<'_>, time: f64) -> SystemError {
         let in_event = self.members.iter().copied().filter(|&slave| self.in_event[slave]);

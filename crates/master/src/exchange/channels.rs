@@ -1,4 +1,4 @@
-//! The channels of all types, used together.
+//! Connections of all types that are not extrapolated.
 
 use serde::{Deserialize, Serialize};
 
@@ -92,7 +92,7 @@ impl Channels {
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves for which `ahead`
-    /// is true contribute the value at the start of their step.
+    /// is true, because their step ends later, contribute the value at its start.
     pub(super) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
         all!(self.commit(time, ahead););
     }
@@ -107,8 +107,8 @@ impl Channels {
         all!(self.shift(slave););
     }
 
-    /// Computes the inputs of `slave` at `time`. Slaves for which `ahead` is true contribute the value at the
-    /// start of their step.
+    /// Computes the inputs of `slave` at `time`. Slaves for which `ahead` is true, because their step ends later,
+    /// contribute the value at its start.
     pub(super) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
         all!(self.gather(slave, time, ahead););
     }
@@ -118,7 +118,7 @@ impl Channels {
         all!(self.has_new(slave) || ..)
     }
 
-    /// Adds the inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
+    /// Adds to `ports` the inputs of `slave` whose gathered value differs from the value that was set last.
     pub(super) fn add_new(&self, slave: usize, ports: &mut Vec<Port>) {
         all!(self.add_new(slave, ports););
     }

@@ -12,7 +12,7 @@ use slave::{CallError, Slave, Transformation};
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
 
-/// The functions of one type: get and set, transformation, fault.
+/// The functions for values of one type: get and set, transformation, fault.
 pub(crate) struct Access<T> {
     get: Get<T>,
     set: Set<T>,
@@ -22,7 +22,7 @@ pub(crate) struct Access<T> {
     disturb: fn(&FaultChain, f64, &T) -> T,
     /// Returns a value as the number that faults record; NaN for a text.
     number: fn(&T) -> f64,
-    /// Whether an input that holds one value need not be set to the other.
+    /// Whether two values are equal, so that an input with the first need not be set to the second.
     same: fn(&T, &T) -> bool,
 }
 
@@ -223,7 +223,7 @@ impl<T: Clone + Default> Channel<T> {
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
-    /// for which `ahead` is true contribute the value at the start of their step.
+    /// for which `ahead` is true, because their step ends later, contribute the value at its start.
     pub(crate) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
         for k in 0..self.wiring.faults.len() {
             if self.wiring.faults[k].is_some() {
@@ -250,8 +250,8 @@ impl<T: Clone + Default> Channel<T> {
         inputs.filter_map(|(port, fault)| Some((*port, fault.as_ref()?)))
     }
 
-    /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true
-    /// contribute the value at the start of their step.
+    /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true, because
+    /// their step ends later, contribute the value at its start.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
         for k in self.wiring.port_maps[slave].input_range.clone() {
             let source = self.state.source(&self.wiring, k, ahead);
@@ -268,7 +268,7 @@ impl<T: Clone + Default> Channel<T> {
         range.into_iter().any(|k| !(self.access.same)(&self.values[k], &self.state.inputs[k]))
     }
 
-    /// Adds the connected inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
+    /// Adds to `ports` the inputs of `slave` whose gathered value differs from the value that was set last.
     pub(crate) fn add_new(&self, slave: usize, ports: &mut Vec<Port>) {
         for k in self.wiring.port_maps[slave].input_range.clone() {
             if !(self.access.same)(&self.values[k], &self.state.inputs[k]) {

@@ -21,7 +21,7 @@ pub(super) struct OutputHistory {
     pub(super) end: f64,
     pub(super) slope: Option<f64>,
     pub(super) curvature: Option<f64>,
-    /// Whether it jumps at communication points, so that the values before say nothing about its slope.
+    /// Whether the output jumps at communication points, so that its past values do not determine its slope.
     pub(super) jumps: bool,
     /// Sizes of the last three steps in s.
     pub(super) earlier_size: f64,
@@ -92,8 +92,8 @@ impl OutputHistory {
         }
     }
 
-    /// Returns slope and curvature at the start: both derivatives if given; or the parabola with
-    /// the given slope through the value before; or the parabola through the last three values.
+    /// Returns slope and curvature at the start: the output derivatives if both are known; otherwise of the parabola
+    /// with the known slope through the value before, or of the parabola through the last three values.
     fn parabola(&self, quotient: f64) -> (f64, f64) {
         match (self.slope, self.curvature) {
             (Some(slope), Some(curvature)) => (slope, curvature),
@@ -107,7 +107,7 @@ impl OutputHistory {
     }
 
     /// Returns the polynomial over a step whose end values are known. A signal that jumps is constant,
-    /// as it does not take the values on a line between the values before and after its jump.
+    /// because it takes no values between those before and after the jump.
     pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let slope = (self.end - self.start) / self.size;
         match extrapolation {

@@ -19,7 +19,7 @@ pub(super) struct Ticks {
 struct TickSource {
     slave: usize,
     references: Vec<u32>,
-    /// Whether each of them ticks: not 0.
+    /// For each clock, whether it ticks: not 0.
     flags: Vec<i32>,
 }
 
@@ -30,9 +30,9 @@ struct TickTarget {
     reference: u32,
     /// The index of its [`TickSource`].
     source: usize,
-    /// The index of the output clock there.
+    /// The index of the output clock in its [`TickSource`].
     clock: usize,
-    /// Whether it has received the present tick.
+    /// Whether the input clock has received the present tick.
     received: bool,
 }
 
@@ -142,7 +142,7 @@ impl Exchange {
         })
     }
 
-    /// Sets the continuous inputs of `slave` to their values at `time` if one of them has changed; returns whether.
+    /// Sets the continuous inputs of `slave` to their values at `time` if one has changed; returns whether one has.
     pub(crate) fn set_reals_in_event(
         &mut self,
         system: &mut System,
@@ -190,8 +190,8 @@ impl Reals {
         instance.get_real(&port_map.outputs, &mut self.trace.latest[port_map.output_range.clone()])
     }
 
-    /// Sets the inputs of a slave to their values at `time`, if one differs from the value set last or has a derivative;
-    /// returns whether.
+    /// Sets the inputs of a slave to their values at `time` if one has changed: it differs from the value set last, or
+    /// has a derivative. Returns whether one has.
     fn set_now(
         &mut self,
         slave: usize,
@@ -219,7 +219,7 @@ impl Reals {
         Ok(changed)
     }
 
-    /// Removes the past of the outputs whose values differ from `before`: they have jumped. Returns whether any has.
+    /// Clears the history of the outputs that have jumped: their values differ from `before`. Returns whether any has.
     pub(crate) fn forget_jumps(&mut self, before: &[f64]) -> bool {
         let trace = &mut self.trace;
         let mut any = false;

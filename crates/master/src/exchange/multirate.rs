@@ -1,4 +1,4 @@
-//! Slaves whose step covers several communication steps: their outputs at the points in between.
+//! Outputs of slaves whose step covers several communication steps, at the points within this step.
 
 use super::reals::Reals;
 use slave::time_rounding;
@@ -31,8 +31,8 @@ impl Reals {
         if self.uses_end_value(slave, source, time + size) { time + size } else { time }
     }
 
-    /// Returns the value of an output at `time`. If its slave is ahead, the value lies on the line
-    /// between start and end of the slave's step; a discrete one keeps its start value.
+    /// Returns the value of an output at `time`. If its slave is ahead, a continuous output is interpolated
+    /// between start and end of the slave's step; a discrete output has its value at the start.
     pub(super) fn value_at(&self, output: usize, time: f64) -> f64 {
         let (trace, owner) = (&self.trace, self.layout.owners[output] as usize);
         let end = trace.latest[output];

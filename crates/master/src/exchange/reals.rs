@@ -20,15 +20,15 @@ pub(crate) struct Reals {
     pub(super) faults: Vec<Option<FaultChain>>,
     pub(super) extrapolation: Extrapolation,
     pub(super) method: Method,
-    /// Whether the latest values are sufficient: all inputs are held, all slaves make equal steps,
-    /// no faults.
+    /// Whether inputs follow from the latest values only: all inputs are held, all slaves make equal
+    /// steps, and there are no faults.
     pub(super) copies_latest: bool,
     /// Whether some slaves make steps of several communication steps.
     pub(super) multirate: bool,
     pub(crate) trace: Trace,
-    /// Values of the outputs at the end of the step that an iteration assumes.
+    /// Values of the outputs that an iteration assumes at the end of the step.
     pub(super) assumed: Vec<f64>,
-    /// Whether an iteration assumes `assumed`.
+    /// Whether the inputs interpolate to `assumed`.
     pub(super) assumes: bool,
     /// Values for the inputs.
     pub(super) values: Vec<f64>,
@@ -166,7 +166,7 @@ impl Reals {
         let source = layout.sources[k] as usize;
         let end_known = self.is_known(slave, source, time + size);
         let source_time = self.source_time(slave, layout.owners[source] as usize, time, size);
-        // With Hold, a source that has stepped further gives its value at `source_time`, not at the end of its own step.
+        // With Hold, a source that has stepped further gives its value at `source_time`, not at its end.
         let may_be_ahead = self.multirate && end_known && self.extrapolation == Extrapolation::Hold;
         let extrapolation = if layout.held[k] || may_be_ahead {
             Polynomial::held(self.value_at(source, source_time))
@@ -208,8 +208,8 @@ impl Reals {
         }
     }
 
-    /// Whether `slave` uses the value that `source` has reached in the current step. In Jacobi's
-    /// method only a function does so, if the step of the source ends by `end`.
+    /// Whether `slave` uses the value that `source` has reached in the current step. In Jacobi's method
+    /// only a slave without states does so, if the step of the source ends by `end`.
     pub(super) fn uses_end_value(&self, slave: usize, source: usize, end: f64) -> bool {
         let span = &self.trace.spans[source];
         let is_there = || span.start + span.size <= end + time_rounding(end, span.size);
@@ -366,7 +366,7 @@ impl Reals {
     }
 }
 
-/// Number of values up to which [`all_finite`] looks at one after the other. A vector load would wait
+/// Largest number of values that [`all_finite`] checks one after the other. A vector load would wait
 /// for the values that an FMU has just stored one by one.
 const FEW: usize = 16;
 

@@ -12,7 +12,7 @@ use crate::signal::{Sample, earliest, reached};
 pub(super) struct Stage {
     window: Window,
     fault: Fault,
-    /// The value at which it sticks, or the last value not lost (the first value if all were lost).
+    /// The value of a stuck fault, or the last value that a dropout has not lost (the first if it lost all).
     #[serde(rename = "kept")]
     last: Option<f64>,
     /// The memory of a delay.
@@ -33,7 +33,7 @@ impl Stage {
         self.window == other.window && self.fault == other.fault
     }
 
-    /// Whether the fault has acted by `time` in s, or delays values from before it.
+    /// Whether the fault has started by `time` in s; a delay starts earlier by its length, when it records values.
     pub(super) fn has_begun(&self, time: f64) -> bool {
         let past = if let Fault::Delay { seconds, .. } = self.fault { seconds } else { 0.0 };
         reached(time, self.window.from - past)
@@ -87,7 +87,7 @@ impl Stage {
         }
     }
 
-    /// Records the value in front of this fault at a communication point.
+    /// Records the value that reaches this fault at a communication point.
     pub(super) fn commit(&mut self, time: f64, value: f64) {
         match &self.fault {
             Fault::Stuck(None) if self.last.is_none() && self.window.contains(time) => {

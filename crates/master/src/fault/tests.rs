@@ -37,7 +37,7 @@ fn a_bias_acts_from_its_start_to_before_its_end() {
 #[test]
 fn a_time_reached_but_for_rounding_is_reached() {
     let line = single(Fault::Bias(1.0), 0.3, Some(0.8));
-    // 3 and 8 steps of 0.1 s in doubles, on both sides of the decimal fractions.
+    // Times slightly above 0.3 s and slightly below 0.3 s and 0.8 s.
     assert_eq!(line.apply(0.1 + 0.1 + 0.1, 0.0), 1.0);
     assert_eq!(line.apply(0.3 - 1e-12, 0.0), 1.0);
     assert_eq!(line.apply(0.8 - 1e-12, 0.0), 0.0);

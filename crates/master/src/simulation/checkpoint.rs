@@ -1,4 +1,4 @@
-//! Checkpoints: the state of a simulation as data. Kept states: in memory, for the same simulation.
+//! Checkpoints, the state of a simulation as data, and kept states, in memory for the same simulation.
 
 mod origin;
 
@@ -135,8 +135,8 @@ impl Simulation {
         Ok(KeptState { master: self.master_state(), scenario, slot })
     }
 
-    /// Returns to a kept state of this simulation, with its driven variables and faults. `state` is the last
-    /// result of [`Simulation::keep`] with its slot: an older one has lost its FMU states.
+    /// Returns to a kept state of this simulation, with its driven variables and faults. `state` is the result
+    /// of the last call of [`Simulation::keep`] with its slot, which has overwritten the FMU states of earlier calls.
     ///
     /// # Errors
     ///
@@ -281,8 +281,7 @@ impl Simulation {
         Ok(Scenario { drives, faults })
     }
 
-    /// Names everything but faults to which the state of the master belongs, in the order of the state: connections,
-    /// driven variables.
+    /// Returns the names of the connections and driven variables, in the order of the state.
     fn parts(&self) -> Vec<String> {
         let system = &self.engine.system;
         let connections = system.connections.iter().map(|connection| {

@@ -33,7 +33,7 @@ impl System {
         self.set_port_value(port, value, text)
     }
 
-    /// As [`System::set_port`], with the value that `text` states, for a caller that reads numbers itself.
+    /// As [`System::set_port`], with the value that `text` states, for a caller that parses numbers itself.
     ///
     /// # Errors
     ///

@@ -168,7 +168,7 @@ impl System {
         Ok(())
     }
 
-    /// Whether the user sets the variable: two such members have the same meaning, but none gives the other a value.
+    /// Whether the user sets the variable: of two connected members of this kind, neither gives the other a value.
     fn is_parameter(&self, port: Port) -> bool {
         let causality = self.variable(port).causality;
         matches!(causality, Causality::Parameter | Causality::StructuralParameter)

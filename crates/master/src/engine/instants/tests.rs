@@ -92,7 +92,7 @@ impl Events for Sampler {
     }
 }
 
-/// The line through the values 0.5 and 1 before the step is at 1.5 at its end, where y is still 1.
+/// At 1.5 s the line through the earlier values 0.5 and 1 gives 1.5, but y is still 1.
 #[test]
 fn an_instant_sees_the_value_of_an_input_and_not_its_extrapolation() {
     let mut system = System::default();

@@ -1,6 +1,6 @@
-//! WebAssembly has no threads.
+//! The pool of threads on WebAssembly, which has no threads.
 
-/// A pool of threads, of which there is none.
+/// A pool of threads; no value of this type exists.
 pub(super) enum Pool {}
 
 impl Pool {

@@ -94,7 +94,7 @@ fn a_delay_uses_values_from_before_its_window() {
 
 #[test]
 fn a_delay_of_a_straight_line_is_exact_for_steps_of_any_size() {
-    // The line expects steps of about 0.1 s.
+    // The delay is created for steps of 0.1 s.
     let mut line = single(delay(1.0), 0.0, None);
     let (mut time, mut step) = (0.0, 1e-4);
     while time < 20.0 {
