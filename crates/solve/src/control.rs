@@ -22,7 +22,7 @@ pub struct SizeBounds {
 }
 
 impl SizeBounds {
-    /// The nearest size within the bounds; the smallest one if they are reversed.
+    /// The nearest size within the bounds; the smallest step if the bounds are reversed.
     fn clamp(self, size: f64) -> f64 {
         size.min(self.largest).max(self.smallest)
     }
@@ -37,7 +37,7 @@ impl SizeBounds {
 /// Runge-Kutta methods"; exponents: Hairer and Wanner 1996, section IV.2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Law {
-    /// q.
+    /// The exponent q.
     exponent: f64,
     /// `e_before / e_0`; 1 without a previous error.
     before: f64,

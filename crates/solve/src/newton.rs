@@ -140,9 +140,9 @@ impl Newton {
         Progress::Evaluate
     }
 
-    /// Handles a last step that did not decrease the residual enough: with an old matrix it returns to the
-    /// start of the step, otherwise it halves the step; after the shortest step, or a slow decrease, it
-    /// requests the matrix. `None` if the decrease is fast enough.
+    /// Handles a last step that did not decrease the residual enough. Returns to the start of a step with an old
+    /// matrix; otherwise halves the step. Requests the matrix after the shortest step or a slow decrease. `None` if
+    /// the decrease is fast enough.
     fn correct(&mut self, u_next: &mut [f64]) -> Option<Progress> {
         let merit = self.convergence.merit;
         if merit > self.before * (1.0 - DESCENT * self.part) {

@@ -7,7 +7,7 @@ use super::{Convergence, Progress, Scale, Solver};
 
 /// Relative norms below which orthogonalised differences of this and of earlier solutions are dropped.
 const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-3 };
-/// Relaxation factor of a step without differences.
+/// Relaxation factor of a step without stored differences.
 const RELAXATION: f64 = 0.1;
 /// Largest number of stored differences, if there are more unknowns.
 const MAX_DIFFERENCES: usize = 100;

@@ -52,9 +52,9 @@ impl Evaluation {
 /// The ratios of norms below which pairs are dropped as linearly dependent.
 #[derive(Clone, Copy)]
 pub(super) struct Filters {
-    /// For pairs of the present solution.
+    /// The ratio for pairs of the present solution.
     pub(super) present: f64,
-    /// For pairs of earlier solutions.
+    /// The ratio for pairs of earlier solutions.
     pub(super) earlier: f64,
 }
 
