@@ -105,9 +105,9 @@ pub(crate) unsafe fn gesv<T: Number>(
 pub(crate) struct Spectrum<T> {
     /// M, the number of eigenvalues.
     pub(crate) count: *mut i32,
-    /// W.
+    /// W, the eigenvalues.
     pub(crate) values: *mut T,
-    /// Z.
+    /// Z, the eigenvectors.
     pub(crate) vectors: Array<T>,
     /// ISUPPZ, the first and the last row of each eigenvector.
     pub(crate) support: *mut i32,
@@ -172,11 +172,11 @@ pub(crate) struct Vectors<T> {
 
 /// The output arrays of [`singular_values`].
 pub(crate) struct Factors<T> {
-    /// S.
+    /// S, the singular values.
     pub(crate) values: *mut T,
-    /// U.
+    /// U, the left singular vectors.
     pub(crate) left: Vectors<T>,
-    /// VT.
+    /// VT, the right singular vectors.
     pub(crate) right: Vectors<T>,
 }
 
