@@ -85,17 +85,17 @@ fn clocks_of(description: &ModelDescription) -> Vec<u32> {
 
 /// A model-exchange instance that is integrated from one communication point to the next.
 ///
-/// The description is that of the FMU, with an element `CoSimulation` that states what this slave offers:
-/// steps of any size, inputs with derivatives up to order 3, event mode, and FMU states and directional derivatives if
-/// the FMU has them.
+/// [`Slave::description`] returns the description of the FMU with an element `CoSimulation` for this slave: steps of
+/// any size, inputs with derivatives up to order 3, event mode, and FMU states and directional derivatives if the FMU
+/// has them.
 ///
-/// The relative tolerance is that of `setup_experiment` if it is finite and above zero, otherwise 1e-6; the absolute
+/// The relative tolerance is given in `setup_experiment` or, if it is not finite and above zero, 1e-6; the absolute
 /// tolerance of a state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets
 /// follow their derivatives within the step. A new value of any other variable after initialization causes an event, as
 /// FMI requires.
 ///
-/// An event at the end of a step belongs to this step: the outputs are those after the event. A master that
-/// handles the events ([`Slave::hand_over_events`]) reads the outputs after it has iterated the event.
+/// An event at the end of a step belongs to this step: the outputs have the values after the event. A master
+/// that handles the events ([`Slave::hand_over_events`]) reads the outputs after it has iterated the event.
 pub struct Integrated {
     instance: Box<dyn ModelExchange>,
     description: ModelDescription,

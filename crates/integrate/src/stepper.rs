@@ -14,7 +14,7 @@ const SAFETY: f64 = 0.9;
 /// The smallest and the largest ratio of two consecutive steps.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
-/// The step after a trial step that cannot be evaluated, relative to it.
+/// Ratio of the next trial step to a trial step that cannot be evaluated.
 const RETREAT: f64 = 0.25;
 /// A remaining distance that exceeds the step by less than this factor is made in one step.
 const STRETCH: f64 = 1.01;
@@ -48,7 +48,7 @@ pub(crate) struct Memory {
     stable: u32,
 }
 
-/// Why no step was made.
+/// The reason why no step was made.
 #[derive(Debug)]
 pub(crate) enum StepError {
     /// The FMU failed.
@@ -117,7 +117,7 @@ impl Stepper {
         self.scale.nominals()
     }
 
-    /// Replaces the nominal values by those that [`Stepper::nominals`] has returned.
+    /// Sets the nominal values to `nominals`, which [`Stepper::nominals`] has returned before.
     pub(crate) fn set_nominals(&mut self, nominals: &[f64]) {
         self.scale.set_nominals(nominals);
     }

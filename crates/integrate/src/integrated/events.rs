@@ -9,7 +9,7 @@ use super::{Integrated, Mode, failed};
 const ITERATIONS: usize = 1000;
 
 impl Integrated {
-    /// Enters event mode at the present point, unless the FMU is in it.
+    /// Enters event mode at the present time, unless the FMU is in event mode.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
         self.point.event = false;
         if self.point.mode == Mode::Continuous {

@@ -104,7 +104,7 @@ impl Integrated {
         }
     }
 
-    /// Whether a time event is due. Sets the time to that of the event, which may be later by rounding.
+    /// Whether a time event is due. Sets the present time to the time of the event, which may be later by rounding.
     fn event_is_due(&mut self, rounding: f64) -> Result<bool, CallError> {
         let due = self.point.next_event.filter(|event| *event <= self.point.time + rounding);
         if let Some(event) = due.filter(|event| *event > self.point.time) {
@@ -183,7 +183,7 @@ impl Integrated {
     }
 
     /// Returns the time just after the first state event in the step from `start` to `end`, with the
-    /// states there in `search.states`. Without one, the event indicators become those of the end.
+    /// states there in `search.states`. Without an event, `indicators` get the event indicators at the end.
     ///
     /// An indicator that changes its sign twice within half a step is not noticed.
     fn locate(&mut self, start: f64, end: f64) -> Result<Option<f64>, CallError> {

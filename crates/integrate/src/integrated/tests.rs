@@ -141,7 +141,7 @@ impl ModelExchange for Timer {
     }
 }
 
-/// One unit in the last place of these times is 2.4e-7 s.
+/// One unit in the last place of such times is 2.4e-7 s.
 #[test]
 fn steps_of_a_millisecond_in_seconds_since_1970_lose_neither_time_nor_events() {
     let start = 1.7e9;
