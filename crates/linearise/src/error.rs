@@ -86,7 +86,7 @@ pub enum LineariseError {
         /// Candidates: outputs and local variables that can be read, as part of a sentence.
         candidates: String,
     },
-    /// The FMU states no communication step, and those that were tried give no result.
+    /// The FMU states no communication step, and no step that was tried gives a result.
     #[error(
         "{model} states no stepSize in its DefaultExperiment, and communication steps of {} s give no \
          result: give a communication step in s; with the first: {reason}",

@@ -52,9 +52,9 @@ impl Matrices {
 pub struct Signal {
     /// Name of the variable.
     pub name: String,
-    /// Its unit, if the FMU states one.
+    /// Unit of the variable, if the FMU states one.
     pub unit: Option<String>,
-    /// Its value.
+    /// Value of the variable at the operating point.
     pub value: f64,
     /// The typical size of a change: see [`Linearise::typical`].
     pub typical: f64,
@@ -108,7 +108,7 @@ pub struct Disagreement {
     pub of: String,
     /// The variable of differentiation.
     pub to: String,
-    /// `fmi2GetDirectionalDerivative`.
+    /// The value of `fmi2GetDirectionalDerivative`.
     pub derivative: f64,
     /// The difference quotient, extrapolated.
     pub difference: f64,
@@ -132,7 +132,7 @@ pub struct Linearisation {
     /// x' at the operating point, in the states' units per s; zero at an equilibrium.
     pub rates: Vec<f64>,
     /// The largest of `rates`, each relative to the sum of |`A_ij`|, |`B_ij`| and |`F_ij`| times
-    /// the typical sizes. Far below one the operating point is practically an equilibrium.
+    /// the typical sizes. Far below one, the operating point is practically an equilibrium.
     pub residual: f64,
     /// The method that gave the matrices.
     pub method: Method,

@@ -44,8 +44,8 @@ struct Map {
     deviations: DMatrix<f64>,
 }
 
-/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]]. The matrices are those at
-/// the start of the record.
+/// The step map: x[k+1] - x[k] = `change` [x[k]; u[k]], y[k+1] = `outputs` [x[k+1]; u[k]], with the values of the
+/// matrices at the start of the record.
 struct Discrete {
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
@@ -190,7 +190,7 @@ fn maps(
     Ok(maps)
 }
 
-/// Returns the degree in time of the coefficients.
+/// Returns the degree in time of the fitted coefficients, 0 without drift.
 fn degree(record: &Record) -> usize {
     if record.is_drifting { DEGREE } else { 0 }
 }
