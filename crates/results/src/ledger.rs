@@ -15,7 +15,7 @@ pub const WORDS: usize = ROWS + (1 << 16);
 
 // Positions in the shared memory, in words: the numbers, then the bytes of the path, then the bytes of the rows.
 
-/// 0 without a file, [`OPEN`] or [`COMPLETE`].
+/// State of the file: 0 without a file, [`OPEN`] or [`COMPLETE`].
 const STATE: usize = 0;
 const DEVICE: usize = 1;
 const INODE: usize = 2;
@@ -121,7 +121,7 @@ fn bytes(words: &[AtomicU64], length: u64) -> Vec<u8> {
 /// A results file after the end of the process that wrote it.
 #[derive(Debug)]
 pub struct LeftFile {
-    /// Its absolute path.
+    /// The absolute path of the file.
     pub path: PathBuf,
     /// Whether the process had completed it.
     pub was_complete: bool,

@@ -119,7 +119,7 @@ pub enum ResultsError {
     /// The extension of the file is neither `.csv` nor `.parquet`.
     #[error("{}: results are written as .csv or .parquet", path.display())]
     Format {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The extension of a file that is read is none of `.csv`, `.parquet` and `.mat`.
@@ -129,13 +129,13 @@ pub enum ResultsError {
         path.display()
     )]
     Extension {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// Two columns have the same name.
     #[error("two columns of the results have the name {name:?}")]
     Duplicate {
-        /// The name.
+        /// The name of both columns.
         name: String,
     },
     /// The number of values of a type in a row differs from the number of its columns.
@@ -155,13 +155,13 @@ pub enum ResultsError {
         path.display()
     )]
     InUse {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file cannot be created or written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The reason, such as a full disk.
         source: io::Error,
@@ -173,7 +173,7 @@ pub enum ResultsError {
         path.display()
     )]
     Length {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Number of bytes that were written.
         expected: u64,
@@ -187,13 +187,13 @@ pub enum ResultsError {
         path.display()
     )]
     Overwritten {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The path no longer leads to the file that was written, or the descriptor of a pipe or a device is lost.
     #[error("{}: the file was deleted, moved or replaced during the run", path.display())]
     Gone {
-        /// The path.
+        /// The path of the file.
         path: PathBuf,
     },
     /// The process is a copy (fork) of the process that writes the file.
@@ -203,13 +203,13 @@ pub enum ResultsError {
         path.display()
     )]
     Forked {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file cannot be read, or its content does not match its extension.
     #[error("cannot read {}: {reason}", path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The reason.
         reason: String,
@@ -217,11 +217,11 @@ pub enum ResultsError {
     /// A cell does not contain a number.
     #[error("{}, line {line}: {name} is {text:?}, expected a number", path.display())]
     Number {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Line, counted from 1.
         line: u64,
-        /// The column.
+        /// Name of the column.
         name: String,
         /// Content of the cell.
         text: String,
@@ -229,29 +229,29 @@ pub enum ResultsError {
     /// A time is earlier than the time of the row before.
     #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
     Order {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Line or row, counted from 1.
         place: String,
-        /// The column of the time.
+        /// Name of the time column.
         name: String,
-        /// The time.
+        /// The time that is earlier, in s.
         time: f64,
-        /// The time of the row before.
+        /// The time of the row before, in s.
         before: f64,
     },
     /// A column contains texts; numbers are required.
     #[error("{}: {name} holds texts, expected numbers", path.display())]
     Text {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The column.
+        /// Name of the column.
         name: String,
     },
     /// A pattern matches no column, or the selection is empty.
     #[error("{}: {source}", path.display())]
     Selection {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The error of the selection.
         source: SelectionError,

@@ -108,7 +108,7 @@ impl OutputFile {
     }
 
     /// Checks that this process created the file, that it is still the same file, and that its length and position
-    /// are those after the last write.
+    /// have not changed since the last write.
     ///
     /// Opens the file again if only the descriptor is lost. Cuts off bytes that others have appended and resets the
     /// position, so that later writes succeed; one call returns the error. For a file that others have shortened, every

@@ -63,7 +63,7 @@ impl Table {
         Ok(Self { path: path.to_owned(), layout, time: time_position(&columns), columns })
     }
 
-    /// Returns the columns in the order of the file, including the time; of MAT files, those that vary come first.
+    /// Returns the columns in the order of the file, including the time; in MAT files, columns that vary come first.
     /// Columns of CSV and MAT files have the type Real, integers of Parquet the type Integer, also those with 64 bits;
     /// its decimals and timestamps, which are in s, have the type Real. Columns of CSV have no unit, unless the second
     /// line of the file states units.
@@ -178,7 +178,7 @@ fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
 /// Checks that the times of the rows are finite and do not decrease.
 struct Clock<'a> {
     path: &'a Path,
-    /// The column of the time.
+    /// Name of the time column.
     name: &'a str,
     before: f64,
 }

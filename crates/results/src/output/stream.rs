@@ -25,7 +25,7 @@ const ATOMIC: usize = 4096;
 /// Standard output, once it is reserved for the results.
 static RESERVED: Mutex<Option<File>> = Mutex::new(None);
 
-/// Reserves standard output for the results: what this process and its FMUs print goes to standard
+/// Reserves standard output for the results: text that this process and its FMUs print goes to standard
 /// error from now on.
 ///
 /// # Errors

@@ -12,7 +12,7 @@
 
 use super::{MAGIC, OutputFile, ResultsError};
 
-/// Number of bytes of the length of the footer and of [`MAGIC`]. The end of each tail is a multiple.
+/// Number of bytes of the footer length and [`MAGIC`] at the end of a file. Each tail ends at a multiple of it.
 const LINK: usize = 8;
 
 /// A file with a footer.

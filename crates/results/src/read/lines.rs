@@ -200,7 +200,7 @@ fn line_of(path: &Path, record: &ByteRecord) -> u64 {
     line
 }
 
-/// Returns what is wrong with a line that has more or fewer values than names.
+/// Returns the error message for a line with more or fewer values than there are names.
 fn ragged(line: u64, count: usize, expected: usize, delimiter: u8) -> String {
     let values = if count == 1 { "1 value".to_owned() } else { format!("{count} values") };
     let advice = if count > expected && delimiter == b',' {
