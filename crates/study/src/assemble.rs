@@ -98,8 +98,8 @@ pub fn assemble_with(
     Ok(AssembledSystem { system, experiment, steps, fixed_step, opened, integrated })
 }
 
-/// Applies the settings of structural parameters or, if `structural` is false, those of all other variables: first
-/// the settings of the system structure, then those of the configuration, which override them.
+/// Applies the settings of structural parameters or, if `structural` is false, of all other variables: first the
+/// settings of the system structure, then the settings of the configuration, which override them.
 fn apply_settings(
     system: &mut System,
     loaded: &LoadedConfig,

@@ -153,12 +153,12 @@ impl Config {
         connections.try_for_each(|entry| entry.get_ref().check(&entry.span()))
     }
 
-    /// Prepends `folder` to relative paths, except those of `preload`.
+    /// Prepends `folder` to relative paths, except paths in `preload`.
     pub fn rebase(&mut self, folder: &Path) {
         self.each_path(|path| *path = folder.join(&*path));
     }
 
-    /// Makes every path except those of `preload` absolute, so that the configuration is valid in any folder.
+    /// Makes every path absolute, except paths in `preload`, so that the configuration is valid in any folder.
     ///
     /// # Errors
     ///

@@ -48,7 +48,7 @@ pub enum Error {
     File {
         /// The action that failed, for example "read" or "write".
         action: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -62,9 +62,9 @@ pub enum Error {
     /// An error with its context, such as an FMU or an entry. Its message is the context only.
     #[error("{what}")]
     Within {
-        /// The context.
+        /// The context, such as the name of an FMU.
         what: String,
-        /// The error.
+        /// The error without its context.
         source: Box<Error>,
     },
     /// A setting, a file or a request is invalid; the sentence states the reason.

@@ -7,7 +7,7 @@ use tracing::field::{Field, Visit};
 /// The fields of a message of the libraries or of an FMU, as `tracing` records them.
 #[derive(Debug, Default)]
 pub struct LogFields {
-    /// The text.
+    /// The text of the message.
     pub message: String,
     /// The instance name of the FMU; empty for messages that come from no FMU.
     pub instance: String,

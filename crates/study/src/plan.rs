@@ -1,4 +1,4 @@
-//! Chooses what a configuration leaves open: algorithm, times, interval between rows.
+//! Chooses the settings that a configuration leaves open: algorithm, times, interval between rows.
 
 use crate::error::Error;
 use fmu_description::number::{rounded, seconds};
@@ -14,7 +14,7 @@ use crate::config::{Config, ConnectionEntry, Every};
 
 /// Largest default number of intervals between rows with fixed steps.
 const ROWS: f64 = 1e4;
-/// Length of a run in s if nothing states a stop time after its start, as in FMPy.
+/// Default length of a run in s if no stop time after its start is stated, as in FMPy.
 const LENGTH: f64 = 1.0;
 /// A step of fewer spacings between neighbouring floating-point times gives a warning.
 const STEP_RESOLUTION: f64 = 50.0;

@@ -7,8 +7,8 @@ use crate::error::Error;
 use crate::plan::Plan;
 
 /// Restores the simulation of `checkpoint`. Returns an error if the system or a setting does not fit the
-/// checkpoint; logs a warning if the stop time is later than the one that the FMUs have received, or if the run
-/// is already at its end.
+/// checkpoint; logs a warning if the stop time is later than the stop time that the FMUs have received, or if the
+/// run is already at its end.
 pub(crate) fn resume(
     system: System,
     plan: &Plan,

@@ -49,7 +49,7 @@ pub struct SetEntry {
     pub variable: Spanned<String>,
     /// Time in s; the value takes effect at the first communication point at or after it.
     pub at: f64,
-    /// The value.
+    /// The value that the variable gets.
     pub value: Spanned<Literal>,
     /// Unit of the value; default: the unit of the variable.
     pub unit: Option<Spanned<String>>,

@@ -49,7 +49,7 @@ pub enum TableError {
     /// The file is not UTF-8 text.
     #[error("line {line}: expected UTF-8 text, found other bytes")]
     Encoding {
-        /// The line.
+        /// Number of the line.
         line: usize,
     },
     /// The file is empty or has only empty lines.
@@ -58,7 +58,7 @@ pub enum TableError {
     /// The first column is not `time`.
     #[error("line {line}: the first column is {actual:?}, expected \"time\"{hint}")]
     NoTime {
-        /// The line.
+        /// Number of the line.
         line: usize,
         /// Name of the first column.
         actual: String,
@@ -68,27 +68,27 @@ pub enum TableError {
     /// A column has no name.
     #[error("line {line}: column {column} has no name")]
     Unnamed {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// The column.
+        /// Number of the column.
         column: usize,
     },
     /// Two columns have the same name.
     #[error("line {line}: the columns {first} and {second} are both called {name:?}")]
     Twice {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// The name.
+        /// The name of both columns.
         name: String,
-        /// One column.
+        /// Number of the first column.
         first: usize,
-        /// The other column.
+        /// Number of the second column.
         second: usize,
     },
     /// There is no column except the time.
     #[error("line {line}: there is no column but the time")]
     NoColumns {
-        /// The line.
+        /// Number of the line.
         line: usize,
     },
     /// There are no rows.
@@ -97,31 +97,31 @@ pub enum TableError {
     /// A row has another length than the header.
     #[error("line {line}: expected {expected} entries as in the header, found {actual}")]
     Width {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// Length of the header.
+        /// Number of entries of the header.
         expected: usize,
-        /// Length of the row.
+        /// Number of entries of the row.
         actual: usize,
     },
     /// An entry is not a finite number.
     #[error("line {line}, column {column:?}: expected a finite number, found {actual:?}")]
     Number {
-        /// The line.
+        /// Number of the line.
         line: usize,
         /// Name of the column.
         column: String,
-        /// The entry.
+        /// The text of the entry.
         actual: String,
     },
     /// A time is less than the time before it.
     #[error("line {line}: the time {actual} s comes after {before} s, expected ascending times")]
     Order {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// The time before.
+        /// The time before, in s.
         before: f64,
-        /// The time.
+        /// The time that is less, in s.
         actual: f64,
     },
 }

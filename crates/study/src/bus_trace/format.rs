@@ -51,7 +51,7 @@ impl Format {
     pub(super) fn write_start(self, file: &mut impl Write, buses: usize) -> io::Result<()> {
         match self {
             Self::Candump => Ok(()),
-            // Simulated time starts at the epoch.
+            // 0 s of the simulation is the epoch.
             Self::Asc => file.write_all(
                 b"date Thu Jan 1 12:00:00.000 am 1970\nbase hex timestamps absolute\nno internal events logged\n",
             ),

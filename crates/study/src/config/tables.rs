@@ -108,7 +108,7 @@ impl Isolation {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CheckpointSettings {
-    /// The file.
+    /// The checkpoint file.
     pub file: Option<PathBuf>,
     /// Simulated time in s between two checkpoints; default: only a checkpoint at the end, which is written anyway.
     pub every: Option<Spanned<f64>>,

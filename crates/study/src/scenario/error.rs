@@ -19,7 +19,7 @@ pub struct ScenarioError {
     pub place: Range<usize>,
     /// Path of the entry, such as `scenario.fault[2]`; entries count from 1.
     pub entry: String,
-    /// The reason.
+    /// The reason why the entry is invalid.
     pub reason: Box<Reason>,
 }
 
@@ -33,9 +33,9 @@ pub enum Reason {
     /// The variable cannot be set during the run.
     #[error("{name} is {actual}, expected an input or a tunable parameter")]
     NotSettable {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// Its causality and variability.
+        /// Causality and variability of the variable.
         actual: String,
     },
     /// The input already has a source.
@@ -44,23 +44,23 @@ pub enum Reason {
          connection can hold another one: stuck = {{ value = .. }}"
     )]
     Connected {
-        /// The input.
+        /// The input, as `slave.variable`.
         name: String,
-        /// Its source.
+        /// The output to which the input is connected.
         source_name: String,
     },
     /// Two entries drive the same variable.
     #[error("{name} is driven twice, also by {first}")]
     Twice {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// Path of the other entry.
+        /// Path of the first entry that drives the variable.
         first: String,
     },
     /// A fault is stated for a variable without a connection and without a signal.
     #[error("{name} is {actual}, expected a connected input, or one that a signal drives")]
     NoConnection {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
         /// The kind of the variable.
         actual: &'static str,
@@ -68,31 +68,31 @@ pub enum Reason {
     /// The input has another source than stated.
     #[error("{target} is connected to {actual}, expected {stated}")]
     OtherSource {
-        /// The input.
+        /// The input, as `slave.variable`.
         target: String,
-        /// Its source.
+        /// The source of the input.
         actual: String,
-        /// The source stated.
+        /// The source that the entry states.
         stated: String,
     },
     /// An entry does not have exactly one kind.
     #[error("found {}, expected exactly one of {expected}", listed(actual))]
     Kinds {
-        /// The kinds stated.
+        /// The kinds that the entry states.
         actual: Vec<&'static str>,
-        /// The kinds possible.
+        /// The kinds of which an entry states one.
         expected: &'static str,
     },
     /// The kind does not fit the type of the variable.
     #[error("{what} does not fit {name}, which is of type {kind}; expected {expected}")]
     Unfit {
-        /// The kind of the entry.
+        /// The kind of signal or fault that the entry states.
         what: &'static str,
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// Its type.
+        /// The type of the variable.
         kind: &'static str,
-        /// The kinds that fit.
+        /// The kinds that fit this type.
         expected: &'static str,
     },
     /// A number is out of range.
@@ -100,25 +100,25 @@ pub enum Reason {
     Number {
         /// Name of the number.
         what: &'static str,
-        /// The number.
+        /// The number that is stated.
         actual: f64,
-        /// The condition it must satisfy.
+        /// The condition that the number must satisfy.
         expected: &'static str,
     },
     /// Members of a table are missing or exclude each other.
     #[error("{what}: expected {expected}")]
     Members {
-        /// The table.
+        /// Name of the table.
         what: &'static str,
-        /// The members expected.
+        /// The members that the table must have.
         expected: &'static str,
     },
     /// A value does not fit the type of the variable.
     #[error("{name} = {actual}: expected {expected}")]
     Value {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The value.
+        /// The value that is stated.
         actual: String,
         /// The values that fit.
         expected: String,
@@ -129,17 +129,17 @@ pub enum Reason {
     /// A unit is stated for a variable without one.
     #[error("{name} has no unit, expected a value without one, found the unit {stated:?}")]
     NoUnit {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The unit stated.
+        /// The unit that the entry states.
         stated: String,
     },
     /// The unit cannot be converted to the unit of the variable.
     #[error("{name} is in {unit:?}, to which {stated:?} cannot be converted")]
     Dimension {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The unit stated.
+        /// The unit that the entry states.
         stated: String,
         /// The unit of the variable.
         unit: String,
@@ -153,7 +153,7 @@ pub enum Reason {
     /// A file is not a valid table.
     #[error("{}: {error}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The error of the table.
         error: TableError,
@@ -161,9 +161,9 @@ pub enum Reason {
     /// The file does not have the column.
     #[error("{}: there is no column {name:?}, it has {known}", path.display())]
     Column {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The column.
+        /// Name of the column.
         name: String,
         /// Some of the columns in the file.
         known: String,
@@ -171,7 +171,7 @@ pub enum Reason {
     /// No column of the file has the name of an input or parameter that can be driven.
     #[error("{}: no column is called as {expected}, it has {known}", path.display())]
     NoColumn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The form of the column names expected.
         expected: String,

@@ -91,7 +91,7 @@ pub(super) struct Resolver<'a> {
 
 /// A variable with its description.
 pub(super) struct Target<'a> {
-    /// The port of the variable; of aliases, the one that is connected, or else the one that holds the value.
+    /// The port of the variable. Of several aliases, the port that is connected, or else the port that holds the value.
     pub(super) port: Port,
     /// The name of the variable, as stated.
     pub(super) name: String,
