@@ -18,7 +18,7 @@ pub enum SystemError {
     /// Two slaves have the same name.
     #[error("there are two FMUs of the name {name:?}, expected different names")]
     SameName {
-        /// The name.
+        /// The name of both slaves.
         name: String,
     },
     /// No slave has this name.
@@ -26,7 +26,7 @@ pub enum SystemError {
     UnknownSlave {
         /// The whole name.
         name: String,
-        /// Its first part.
+        /// The part of the name that should be a slave.
         slave: String,
         /// The names of the slaves that exist.
         known: String,
@@ -38,7 +38,7 @@ pub enum SystemError {
         name: String,
         /// `modelName` of the FMU.
         model: String,
-        /// The variable.
+        /// The part of the name after the slave.
         variable: String,
         /// Variables with a similar name, as part of a sentence.
         nearest: String,
@@ -46,9 +46,9 @@ pub enum SystemError {
     /// The variable has the wrong causality or type.
     #[error("{name} is {actual}, expected {expected}")]
     Role {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// Its causality or type.
+        /// The causality or type of the variable.
         actual: String,
         /// The causality or type expected.
         expected: String,
@@ -56,23 +56,23 @@ pub enum SystemError {
     /// An input has two sources.
     #[error("{input} is connected twice, to {first} and to {second}")]
     Twice {
-        /// The input.
+        /// The input, as `slave.variable`.
         input: String,
-        /// One source.
+        /// The output that is connected to the input.
         first: String,
-        /// The other source.
+        /// A second output that should be connected to the input.
         second: String,
     },
     /// The two ends of a connection have different units.
     #[error("{from} in {from_unit} cannot be connected to {to} in {to_unit}")]
     Unit {
-        /// The output.
+        /// The output, as `slave.variable`.
         from: String,
-        /// Its unit.
+        /// The unit of the output.
         from_unit: String,
-        /// The input.
+        /// The input, as `slave.variable`.
         to: String,
-        /// Its unit.
+        /// The unit of the input.
         to_unit: String,
     },
     /// Only one end of a connection is a difference, and an offset separates their units.
@@ -81,13 +81,13 @@ pub enum SystemError {
          {absolute_unit} is not: state factor and offset of the connection"
     )]
     Relative {
-        /// The end that is a difference.
+        /// The end of the connection that is a difference.
         relative: String,
-        /// Its unit.
+        /// The unit of the end that is a difference.
         relative_unit: String,
-        /// The other end.
+        /// The other end of the connection.
         absolute: String,
-        /// Its unit.
+        /// The unit of the other end.
         absolute_unit: String,
     },
     /// The two ends of a connection have different sizes.
@@ -96,13 +96,13 @@ pub enum SystemError {
          element, such as {element}"
     )]
     Size {
-        /// The source.
+        /// The source of the connection, as `slave.variable`.
         from: String,
-        /// Its size.
+        /// The size of the source.
         from_size: String,
-        /// The target.
+        /// The target of the connection, as `slave.variable`.
         to: String,
-        /// Its size.
+        /// The size of the target.
         to_size: String,
         /// The first element of the source if it is an array, otherwise of the target.
         element: Box<str>,
@@ -110,9 +110,9 @@ pub enum SystemError {
     /// Two terminals do not match.
     #[error("{from} cannot be connected to {to}: {why}")]
     Terminals {
-        /// One terminal.
+        /// The first terminal, as `slave.terminal`.
         from: String,
-        /// The other one.
+        /// The second terminal, as `slave.terminal`.
         to: String,
         /// What does not match.
         why: String,
@@ -123,15 +123,15 @@ pub enum SystemError {
          structural parameter first"
     )]
     Resized {
-        /// The element.
+        /// The removed element, as `slave.variable`.
         name: String,
     },
     /// A text cannot be parsed as a value of the variable's type.
     #[error("{name} = {value:?}: expected {expected}")]
     Value {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The text.
+        /// The text that states the value.
         value: String,
         /// What was expected, as part of a sentence.
         expected: String,
@@ -139,9 +139,9 @@ pub enum SystemError {
     /// The standard allows nobody to set the variable.
     #[error("{name} = {value:?}: the variable is {what}, so it cannot be set")]
     NotSettable {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The text.
+        /// The text that states the value.
         value: String,
         /// What the variable is, as part of a sentence.
         what: &'static str,
@@ -149,9 +149,9 @@ pub enum SystemError {
     /// An FMU refused a setting.
     #[error("{name} = {value:?}: {source}")]
     Setting {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The text.
+        /// The text that states the value.
         value: String,
         /// Function, status and messages.
         source: CallError,
@@ -162,9 +162,9 @@ pub enum SystemError {
          {actual}. The FMU ignores or replaces the value; remove the setting"
     )]
     LostSetting {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
-        /// The text.
+        /// The text that states the value.
         value: String,
         /// The value in the FMU after the initialization.
         actual: String,
@@ -175,7 +175,7 @@ pub enum SystemError {
         seconds(*time)
     )]
     Unreadable {
-        /// The variable.
+        /// The variable, as `slave.variable`.
         name: String,
         /// Time of the master in s.
         time: f64,
@@ -192,7 +192,7 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
-    /// The iteration of an instant does not end.
+    /// The iteration of the events at a time does not end.
     #[error(
         "the events at t = {} s do not settle within {iterations} iterations: {names} still change",
         seconds(*time)
@@ -202,15 +202,15 @@ pub enum SystemError {
         time: f64,
         /// Number of iterations.
         iterations: usize,
-        /// What changes.
+        /// The variables that still change.
         names: String,
     },
     /// A connected output or input is NaN or infinite.
     #[error("{name} is {value} at t = {} s, expected a finite number", seconds(*time))]
     NotFinite {
-        /// The output or input.
+        /// The output or input, as `slave.variable`.
         name: String,
-        /// Its value.
+        /// The value, NaN or infinite.
         value: f64,
         /// Time of the master in s.
         time: f64,
@@ -218,7 +218,7 @@ pub enum SystemError {
     /// The algorithm needs a capability that an FMU lacks.
     #[error("{slave} cannot take part in {required_by}: its {lacks} is false")]
     Capability {
-        /// The slave.
+        /// Name of the slave.
         slave: String,
         /// The capability flag that is false.
         lacks: &'static str,
@@ -244,7 +244,7 @@ pub enum SystemError {
     Coupling {
         /// Start of the step in s.
         time: f64,
-        /// Its size in s.
+        /// Size of the step in s.
         size: f64,
         /// How the iteration ended.
         why: String,
@@ -254,9 +254,9 @@ pub enum SystemError {
     Resume {
         /// Name of the setting.
         name: String,
-        /// Its value in the run of the checkpoint.
+        /// Value of the setting in the run of the checkpoint.
         saved: String,
-        /// Its value now.
+        /// Value of the setting in the new run.
         requested: String,
     },
     /// The error of the smallest step exceeds the tolerance.
@@ -269,9 +269,9 @@ pub enum SystemError {
     Stuck {
         /// Start of the step in s.
         time: f64,
-        /// Its size in s.
+        /// Size of the step in s.
         size: f64,
-        /// Its error as a multiple of the tolerance.
+        /// Error of the step as a multiple of the tolerance.
         error: f64,
     },
     /// The steps are so small that the run cannot reach its stop time.
@@ -305,9 +305,9 @@ pub enum SystemError {
     Time {
         /// Name of the quantity.
         what: &'static str,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
-        /// The condition it must satisfy.
+        /// The condition that the value must satisfy.
         rule: String,
     },
 }

@@ -36,11 +36,11 @@ impl Window {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Fault {
-    /// `v + b`.
+    /// `v + b`: the constant b is added.
     Bias(f64),
-    /// `k v`.
+    /// `k v`: the value is multiplied by k.
     Gain(f64),
-    /// `v + r (t - from)`, with `r` per second.
+    /// `v + r (t - from)`, from the start `from` of the window, with `r` per second.
     Drift(f64),
     /// The given value, or the value at the first communication point of the window.
     Stuck(Option<f64>),
@@ -193,8 +193,8 @@ impl FaultChain {
     }
 
     /// As [`FaultChain::apply`], for Integers; the result is rounded, and in a simulation limited to the range of the
-    /// input. Without a simulation, the limits are the range of 32 bits for a `value` within it, otherwise that of 64
-    /// bits.
+    /// input. Without a simulation, the limits are the range of 32 bits for a `value` of 32 bits, otherwise the range
+    /// of 64 bits.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i64) -> i64 {

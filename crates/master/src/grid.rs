@@ -34,7 +34,7 @@ pub(crate) struct Grid {
 pub struct EarlyEnd {
     /// Name of the FMU.
     pub slave: String,
-    /// Its step in s.
+    /// The step of the FMU in s.
     pub step: f64,
     /// The end of the run in s.
     pub end: f64,

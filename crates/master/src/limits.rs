@@ -147,7 +147,7 @@ struct Watched {
 
 /// The output that an input is connected to.
 enum Source {
-    /// At this position of the connected Reals.
+    /// A Real output, at this position of the connected Reals.
     Real(usize),
     Integer(Port),
 }

@@ -89,8 +89,8 @@ impl<'a> Rows<'a> {
         rows.collect()
     }
 
-    /// Returns the entry of the output at position `output` in the first of `lists` that has one; for an alias of FMI
-    /// 3.0, which has no entry, that of its [`System::holder`]. `None` if it is no output.
+    /// Returns the entry of the output at position `output` in the first of `lists` that has one. An alias of FMI 3.0
+    /// has no entry; the entry of its [`System::holder`] is returned instead. `None` if it is no output.
     fn entry(&self, lists: &[&HashMap<u32, &'a Unknown>], output: usize) -> Option<&'a Unknown> {
         let entry = |position: usize| {
             let index = u32::try_from(position + 1).ok()?;

@@ -118,7 +118,7 @@ impl Readout {
         }
     }
 
-    /// Writes the values of driven variables at `time`, in s, except those that still have their start values.
+    /// Writes the values of driven variables at `time`, in s, except variables that still have their start values.
     pub(crate) fn apply(&mut self, drives: &mut Drives, time: f64) {
         for &(number, position) in &self.driven {
             let Some(drive) = drives.iter_mut().nth(number) else { continue };

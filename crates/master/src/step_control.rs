@@ -62,7 +62,7 @@ impl PlannedStep {
 
 /// A completed step.
 pub(crate) struct StepOutcome {
-    /// Its end in s.
+    /// The end of the step in s.
     pub(crate) end: f64,
     /// The slave that requested the end of the simulation.
     pub(crate) ending: Option<Ending>,

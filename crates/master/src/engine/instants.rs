@@ -19,7 +19,7 @@ const MOST: usize = 1000;
 /// The slaves whose events the master handles.
 #[derive(Debug, Default)]
 pub(crate) struct Instants {
-    /// The positions of these slaves.
+    /// The positions of the slaves whose events the master handles.
     members: Vec<usize>,
     /// For each slave, the time in s of its next known event; infinite without one, and for a slave without
     /// connections.
@@ -98,7 +98,7 @@ impl Instants {
             })
     }
 
-    /// Whether a driven variable of one of these slaves has a break at `time`: its drive starts, or its signal or a
+    /// Whether a driven variable of a slave in `members` has a break at `time`: its drive starts, or its signal or a
     /// fault on it jumps or has a kink.
     fn has_break(&self, drives: &Drives, time: f64) -> bool {
         !drives.is_empty()

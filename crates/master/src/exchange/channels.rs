@@ -123,7 +123,7 @@ impl Channels {
         all!(self.add_new(slave, ports););
     }
 
-    /// Records the gathered values of all inputs as those that were set last.
+    /// Records the gathered values of all inputs as the values that were set last.
     pub(super) fn accept(&mut self) {
         all!(self.accept(););
     }

@@ -289,7 +289,7 @@ impl<T: Clone + Default> Channel<T> {
         Ok(())
     }
 
-    /// Records the gathered values of all inputs as those that were set last.
+    /// Records the gathered values of all inputs as the values that were set last.
     pub(crate) fn accept(&mut self) {
         self.state.inputs.clone_from(&self.values);
     }

@@ -157,8 +157,8 @@ impl Exchange {
         self.ticks.end();
     }
 
-    /// Computes the discrete and clocked inputs of all `count` slaves at `time`, the start of the run, and records them
-    /// as those that were set last.
+    /// Computes the discrete and clocked inputs of all `count` slaves at `time`, the start of the run, and records
+    /// these values as set.
     pub(crate) fn accept_at_events(&mut self, count: usize, time: f64) {
         for slave in 0..count {
             self.gather_at_events(slave, time);

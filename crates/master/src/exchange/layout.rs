@@ -80,7 +80,7 @@ pub(super) struct Layout {
     pub(super) held: Vec<bool>,
     /// For each input, its port.
     pub(super) input_ports: Vec<Port>,
-    /// For each slave, whether it is a function. A function uses input values at the end of a step.
+    /// For each slave, whether it has no states, so that it uses input values at the end of a step.
     pub(super) functions: Vec<bool>,
     /// For each slave, whether all its inputs are copies of outputs, without transformation.
     pub(super) plain: Vec<bool>,
@@ -205,9 +205,9 @@ impl Layout {
         }
     }
 
-    /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on a Real input
-    /// that follows it, also through further slaves. An output without stated dependencies counts as smooth, as does
-    /// one that depends on discrete outputs through inputs of other types only, such as a Boolean.
+    /// Finds the outputs that jump with a discrete output of another slave: they depend directly on a Real input that
+    /// is connected to it, also through further slaves. An output counts as smooth if its dependencies are not stated,
+    /// or if it depends on discrete outputs only through inputs of other types, such as a Boolean.
     fn find_jumping(&mut self, system: &System) {
         let outputs = || self.output_ports.iter().zip(&self.discrete);
         let discrete = outputs().filter(|(_, is_discrete)| **is_discrete);

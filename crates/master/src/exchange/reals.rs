@@ -158,9 +158,9 @@ impl Reals {
     }
 
     /// Computes the value of one input of `slave` for a step from `time` over `size`, both in s, and its derivatives at
-    /// `time` up to the order that the slave takes. `k` is the index of the input among those of all slaves, `position`
-    /// among those of `slave`. Without derivatives, the value is the mean of a linear or quadratic polynomial over the
-    /// step, or, for `Limited` with a known end, the value at its end.
+    /// `time` up to the order that the slave takes. `k` is the index of the input among the inputs of all slaves,
+    /// `position` among the inputs of `slave`. Without derivatives, the value is the mean of a linear or quadratic
+    /// polynomial over the step, or, for `Limited` with a known end value, this value.
     fn gather_input(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, port_map) = (&self.layout, &self.layout.port_maps[slave]);
         let source = layout.sources[k] as usize;

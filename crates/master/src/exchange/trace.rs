@@ -13,7 +13,7 @@ pub(super) struct Span {
     pub(super) last_size: f64,
     /// Size of the step before that in s.
     pub(super) earlier_size: f64,
-    /// Whether the slave has made its step, so that the latest values are those at its end.
+    /// Whether the slave has made its step, so that the latest values belong to its end.
     pub(super) stepped: bool,
 }
 

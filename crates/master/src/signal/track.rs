@@ -65,9 +65,9 @@ pub enum TrackError {
     Order {
         /// Number of the point.
         point: usize,
-        /// The time before.
+        /// The time of the point before.
         before: f64,
-        /// The time.
+        /// The time of the point.
         actual: f64,
     },
     /// Times and values have different lengths.

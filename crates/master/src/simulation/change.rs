@@ -24,8 +24,8 @@ impl Simulation {
     }
 
     /// Replaces the scenario by one that adds to it: further driven variables, further points of
-    /// signals, and faults after those that a connection has. What is added must not take effect before
-    /// [`Simulation::next_change`]; this is not checked. A [`crate::fault::Fault::Delay`] that is added has no
+    /// signals, and faults after the present faults of a connection. The additions must not take effect before
+    /// [`Simulation::next_change`]; this is not checked. An added [`crate::fault::Fault::Delay`] has no
     /// values from before now: until its delay has passed, it gives its initial or the present value.
     ///
     /// # Errors

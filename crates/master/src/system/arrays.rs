@@ -5,7 +5,7 @@ use crate::error::SystemError;
 use fmu_description::Causality;
 use slave::{Transformation, Value, ValueType};
 
-/// What a name stands for: a variable, or the elements of an array with their indices.
+/// The meaning of a name: a variable, or the elements of an array with their indices.
 enum Named {
     One(Port),
     Array(Vec<(String, Port)>),
@@ -38,7 +38,7 @@ fn is_indices(text: &str) -> bool {
 }
 
 impl System {
-    /// Returns what a name `slave.variable` stands for.
+    /// Returns the variable or the elements of the array that a name `slave.variable` denotes.
     fn named(&self, name: &str) -> Result<Named, SystemError> {
         let error = match self.port(name) {
             Ok(port) => return Ok(Named::One(port)),

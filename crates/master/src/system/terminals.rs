@@ -52,7 +52,7 @@ impl System {
         };
         let mut pairs = Vec::new();
         self.match_members(one, other, &mut pairs).map_err(wrong)?;
-        // Nested terminals of equal names.
+        // Nested terminals of equal names are connected, too.
         let inner = |outer: SlaveTerminal<'_>| {
             let prefix = format!("{}.", outer.terminal.name);
             let all = self.slaves[outer.slave].1.description().terminals.iter();
@@ -199,8 +199,8 @@ impl System {
     }
 }
 
-/// Returns the name of the member that receives what `name` sends, or sends what it receives; `None` if `name` starts
-/// with neither `Tx_` nor `Rx_`.
+/// Returns the name of the partner of the member `name`, with `Tx_` and `Rx_` exchanged; `None` if `name` starts with
+/// neither of them.
 fn crossed(name: &str) -> Option<String> {
     let (direction, rest) = name.split_once('_')?;
     match direction {

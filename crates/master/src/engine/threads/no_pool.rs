@@ -4,7 +4,7 @@
 pub(super) enum Pool {}
 
 impl Pool {
-    /// Fails with the reason.
+    /// Returns the reason why there is no pool, as an error.
     pub(super) fn new(_jobs: usize) -> Result<Self, String> {
         Err("WebAssembly has none".to_owned())
     }

@@ -7,7 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub(super) struct Pool(ThreadPool);
 
 impl Pool {
-    /// Starts `jobs` threads; fails with the reason.
+    /// Starts `jobs` threads. The error is the reason why they cannot start.
     pub(super) fn new(jobs: usize) -> Result<Self, String> {
         let pool = ThreadPoolBuilder::new().num_threads(jobs).build();
         pool.map(Self).map_err(|error| error.to_string())
