@@ -151,7 +151,7 @@ pub enum Progress {
     },
     /// `I - dG/du` is numerically singular: the loop has no solution or no unique one.
     Singular {
-        /// Bound `(1 + |M|) |M^-1|` of the condition number of the matrix M in the 1-norm, with the unknowns
+        /// Bound `(1 + |M|) |M^-1|` of the condition number of `M = I - dG/du` in the 1-norm, with the unknowns
         /// divided by their nominals; infinite if M has no inverse or is not finite.
         condition: f64,
     },
