@@ -156,7 +156,7 @@ impl Integrated {
 
     /// Wraps a new instance as a slave, with the method called `method`, or the default if there is none of this name.
     ///
-    /// A worker of `fmu-import` calls integrators in this form.
+    /// This is the form of an integrator that a worker process of `fmu-import` calls.
     #[must_use]
     pub fn boxed(instance: Box<dyn ModelExchange>, method: &str) -> Box<dyn Slave> {
         let method = method.parse().unwrap_or_default();

@@ -321,8 +321,8 @@ impl Stepper {
         Ok(size.min(100.0 * guess))
     }
 
-    /// The first state of the last step without a finite error, otherwise the one with the largest error;
-    /// and whether its error is finite.
+    /// Returns the first state without a finite error in the last step, otherwise the state with the largest
+    /// error; and whether the error of this state is finite.
     fn worst(&self) -> (usize, bool) {
         let error = self.last_stiff().map_or(self.explicit.error.as_slice(), Rosenbrock::error);
         let end = self.end();
