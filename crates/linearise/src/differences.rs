@@ -128,8 +128,8 @@ impl Samples {
 
     /// Returns the slope of a component; `magnitude`, the size of its largest term, determines the rounding error.
     ///
-    /// With two sides, half of the difference between the right and the left slope is added to the error if it is
-    /// larger than four times its own error, because there is no derivative at a kink.
+    /// With two sides, half of the difference between the right and the left slope is added to the error if the
+    /// difference is larger than four times its own error, because there is no derivative at a kink.
     fn slope(&self, row: usize, magnitude: f64) -> Estimate {
         let noise = |level: usize| f64::EPSILON * magnitude / self.widths[level];
         let exponent = |order| self.side.exponent(order);
