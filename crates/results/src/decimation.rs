@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Tolerance, relative to the interval, by which a communication point may precede an instant of the
-/// grid and still count as at the instant, because times are rounded. The rounding of start and time is added.
+/// A communication point counts as at an instant of the grid if it precedes the instant by less than this
+/// fraction of the interval plus the rounding of start and time.
 const TOLERANCE: f64 = 1e-9;
 
 /// The communication points to record.

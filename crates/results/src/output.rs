@@ -111,8 +111,8 @@ impl OutputFile {
     /// have not changed since the last write.
     ///
     /// Opens the file again if only the descriptor is lost. Cuts off bytes that others have appended and resets the
-    /// position, so that later writes succeed; one call returns the error. For a file that others have shortened, every
-    /// call returns an error. Length and position of a pipe or a device are not checked.
+    /// position: this call returns an error, and later ones succeed. For a file that others have shortened, every call
+    /// returns an error. Length and position of a pipe or a device are not checked.
     pub(super) fn verify(&mut self) -> Result<(), ResultsError> {
         if process::id() != self.process {
             return Err(ResultsError::Forked { path: self.path.clone() });
