@@ -76,8 +76,8 @@ choice! {
         /// with the output derivative of the source if it provides one, otherwise with its last
         /// difference quotient.
         Linear = "linear",
-        /// A parabola through the output derivatives if the source provides them, otherwise through
-        /// past values. If the source has already stepped, it ends at the value of the source there.
+        /// A parabola through the output derivatives if the source provides them, otherwise through past
+        /// values. If the source has already stepped, the parabola ends at the value that it has reached.
         Quadratic = "quadratic",
     }
 }

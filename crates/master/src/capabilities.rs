@@ -23,8 +23,8 @@ pub(crate) fn build_exchange(system: &mut System, algorithm: &Algorithm) -> Exch
     Exchange::new(system, algorithm, &refusing)
 }
 
-/// Whether an FMU refuses derivatives that `flag` promises. Other failures appear again when the
-/// derivatives are needed.
+/// Whether an FMU refuses derivatives that `flag` promises. Ignores other failures: they appear again
+/// when the derivatives are needed.
 fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -> bool {
     let Err(error) = done else { return false };
     let refused = error.leaves_the_instance_usable();

@@ -93,8 +93,8 @@ impl SlowValues {
         SlowState { names: self.names(system), values: self.slaves.iter().map(values).collect() }
     }
 
-    /// Restores the values of a checkpoint. If the resumed run records other variables, the values
-    /// of a slave within its step are those at the end of this step until the slave reaches it.
+    /// Restores the values of a checkpoint. If the resumed run records other variables, it records the
+    /// values at the end of the current step of each slave until the slave reaches this end.
     ///
     /// # Errors
     ///

@@ -219,8 +219,8 @@ impl SizeControl {
         }
     }
 
-    /// Makes one whole step and then two halves, keeps the halves, and returns the error estimated
-    /// from both.
+    /// Makes one whole step and then two halves, keeps the result of the halves, and returns the error
+    /// estimated from both results.
     fn step_by_halves(
         &mut self,
         engine: &mut Engine,

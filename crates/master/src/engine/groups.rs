@@ -16,8 +16,8 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// Forms the groups. Jacobi: one group of all slaves, except functions, which follow one by
-    /// one. Gauss-Seidel: consecutive slaves without connections between them form a group, because
+    /// Forms the groups. Jacobi: one group of all slaves, except slaves without states, which follow one
+    /// by one. Gauss-Seidel: consecutive slaves without connections between them form a group, because
     /// their order does not matter.
     pub(super) fn new(system: &System, method: Method, order: &Order) -> Self {
         let count = system.slaves.len();

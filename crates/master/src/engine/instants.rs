@@ -21,7 +21,7 @@ const MOST: usize = 1000;
 pub(crate) struct Instants {
     /// The positions of the slaves whose events the master handles.
     members: Vec<usize>,
-    /// For each slave, the time in s of its next known event; infinite without one, and for a slave without
+    /// For each slave, the time in s of its next known event; infinite if there is none, and for a slave without
     /// connections.
     next: Vec<f64>,
     /// For each slave, the time in s of the event at which its last step ended; infinite if it ended at none.
@@ -256,8 +256,8 @@ impl Instants {
         Ok(())
     }
 
-    /// Asks all slaves for the times of their next events, after their states have been restored: all slaves are
-    /// between two steps. `pending` is, for each slave, the time in s of the event at which its last step ended.
+    /// Asks all slaves for the times of their next events, after their states between two steps have been restored.
+    /// `pending` is, for each slave, the time in s of the event at which its last step ended.
     pub(crate) fn restore(
         &mut self,
         system: &mut System,

@@ -49,7 +49,7 @@ impl Pass {
 
     /// Sets the inputs of all slaves from `latest`, makes `step` with each slave and reads their outputs. Replaces
     /// `latest` after all slaves have stepped. Returns the slaves that did not complete the step or ended it at an
-    /// event, with their results; or the first failure with its slave, and `latest` then has its former values.
+    /// event, with their results. Returns the first failure with its slave; `latest` then keeps its values.
     #[inline]
     pub(super) fn run(
         &mut self,

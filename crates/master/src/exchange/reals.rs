@@ -317,8 +317,8 @@ impl Reals {
     }
 
     /// Returns an input of the slave that is not finite after transformation and fault, with its value; `None` if all
-    /// are finite. Also returns `None`, without a check, if no connection to the slave has a transformation and no
-    /// connected Real has a fault: outputs are checked themselves. This misses an extrapolation that overflows.
+    /// are finite. Does not check the inputs if no connection to the slave has a transformation and no connected Real
+    /// has a fault, because outputs are checked; an extrapolation that overflows is then not detected.
     #[inline]
     pub(crate) fn input_not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         if self.layout.plain[slave] && self.faults.is_empty() {

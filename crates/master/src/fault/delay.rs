@@ -53,7 +53,7 @@ impl TryFrom<StoredDelayLine> for DelayLine {
 }
 
 impl DelayLine {
-    /// Creates a delay line of `seconds` for points about `step` s apart; an error if that takes less
+    /// Creates a delay line of `seconds` for points about `step` s apart; an error if `seconds` is less
     /// than 0 or more than [`MOST_STEPS`] steps.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
     pub(super) fn new(seconds: f64, step: f64) -> Result<Self, FaultError> {

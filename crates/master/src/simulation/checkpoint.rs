@@ -65,7 +65,7 @@ impl Checkpoint {
     }
 
     /// Returns the stop time in s that the FMUs received in `fmi2SetupExperiment`, if any. A
-    /// resumed run passes the same one; an FMU may refuse to step beyond it.
+    /// resumed run passes the same stop time; an FMU may refuse to step beyond it.
     #[must_use]
     pub fn fmu_stop_time(&self) -> Option<f64> {
         self.origin.stop_time

@@ -111,7 +111,7 @@ impl System {
         })
     }
 
-    /// As [`System::pairs`], with the names of slaves and variables apart.
+    /// As [`System::pairs`], with separate names of slave and variable.
     ///
     /// # Errors
     ///

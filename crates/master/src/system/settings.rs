@@ -82,8 +82,8 @@ impl System {
     }
 
     /// Repeats settings in initialization mode, where the standard allows it (FMI 2.0.5, table 4.2.4), because some
-    /// FMUs reset them when they enter it: inputs always, as some FMUs cannot read them, and other variables if they
-    /// have another value. Returns an error, with `time` in s, if an FMU cannot be used any more.
+    /// FMUs reset them when they enter this mode. Sets inputs always, because some FMUs cannot read them, other
+    /// variables if they have another value. Returns an error, with `time` in s, if an FMU cannot be used any more.
     pub(crate) fn repeat_settings(&mut self, time: f64) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             let variable = self.variable(setting.port);

@@ -23,10 +23,10 @@ impl System {
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
 
-    /// Returns factor and offset of the conversion between the units of two variables; `None` if the units have the same
-    /// name (their definitions are not compared), if values are equal in both, or if a variable has no unit that its
-    /// description defines. The conversion of differences (`relativeQuantity`) has no offset. An error if the units
-    /// cannot be converted, or if they differ by an offset and only one of the variables is a difference.
+    /// Returns factor and offset of the conversion between the units of two variables. `None` if the units have the
+    /// same name (their definitions are not compared), if values are equal in both units, or if a variable has no unit
+    /// that its description defines. The conversion of differences (`relativeQuantity`) has no offset. An error if the
+    /// units cannot be converted, or if they differ by an offset and only one of the variables is a difference.
     pub(super) fn conversion(
         &self,
         from: Port,
