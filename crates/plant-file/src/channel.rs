@@ -13,10 +13,10 @@ pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
 /// The weights of an H-infinity norm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Channel {
-    /// Weight of each output of the norm. The outputs are, for the observer, the errors of the estimated faults; for
-    /// the feedback, the measurements, then the commands. Empty if all weights are 1.
+    /// Weights of the outputs of the norm: for the observer the errors of the fault estimates, for the feedback the
+    /// measurements, then the commands. Empty if all are 1.
     pub weights: Vec<ChannelWeight>,
-    /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
+    /// Weight of the noise of each measurement, in the unit of the measurement; empty if noise is no input of the norm.
     pub noise: Vec<ChannelWeight>,
 }
 
@@ -27,15 +27,15 @@ pub struct ChannelWeight {
     pub signal: String,
     /// The weight over frequency.
     pub weight: Weight,
-    /// The largest factor between the weight and the table that states it; none without a table.
+    /// The largest ratio of the weight to the table that it approximates; `None` without a table.
     pub deviation: Option<f64>,
 }
 
 /// The signals of the norm of a gain.
 pub(crate) struct ChannelSignals<'a> {
-    /// Names of its outputs.
+    /// Names of the outputs.
     pub(crate) outputs: Vec<&'a str>,
-    /// Names of the measurements whose noise the norm can have; none for a state feedback.
+    /// Names of the measurements whose noise can be an input; `None` for a state feedback.
     pub(crate) noises: Option<Vec<&'a str>>,
 }
 
@@ -59,8 +59,8 @@ impl Channel {
         self.weights.iter().chain(&self.noise)
     }
 
-    /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement. Signals
-    /// without an entry in `weights` have the weight 1.
+    /// Reads `weights`, a table from names of outputs to weights (1 if missing), and `noise`, one weight for all
+    /// measurements or one for each.
     pub(crate) fn read(
         table: &Table<'_>,
         signals: &ChannelSignals<'_>,
@@ -96,7 +96,6 @@ impl Channel {
     }
 }
 
-/// Reads one weight for all measurements, or one for each.
 fn noises(entry: &Entry<'_>, names: &[&str], domain: Domain) -> Result<Vec<ChannelWeight>> {
     let one = |entry: &Entry<'_>| weight(entry, String::new(), domain);
     let all = each(entry, names.len(), "numbers, one per measurement", one)?;
@@ -104,7 +103,8 @@ fn noises(entry: &Entry<'_>, names: &[&str], domain: Domain) -> Result<Vec<Chann
     Ok(names.iter().zip(all).map(named).collect())
 }
 
-/// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`; both tables may state `order`, 1 or 2.
+/// Reads a weight: a number above 0, `{ low, frequency, high }` or `{ table }`, the last two with an optional `order`
+/// of 1 or 2.
 fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight> {
     if !entry.is_table() {
         let weight = Weight::constant(entry.positive()?);
@@ -154,7 +154,8 @@ fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>> {
     Ok(points)
 }
 
-/// Reads a frequency in rad/s, in a sampled design below pi / T, and returns the frequency of the continuous weight.
+/// Reads a frequency in rad/s, below pi / T in a design with sample time T; returns the one that the bilinear map
+/// needs.
 fn continuous_frequency(entry: &Entry<'_>, domain: Domain) -> Result<f64> {
     let stated = entry.positive()?;
     let frequency = bilinear_frequency(stated, domain);

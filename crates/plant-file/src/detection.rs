@@ -22,13 +22,13 @@ pub struct DetectionRequest {
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
     pub noise: Vec<f64>,
-    /// Process noise of the states, in the same sense; `None` if the file states none.
+    /// Process noise of the states, stated as `noise` is; `None` if the file states none.
     pub process_noise: Option<ProcessNoise>,
     /// The size of each fault that should be detected.
     pub sizes: Vec<f64>,
     /// Time between two tests of a continuous controller, s; `None` if it is not stated, and in a sampled design.
     pub sample_time: Option<f64>,
-    /// The errors of the model that the tests allow for, if the file asks for it.
+    /// The model errors that must give no alarm, if the file states `model_error`.
     pub model_error: Option<ModelError>,
     /// Time in s within which the least detectable fault is detected, if stated.
     pub delay: Option<f64>,
@@ -48,10 +48,10 @@ pub enum Method {
     },
 }
 
-/// The errors of the model that give no alarm: the tolerances of `[robustness]`.
+/// The model errors that must give no alarm: deviations within the tolerances of `[robustness]`.
 #[derive(Clone, Debug)]
 pub struct ModelError {
-    /// Factor of the largest residual, at least 1.
+    /// Safety factor on the largest residual that these errors cause, at least 1.
     pub margin: f64,
     /// For each command the largest deviation from its operating point, if stated.
     pub commands: Vec<Option<f64>>,
@@ -88,11 +88,11 @@ pub struct Disturbance {
 pub enum DisturbanceEntry {
     /// The column E of x' = A x + E d.
     Column(DVector<f64>),
-    /// It adds to the command at this position, from 0.
+    /// The command, by its position from 0, to which the disturbance is added.
     Actuator(usize),
-    /// It adds to the measurement at this position, from 0.
+    /// The measurement, by its position from 0, to which the disturbance is added.
     Sensor(usize),
-    /// It is this input of the plant's FMU.
+    /// An input of the plant's FMU.
     Input(String),
 }
 
@@ -114,7 +114,7 @@ const KEYS: [&str; 13] = [
 const DISTURBANCE: [&str; 6] = ["name", "E", "actuator", "sensor", "input", "bound"];
 
 impl DetectionRequest {
-    /// Reads the table, if the file has one.
+    /// Reads `[detection]`; `None` without it.
     pub(crate) fn read(
         file: &Table<'_>,
         actuators: &[Signal],
@@ -169,7 +169,8 @@ fn false_alarms(table: &Table<'_>) -> Result<f64> {
     }
 }
 
-/// Reads `noise` of this table, otherwise of `[robustness]`: one number above 0 for all measurements, or one for each.
+/// Reads `noise` of `[detection]`, otherwise of `[robustness]`: one number above 0 for all measurements, or one for
+/// each.
 fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec<f64>> {
     let robustness = optional(file, "robustness", Entry::table)?;
     let inherited = robustness.and_then(|table| table.get("noise"));
@@ -222,8 +223,8 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
     Ok(Some(ModelError { margin, commands, place: entry.place }))
 }
 
-/// Reads the list `[[disturbances]]`; empty if the file has none. Columns E of sampled matrices become those of the
-/// plant.
+/// Reads the list `[[disturbances]]`; empty if the file has none. Columns E of sampled matrices are converted to the
+/// time domain of the plant.
 pub(crate) fn disturbances(
     file: &Table<'_>,
     signals: [&[Signal]; 2],

@@ -3,11 +3,10 @@
 use crate::read::{Result, each, not_negative, optional, positive, positive_within};
 use files::{Entry, Place, Table};
 
-/// A law that estimates the faults, with the parameters that the file states; the others follow from plant and
-/// observer.
+/// A law that estimates the faults; parameters that the file does not state are `None`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
-    /// The augmented state observer of the paper.
+    /// The augmented state observer (Patton and Klinkhieo 2009).
     Augmented,
     /// A proportional and an integral part.
     ProportionalIntegral {
@@ -16,9 +15,9 @@ pub enum Law {
     },
     /// Fast adaptive estimation.
     FastAdaptive {
-        /// The weight of the rate of the error, s.
+        /// The decay rate of the directly measured error, 1/s.
         sigma: Option<f64>,
-        /// The learning rates, one for each fault.
+        /// The rates at which the estimates follow, 1/s, one for each fault.
         gamma: Option<Vec<f64>>,
     },
     /// A bounded injection.

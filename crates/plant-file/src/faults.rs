@@ -43,9 +43,9 @@ pub enum EntryPoint {
 pub struct Fault {
     /// Its name.
     pub name: String,
-    /// Its unit, as FMI writes it: the stated one, otherwise that of its actuator or sensor.
+    /// Its unit in the notation of FMI: the stated one, otherwise that of its actuator or sensor.
     pub unit: Option<String>,
-    /// What it is, for a reader.
+    /// A description for readers.
     pub description: String,
     /// Its assumed dynamics.
     pub dynamics: FaultDynamics,
@@ -63,7 +63,7 @@ pub struct Fault {
     pub place: Place,
 }
 
-/// The entries of a plant file at which errors about faults point.
+/// The entries that state faults; an error about all faults is at the first one in the file.
 pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 /// Largest number of faults with `up_to`.
@@ -84,8 +84,8 @@ const FAULT: [&str; 13] = [
     "step",
 ];
 
-/// Reads all faults: those of `actuator_faults`, "all" or names, then those of `[[faults]]`; without `[[faults]]` one
-/// fault for each column of `F_a`, named f1, f2 and so on. An error if there is no fault.
+/// Reads all faults: those of `actuator_faults` ("all" or names), then those of `[[faults]]` or, without that list, one
+/// fault for each column of `F_a`, named f1, f2 and so on. No fault at all is an error.
 ///
 /// `signals`: actuators and measurements.
 pub(crate) fn all_faults(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<Vec<Fault>> {

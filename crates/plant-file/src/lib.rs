@@ -52,7 +52,7 @@ pub use model::{Model, PlantFmu};
 #[derive(Clone)]
 pub struct PlantFile<'a> {
     source: &'a Source,
-    /// The places of entries, for errors of later steps.
+    /// The places of the entries, for errors that are found later.
     places: BTreeMap<&'static str, Place>,
     /// The description of the controller by the user; `None` if it is missing or empty.
     pub description: Option<String>,
@@ -60,7 +60,7 @@ pub struct PlantFile<'a> {
     pub t_on: f64,
     /// Whether the faults are also estimated while they are not compensated.
     pub monitor: bool,
-    /// The time constant, s, with which commands approach a new law; without it they jump.
+    /// The time constant, s, with which the commands change over to other gains; `None` if they jump.
     pub transfer_time: Option<f64>,
     /// The plant.
     pub model: Model,
@@ -72,9 +72,9 @@ pub struct PlantFile<'a> {
     pub faults: Vec<Fault>,
     /// Set points of measurements, if there are any.
     pub references: Option<References>,
-    /// The sampling of the controller; none in continuous time.
+    /// The sampling of the controller; `None` in continuous time.
     pub sampling: Option<Sampling>,
-    /// Rates of the measurement filter, 1/s, one per measurement; none without a filter.
+    /// Rates of the measurement filter, 1/s, one per measurement; `None` without a filter.
     pub filter: Option<Vec<f64>>,
     /// Number of states with which the observer approximates each delay.
     pub delay_order: usize,
@@ -82,7 +82,7 @@ pub struct PlantFile<'a> {
     pub feedback: Request,
     /// The requirement on the observer.
     pub observer: Request,
-    /// The shape of the loop, from which feedback and observer follow.
+    /// The shape of the loop, if the file states it in place of `feedback` and `observer`.
     pub loop_shape: Option<LoopShape>,
     /// The law that estimates the faults.
     pub estimation: EstimationRequest,
@@ -102,9 +102,9 @@ pub struct PlantFile<'a> {
     pub disturbances: Vec<Disturbance>,
     /// The requirements on the detection of faults, if there are any.
     pub detection: Option<DetectionRequest>,
-    /// The requirements on the controller without actuators, if there are any.
+    /// The requirements on the controllers for actuators that are gone, if there are any.
     pub reconfiguration: Option<ReconfigurationRequest>,
-    /// The requirements on one feedback that does not know which actuator has failed, if there are any.
+    /// The requirements on the fall-back, one feedback whichever actuator has failed, if there are any.
     pub fallback: Option<FallbackRequest>,
 }
 
@@ -274,7 +274,7 @@ impl<'a> PlantFile<'a> {
         self.loop_shape.as_ref()?.pid.as_ref()
     }
 
-    /// The estimator of the observer: `Prediction` in continuous time and beside controllers of low order.
+    /// The estimator of the observer: `Prediction` in continuous time and with controllers of low order.
     #[must_use]
     pub fn estimator(&self) -> Estimator {
         match self.sampling {
@@ -300,7 +300,7 @@ impl<'a> PlantFile<'a> {
         self.source.error(place, message)
     }
 
-    /// Whether a measurement has a range or a longest time of a hold.
+    /// Whether a measurement has a `range` or a `longest_hold`.
     #[must_use]
     pub fn checks_measurements(&self) -> bool {
         let mut all = self.measurements.iter();
@@ -318,8 +318,8 @@ impl<'a> PlantFile<'a> {
         Err(self.error(&["actuators", "B"], message))
     }
 
-    /// Refuses ranges and longest holds of measurements in a continuous design with a schedule, and a longest hold of
-    /// too many samples.
+    /// Refuses `range` and `longest_hold` in a continuous design with a schedule, and a `longest_hold` of too many
+    /// samples.
     fn check_holds(&self) -> Result<()> {
         for signal in &self.measurements {
             let [_, range, hold] = &signal.places;
@@ -348,8 +348,8 @@ impl<'a> PlantFile<'a> {
         Ok(())
     }
 
-    /// Checks that F_a has one column per fault that enters through F_a, and that there is no F_a without such faults;
-    /// and that no fault is an input of an FMU if there is no FMU.
+    /// Checks that F_a has one column for each fault that enters through it, is missing without such faults, and that a
+    /// fault is an input of an FMU only if the plant is one.
     fn check_columns(&self, file: &Table<'_>) -> Result<()> {
         let is_input = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Input(_));
         if let (None, Some(fault)) = (self.fmu(), self.faults.iter().find(is_input)) {
@@ -402,8 +402,8 @@ pub fn estimator(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Reads the rates of the measurement filter; `None` without one. Sensor faults require it; the design checks whether
-/// it is required otherwise.
+/// Reads the rates of the measurement filter; `None` without one. Sensor faults require a filter; the design checks
+/// whether anything else does.
 fn filter(file: &Table<'_>, measurements: &[Signal], faults: &[Fault]) -> Result<Option<Vec<f64>>> {
     let sensor = faults.iter().find(|fault| matches!(fault.entry_point, EntryPoint::Sensor(_)));
     match (file.get("filter"), sensor) {

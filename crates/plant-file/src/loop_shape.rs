@@ -1,4 +1,4 @@
-//! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
+//! The table `[loop]` of a plant file: the shape of the sensitivities S and T.
 
 use crate::pid::Pid;
 use crate::read::{Result, alone, optional, positive, positive_within};
@@ -11,11 +11,11 @@ const KEYS: [&str; 7] =
     ["bandwidth", "set_point", "peak", "roll_off", "effort", "structure", "pairs"];
 /// Entries of the file that are not possible together with `[loop]`.
 const OTHERS: [&str; 6] = ["feedback", "observer", "schedule", "family", "estimation", "D"];
-/// The peak of S and of T, if none is stated.
+/// Default of `peak`.
 const PEAK: f64 = 1.5;
-/// The frequency from which T falls, relative to the bandwidth, if none is stated.
+/// Default of `roll_off`, relative to the bandwidth.
 const ROLL_OFF: f64 = 10.0;
-/// The bandwidth of references, relative to that of the loop, if none is stated.
+/// Default of `set_point`, relative to the bandwidth.
 const SET_POINT: f64 = 0.3;
 /// Bandwidths of feedback and observer from which the search starts, relative to that of the loop.
 const STARTS: [(f64, f64); 6] =

@@ -24,12 +24,12 @@ pub enum Model {
         c: DMatrix<f64>,
         /// D, p x m; zero if it is not stated.
         d: DMatrix<f64>,
-        /// F_a, n x q, with a column for each fault that enters by one; none if it is not stated.
+        /// F_a, n x q, with a column for each fault that enters through F_a; `None` if it is not stated.
         f_a: Option<DMatrix<f64>>,
         /// The states.
         states: Vec<Signal>,
-        /// The sampled matrices, if the file states such; `a`, `b` and `f_a` are then those of the continuous plant
-        /// with these samples, if there is one, otherwise those of the file.
+        /// The sampled matrices, if the file states `matrices = "sampled"`: then `a`, `b` and `f_a` are those of the
+        /// continuous plant with these samples or, if there is none, those of the file.
         sampled: Option<Box<SampledMatrices>>,
     },
     /// The matrices are linearised from an FMU.
@@ -91,7 +91,6 @@ pub(crate) fn read_fmu_plant(
     Ok((model, [signals(&actuators, ACTUATOR)?, signals(&measurements, MEASUREMENT)?]))
 }
 
-/// Reads a text, or a list of texts.
 fn texts(entry: &Entry<'_>) -> Result<Vec<String>> {
     if entry.is_text() {
         return Ok(vec![entry.text()?.to_owned()]);

@@ -1,4 +1,4 @@
-//! Names that the controller FMU cannot have.
+//! Checks the names in a plant file against those of the controller FMU.
 
 use crate::read::Result;
 use files::PlaceError;
@@ -106,7 +106,6 @@ fn check_arrays<'a>(file: &'a PlantFile<'_>, references: &'a [Signal]) -> Result
     Err(at_name(file, signal, message))
 }
 
-/// Checks that faults and rates of ramps have different names.
 fn check_fault_names(file: &PlantFile<'_>) -> Result<()> {
     for (at, fault) in file.faults.iter().enumerate() {
         let is_rate_of = |other: &Fault| {
@@ -135,7 +134,6 @@ fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError
     }
 }
 
-/// The number of elements of a scalar.
 const SCALAR: Option<usize> = Some(1);
 /// The number of elements of a matrix, represented by 2: any number above 1 makes it an array.
 const MATRIX: Option<usize> = Some(2);
@@ -211,7 +209,7 @@ impl ControllerVariables {
         self.has(name, |_| true)
     }
 
-    /// Whether `name` is one of the variables that are `examined`, or an element of one.
+    /// Whether `name` is one of the variables for which `examined` is true, or an element of one.
     fn has(&self, name: &str, examined: impl Fn(&str) -> bool) -> bool {
         let array = array_element(name).map(|(array, _)| array);
         self.0.iter().filter(|(variable, _)| examined(variable)).any(

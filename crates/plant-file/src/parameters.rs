@@ -21,7 +21,7 @@ pub struct ParameterTolerance {
 pub enum Tolerance {
     /// Fraction of the value.
     Relative(f64),
-    /// Lowest and highest value; that they are around the value is checked when the FMU is linearised.
+    /// Lowest and highest value; the linearisation of the FMU checks that the value is between them.
     Limits([f64; 2]),
 }
 

@@ -20,9 +20,10 @@ pub const MOST_ORDER: u32 = 6;
 /// u = K (b r - y_f + 1 / T_i integral of (r - y) dt - T_d y_f') - K_2 y_f'' - ... - K_(n-1) y_f^(n-1)
 /// ```
 ///
-/// for each command, with the measurement y, its reference r, and the measurement `y_f` behind a Butterworth filter of
-/// order n. The filter is 1 / (1 + s / w) in a PI controller, n = 1, and 1 / (1 + sqrt(2) s / w + s^2 / w^2) in a PID
-/// controller, n = 2. A PI controller has no derivative.
+/// for each command, with the measurement y, its reference r, the gain K, the weight b of the reference, the times
+/// `T_i` and `T_d`, and `y_f`, which is y after a Butterworth filter of order n. The filter is 1 / (1 + s / w) in a PI
+/// controller, n = 1, and 1 / (1 + sqrt(2) s / w + s^2 / w^2) in a PID controller, n = 2. A PI controller has no
+/// derivative.
 ///
 /// Source: K. J. Astrom and T. Hagglund, Advanced PID control (2006), sections 3.3 and 3.4.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +32,7 @@ pub struct Pid {
     pub order: usize,
     /// The controllers, in the order of their commands; a command has at most one.
     pub pairs: Vec<Pair>,
-    /// w, in rad/s.
+    /// The corner frequency w of the filters, in rad/s.
     pub corner: f64,
     /// Where the file states them.
     pub place: Place,
@@ -108,8 +109,8 @@ impl Pid {
         Ok(Some(Self { order, pairs, corner, place: entry.place }))
     }
 
-    /// Checks that the references are integrated, and that each is that of one measurement with a controller, and each
-    /// such measurement has one.
+    /// Checks that the references are integrated, that each belongs to one measurement with a controller, and that each
+    /// of these measurements has a reference.
     pub(crate) fn check_references(
         &self,
         file: &Table<'_>,

@@ -4,7 +4,6 @@ use std::ops::{RangeBounds, RangeInclusive};
 
 use files::{Entry, PlaceError, Table};
 
-/// The result of reading an entry.
 pub(crate) type Result<T, E = PlaceError> = std::result::Result<T, E>;
 
 /// Reads a number above 0; `None` if the table does not have the entry.
@@ -52,12 +51,10 @@ pub(crate) fn positive_within(
     within(entry, range, rule)
 }
 
-/// Reads a number of at least 0.
 pub(crate) fn not_negative(entry: &Entry<'_>) -> Result<f64> {
     within(entry, 0.0.., "expected no less than 0")
 }
 
-/// Reads a whole number in `range`.
 pub(crate) fn whole(entry: &Entry<'_>, range: RangeInclusive<u32>) -> Result<u32> {
     let (least, most) = range.into_inner();
     let number = entry.number()?;

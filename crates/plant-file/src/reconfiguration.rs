@@ -1,22 +1,22 @@
-//! The table `[reconfiguration]` of a plant file: the requirements on the controller without actuators.
+//! The table `[reconfiguration]` of a plant file: the requirements on the controllers for actuators that are gone.
 
 use crate::faults::{EntryPoint, Fault};
 use crate::read::{Result, alone, positive_within};
 use crate::signals::{Signal, positions};
 use files::{Place, Table};
 
-/// The requirements on the controller without actuators.
+/// The requirements on the controllers for actuators that are gone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReconfigurationRequest {
     /// The actuators that may be gone, from 0.
     pub actuators: Vec<usize>,
-    /// How many of them may be gone together.
+    /// The largest number of actuators that are gone together.
     pub together: usize,
     /// For each of these actuators the command at which it is stuck, in its unit.
     stuck_at: Vec<f64>,
     /// The measurements to keep at the operating point, from 0; all of them if the file states none.
     pub keep: Vec<usize>,
-    /// An actuator counts as gone after its estimated loss has been above the first number for the second, in s;
+    /// Loss and time in s: an actuator counts as gone after its estimated loss has been above this loss for this time;
     /// `None` if only an input of the FMU reports it.
     pub decision: Option<(f64, f64)>,
     /// Where the file states it.
@@ -72,7 +72,7 @@ impl ReconfigurationRequest {
         alone.chain((2..=self.together).flat_map(|size| self.sets(size))).collect()
     }
 
-    /// The sets of `size` of the actuators that may be gone, each in ascending order.
+    /// The sets of `size` actuators that may be gone together, each in ascending order.
     #[must_use]
     pub fn sets(&self, size: usize) -> Vec<Vec<usize>> {
         let mut ordered = self.actuators.clone();
@@ -89,8 +89,8 @@ impl ReconfigurationRequest {
     }
 }
 
-/// Reads `together`, how many actuators may be gone together; 1 if it is missing. `used`: the number of actuators that
-/// may be gone, of `all`. An error if these are more than [`MOST_SETS`] sets.
+/// Reads `together`, how many actuators may be gone together; 1 if it is missing. `used` of `all` actuators may be
+/// gone. An error if that makes more than [`MOST_SETS`] sets.
 fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize> {
     let Some(entry) = table.get("together") else { return Ok(1) };
     let most = used.min(all - 1);

@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-3;
 pub struct References {
     /// The references as inputs of the controller FMU, without operating points; see [`References::completed`].
     pub signals: Vec<Signal>,
-    /// H, t x p: each reference is the set point of its row times the measurements.
+    /// H, t x p: each reference is the set point of an entry of H y, with the measurements y.
     pub h: DMatrix<f64>,
     /// For each reference the size of the step that the report shows, in its unit, if stated.
     pub steps: Vec<Option<f64>>,
@@ -27,7 +27,7 @@ pub struct References {
     pub feedforward: bool,
     /// Where `integral` and `feedforward` are stated; the place of the table if they are not.
     pub action_places: [Place; 2],
-    /// Time constant, in s, with which the integrals follow a command at its limit, if stated.
+    /// Time constant, in s, of the back-calculation of the integrals while a command is at its limit, if stated.
     pub windup_time: Option<f64>,
 }
 

@@ -33,7 +33,7 @@ pub enum Requirement {
     HInfinity {
         /// The largest norm; `None` for the least one.
         bound: Option<f64>,
-        /// The region of the eigenvalues; that of all stable ones if none is stated.
+        /// The region of the eigenvalues; without parts if none is stated.
         region: Region,
         /// The weights of the outputs of the norm and of the measurement noise.
         channel: Channel,
@@ -105,8 +105,8 @@ impl Requirement {
         }
     }
 
-    /// The index of the first state with a zero row in the first weight: for a Kalman filter, without noise. `None` if
-    /// there is no such state, and for requirements without weights.
+    /// The index of the first state whose row of the first weight is zero, which has no noise in a Kalman filter.
+    /// `None` if there is no such state, and for requirements without weights.
     #[must_use]
     pub fn without_noise(&self) -> Option<usize> {
         match self {
@@ -298,8 +298,7 @@ fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>> {
     }
 }
 
-/// The relative difference, to the largest entry, by which rounding may make a weight unsymmetric, in a product of
-/// three matrices.
+/// Asymmetry of a weight, relative to its largest entry, that counts as rounding, as in a product of three matrices.
 const UNSYMMETRIC: f64 = 1e-12;
 
 /// Reads a symmetric matrix, or a list of numbers of at least 0 as a diagonal matrix. A matrix that rounding made
@@ -335,7 +334,7 @@ fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>> {
 }
 
 impl Region {
-    /// Whether an eigenvalue of the loop is in the region. For a sampled loop it is one in the z-plane, and only the
+    /// Whether an eigenvalue of the loop is in the region. For a sampled loop `value` is in the z-plane, and only the
     /// decay counts.
     #[must_use]
     pub fn contains(self, value: Complex<f64>, domain: Domain) -> bool {

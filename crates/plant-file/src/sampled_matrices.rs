@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use crate::Sampling;
 use crate::read::{Result, is_first, refuse};
 
-/// An entry of the logarithm is rounding below this fraction of the geometric mean of the largest entries in its row
-/// and column.
+/// Below this fraction of the geometric mean of the largest entries in its row and column, an entry of the matrix
+/// logarithm counts as rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// Modulus below which an eigenvalue of a sampled A counts as zero: rounding makes those of a chain of three registers
@@ -86,7 +86,7 @@ impl SampledMatrices {
     }
 }
 
-/// Says why no continuous plant has the samples, and how to state a delay, from which zero eigenvalues mostly come.
+/// Says why no continuous plant has the samples. Zero eigenvalues mostly come from a delay: says how to state it, too.
 fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
     let eigenvalues = eigenvalues(a).unwrap_or_default();
     let zeros = eigenvalues.iter().filter(|value| value.norm() < ZERO).count();

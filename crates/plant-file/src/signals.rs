@@ -11,7 +11,7 @@ use files::{Entry, Place, Table};
 pub struct Signal {
     /// Its name.
     pub name: String,
-    /// Its unit, as FMI writes it.
+    /// Its unit in the notation of FMI.
     pub unit: Option<String>,
     /// The meaning of the signal, for a reader.
     pub description: String,
@@ -19,7 +19,7 @@ pub struct Signal {
     pub operating: Option<f64>,
     /// The smallest and the largest value: the limits of an actuator or the range of a measurement, if stated.
     pub limits: Option<[f64; 2]>,
-    /// The longest time in s for which the last value of a measurement may replace it, if stated.
+    /// The longest time in s for which its last valid value may replace a measurement, if stated.
     pub longest_hold: Option<f64>,
     /// The time in s after which a command acts or a measurement arrives; 0 if not stated.
     pub delay: f64,
@@ -58,7 +58,7 @@ pub(crate) const ACTUATOR: &[&str] =
 pub(crate) const MEASUREMENT: &[&str] =
     &["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
 
-/// Reads a list of at least one signal, each a text (its name) or a table with some of `keys`. Their names differ.
+/// Reads a list of at least one signal, each a text (its name) or a table with some of `keys`. Refuses equal names.
 pub(crate) fn signals(entry: &Entry<'_>, keys: &[&str]) -> Result<Vec<Signal>> {
     let members = entry.list()?;
     if members.is_empty() {

@@ -194,8 +194,8 @@ fn points(list: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize)
     Ok((all, nominal))
 }
 
-/// `first`, then the entries that a variant of `model` may have. Those of the operating point of matrices only with
-/// `operating`; an FMU always has one.
+/// `first`, then the entries that a variant of `model` may have. Variants of matrices have an operating point only with
+/// `operating`, variants of an FMU always.
 fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'static str> {
     let mut keys = first.to_vec();
     match model {
