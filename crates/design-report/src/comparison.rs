@@ -29,13 +29,13 @@ pub struct LawResult {
     pub law: String,
     /// Its authors.
     pub sources: String,
-    /// Why it does not exist, in a sentence.
+    /// Why the law does not exist, in a sentence; none if it exists.
     pub reason: Option<String>,
-    /// What it does on this plant; none if it does not exist.
+    /// Its results on this plant; none if the law does not exist.
     pub result: Option<LawFigures>,
 }
 
-/// What a law does on the plant.
+/// The results of a law on the plant.
 #[derive(Serialize)]
 pub struct LawFigures {
     /// Equations, parameters, conditions, errors of the estimates.

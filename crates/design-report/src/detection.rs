@@ -44,8 +44,8 @@ pub struct ParameterCases {
     pub cases: usize,
     /// The seed of the random numbers.
     pub seed: u32,
-    /// With a confidence of 99 % no larger part of the box of the parameters gives a test a larger mean than
-    /// `model_error` without its factor: 1 - 0.01^(1 / cases).
+    /// With a confidence of 99 %, at most this part of the box of the parameters gives a test a larger mean than
+    /// `model_error` before the factor of the plant file: 1 - 0.01^(1 / cases).
     pub uncovered: f64,
 }
 
@@ -63,7 +63,7 @@ impl ParameterCases {
 /// A test of the residuals.
 #[derive(Default, Serialize, JsonSchema)]
 pub struct Test {
-    /// The fault that it is for, or `all`.
+    /// The fault that the test is for, or `all`.
     pub name: String,
     /// Number of residuals.
     pub residuals: usize,
@@ -74,14 +74,14 @@ pub struct Test {
     /// The largest mean of the residuals, in standard deviations, that errors of the model give them without a
     /// fault; 0 if they are not considered. Drift or threshold allow for it.
     pub model_error: f64,
-    /// For parameters of an FMU: by which part the largest mean that was found within their limits exceeds the
-    /// largest at the corners, the centre and the centres of the faces. `model_error` allows for it.
+    /// For parameters of an FMU: the relative excess of the largest mean found within their limits over the largest at
+    /// the corners, the centre and the centres of the faces. `model_error` includes it.
     pub interior_excess: Option<f64>,
     /// Threshold of the statistic.
     pub threshold: f64,
-    /// Predicted mean time between its false alarms, in s.
+    /// Predicted mean time between false alarms of this test, in s.
     pub false_alarm_interval: f64,
-    /// The disturbances and the other faults from which it is decoupled.
+    /// The disturbances and the other faults from which the test is decoupled.
     pub decoupled: Vec<DecoupledInput>,
 }
 
@@ -108,7 +108,7 @@ pub struct DetectedFault {
     pub unit: Option<String>,
     /// The size of its step.
     pub size: f64,
-    /// The test that is for it.
+    /// The test for this fault.
     pub test: String,
     /// The mean of the residuals long after the step, in standard deviations.
     pub mean: f64,

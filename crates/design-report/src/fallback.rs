@@ -22,20 +22,19 @@ pub struct FallbackReport {
     pub k_x: Vec<Vec<f64>>,
     /// Frobenius norm of K_x.
     pub gain_norm: f64,
-    /// The same of the intact controller.
+    /// Frobenius norm of K_x of the intact controller.
     pub intact_gain_norm: f64,
     /// Decay rate, 1/s, of the loop of the intact plant and the intact controller.
     pub intact_decay: f64,
     /// One P for the state feedback loops of all cases, in the required region.
     pub feedback: CommonCertificate,
-    /// One P for the loops of all cases with the observer: the loop is stable while the losses change in
-    /// any way and arbitrarily fast, if their fractions of the largest loss are at most 1 in sum; in a
-    /// sampled design from one sample to the next. Or the reason why there is none; constant losses are
-    /// judged by eigenvalues.
+    /// One P for the loops of all cases with the observer, or the reason why there is none. P proves stability while
+    /// the losses change arbitrarily fast (in a sampled design from one sample to the next), if the losses, as
+    /// fractions of `loss`, add up to at most 1. Constant losses are judged by eigenvalues.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<CommonCertificate>")]
     pub whole: Result<CommonCertificate, String>,
-    /// Whether the search for that P was left out, or ended, for lack of time.
+    /// Whether the search for the P of `whole` was left out, or ended, for lack of time.
     pub whole_left_out: bool,
     /// The intact plant, then each actuator that has failed.
     pub cases: Vec<FallbackCase>,
@@ -48,7 +47,7 @@ pub struct FallbackCase {
     pub name: String,
     /// Decay rate of the slowest eigenvalue of plant and controller together, 1/s.
     pub decay: f64,
-    /// The same of A + B K_x with the actuators of this case.
+    /// Decay rate of the slowest eigenvalue of A + B K_x with the actuators of this case, 1/s.
     pub feedback_decay: f64,
     /// The loop opened at the commands and at the measurements.
     pub points: Vec<LoopPoint>,

@@ -14,11 +14,10 @@ pub struct FamilyReport {
     /// One P for the state feedback loops `A_i + B_i K_x` of all members, with integral action `A_e,i + B_e,i
     /// [K_x, K_i]` with the integrals; none if the feedback was designed for the nominal plant.
     pub feedback: Option<CommonCertificate>,
-    /// One P for the loops of all members with the whole controller: the loop is stable while the
-    /// plant moves between the members, in any way and arbitrarily fast; in a sampled design from one
-    /// sample to the next. Or the reason why there is none: then plants between the members, and plants that
-    /// move, are not proven to be stable, and the verdict is not green; each constant member is judged by
-    /// its eigenvalues.
+    /// One P for the loops of all members with the whole controller, or the reason why there is none. P proves
+    /// stability while the plant moves between the members arbitrarily fast, in a sampled design from one sample to the
+    /// next. Without P, nothing is proven for such plants, and the verdict is not green; each constant member is judged
+    /// by its eigenvalues.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<CommonCertificate>")]
     pub whole: Result<CommonCertificate, String>,

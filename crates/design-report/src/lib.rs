@@ -208,15 +208,15 @@ pub struct Loop {
 /// The H-infinity norm of a gain that was designed by it.
 #[derive(Clone, Serialize, JsonSchema)]
 pub struct NormReport {
-    /// From where to where, in words.
+    /// Input and output of the norm, in words.
     pub channel: String,
     /// The norm, with weights and noise; at most 1e-4 of it above the true value.
     pub norm: f64,
     /// A bound of the norm that the bounded real lemma proves, verified by eigenvalues; none if that
     /// fails in double precision, or for more than 30 states.
     pub certified: Option<f64>,
-    /// A proven lower bound of the norm, for the gains and filters of `lower_bound_for`. 0 if larger and larger
-    /// gains make the norm as small as one likes; none if none is known.
+    /// A proven lower bound of the norm, for the gains and filters of `lower_bound_for`. 0 if growing gains make the
+    /// norm arbitrarily small; none if no bound is known.
     pub lower_bound: Option<f64>,
     /// For what the lower bound holds: for all gains, within a region or not, and filters of any order, or for the
     /// gains that place all eigenvalues in the disc of the region.
@@ -250,7 +250,7 @@ pub struct NormWeight {
     pub numerator: Vec<f64>,
     /// Denominator, likewise.
     pub denominator: Vec<f64>,
-    /// The largest factor between the weight and the table that states it; none without a table.
+    /// The largest factor by which the weight deviates from its table; none without a table.
     pub table_deviation: Option<f64>,
 }
 
@@ -379,7 +379,7 @@ pub struct FreeP {
     pub margin: f64,
 }
 
-/// The ball that [e; eps] converges to, eps = f_hat - f.
+/// The ball to which the errors [e; eps] converge, e = x - x_hat, eps = f_hat - f.
 #[derive(Serialize, JsonSchema)]
 pub struct Ultimate {
     /// Bound of the norm of the faults' rates, per s.
@@ -422,7 +422,8 @@ pub struct Bound {
     /// lasting error.
     #[schemars(with = "Option<f64>")]
     pub gain_of_rate: f64,
-    /// The smallest product of a gain and its bound, if the file states bounds.
+    /// The bound of the error by the bound of the fault or, if it is smaller, by that of its rate; none if the file
+    /// does not state `bound`.
     pub largest: Option<f64>,
 }
 

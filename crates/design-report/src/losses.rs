@@ -30,7 +30,7 @@ pub struct LossLoop {
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<LossProof>")]
     pub proof: Result<LossProof, String>,
-    /// The largest losses that are proven: as in `constant`. Empty if the search was left out.
+    /// The largest proven losses, for the same sets of actuators as in `constant`; empty if the search was left out.
     pub certified: Vec<CertifiedLoss>,
 }
 
@@ -41,7 +41,7 @@ pub struct ConstantLoss {
     pub losses: Vec<Number>,
     /// Whether the loop is stable for all losses that were tested.
     pub stable: bool,
-    /// The factor of the stated losses; for one actuator alone that of its own.
+    /// The ratio of `losses` to the stated losses.
     pub factor: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct ConstantLoss {
 pub struct CertifiedLoss {
     /// The losses, which may vary with time between 0 and these values.
     pub losses: Vec<Number>,
-    /// The factor of the stated losses; for one actuator alone that of its own.
+    /// The ratio of `losses` to the stated losses.
     pub factor: f64,
 }
 
@@ -61,8 +61,8 @@ pub struct LossProof {
     pub margin: f64,
     /// The common Lyapunov matrix P of [x; z], row by row; z are the states of the controller.
     pub p: Vec<Vec<f64>>,
-    /// The decay rate that is proven for all these losses, 1/s; none if it was left out or not found.
-    /// With the compensation on only, as are the peaks.
+    /// The decay rate that is proven for all these losses, 1/s; none if it was left out or not found. Like `peaks`, it
+    /// is computed only with the compensation on.
     pub decay: Option<f64>,
     /// Bounds of the states for all these losses.
     pub peaks: Vec<LossPeak>,

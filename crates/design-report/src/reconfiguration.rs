@@ -9,16 +9,16 @@ use crate::{OrReason, or_reason};
 /// The controllers for actuators that are gone.
 #[derive(Serialize, JsonSchema)]
 pub struct ReconfigurationReport {
-    /// An actuator counts as gone after its estimated loss of effectiveness has been above the first number for the
-    /// second, in s; none if only inputs of the FMU report it.
+    /// Loss, and time in s: an actuator counts as gone after its estimated loss of effectiveness has been above this
+    /// loss for this time; none if only inputs of the FMU report it.
     pub by_estimate: Option<[f64; 2]>,
     /// One entry for each actuator that may be gone.
     pub without: Vec<WithoutActuator>,
     /// One entry for each set of several actuators that may be gone together; empty unless the plant file
     /// states `together`.
     pub several: Vec<WithoutSeveral>,
-    /// The actuators, alone and in pairs, that have no gains of their own when they are gone, so that the
-    /// fall-back is in force; empty without a fall-back.
+    /// The actuators, alone and in pairs, without gains of their own: the fall-back is in force while they are gone.
+    /// Empty without a fall-back.
     pub by_fallback: Vec<ServedByFallback>,
 }
 
@@ -60,18 +60,18 @@ pub struct WithoutActuator {
     pub outcome: Result<Reconfigured, String>,
 }
 
-/// A controller without actuators: u = K_x x_hat + K_f f_hat + K_s (stuck command - operating point).
+/// A controller for actuators that are gone: u = K_x x_hat + K_f f_hat + K_s (stuck command - operating point).
 #[derive(Serialize, JsonSchema)]
 pub struct Reconfigured {
     /// How the feedback was found, in a sentence.
     pub method: String,
-    /// The part of the effect of all actuators that the others cannot produce, relative.
+    /// The part of the effect of all actuators that the remaining ones cannot produce, relative.
     pub residual: f64,
     /// Eigenvalues [re, im] of A + B K_x.
     pub eigenvalues: Vec<[f64; 2]>,
     /// Frobenius norm of K_x.
     pub gain_norm: f64,
-    /// The same with all actuators.
+    /// Frobenius norm of K_x with all actuators.
     pub intact_gain_norm: f64,
     /// K_x, row by row.
     pub k_x: Vec<Vec<f64>>,

@@ -16,8 +16,7 @@ pub enum Level {
     /// actuators is missing or needs commands beyond limits.
     Amber,
     /// A check does not hold, a peak of S is above the upper limit, or the loop is or may become unstable: with a
-    /// member of a family, a point of a schedule, parameters within their tolerances, stated losses, or the delays
-    /// themselves.
+    /// member of a family, a point of a schedule, parameters within their tolerances, stated losses, or exact delays.
     Red,
 }
 
@@ -95,7 +94,7 @@ pub struct Robustness {
     /// Root-mean-square value of each command and each estimated fault under the noise of each
     /// measurement.
     pub noise: Matrix,
-    /// The same under all noises together: the commands, the estimated faults.
+    /// Root-mean-square values of the commands, then of the estimated faults, under all noises together.
     pub noise_together: Vec<Number>,
     /// The 2-norms of the gains, and peaks of S, beside those of the linear-quadratic design of the
     /// same speed.
@@ -110,22 +109,22 @@ pub struct Robustness {
     pub sensitivity: Vec<PeakSensitivity>,
     /// Singular values of S and T over frequency.
     pub curves: Vec<Frequency>,
-    /// The loop with the delays themselves; none for a plant without delays.
+    /// The loop with exact delays; none for a plant without delays.
     pub delays: Option<ExactDelays>,
 }
 
-/// A loop with its delays themselves, beside their approximations.
+/// A loop with exact delays, compared with the loop with approximated delays.
 #[derive(Serialize, JsonSchema)]
 pub struct ExactDelays {
     /// Number of states that approximate each delay in the observer.
     pub observer_order: u32,
-    /// The same in the plant of the other figures.
+    /// Number of states that approximate each delay in the plant with which all other figures are computed.
     pub judged_order: u32,
-    /// Peaks of the largest singular value of S with the delays themselves, in the units of the plant file: at the
-    /// commands, at the measurements.
+    /// Peaks of the largest singular value of S with exact delays, in the units of the plant file: at the commands, at
+    /// the measurements.
     pub s_peaks: [f64; 2],
-    /// The largest spectral radius of K (G - H) S over the frequencies, with G the plant with the delays themselves
-    /// and H the approximated one. Below 1 the loop is stable with the delays themselves.
+    /// The largest spectral radius of K (G - H) S over the frequencies, with the controller K, the plant G with exact
+    /// delays and the plant H with approximated ones. Below 1 the loop is stable with exact delays.
     pub difference: f64,
     /// Its frequency, rad/s.
     pub frequency: f64,
@@ -155,9 +154,9 @@ pub struct LoopPoint {
     /// Its frequency, rad/s.
     #[schemars(with = "Option<f64>")]
     pub judged_frequency: f64,
-    /// All channels change at the same time and independently.
+    /// The disk margin if all channels change at the same time and independently.
     pub together: Disk,
-    /// Each channel alone, the others exact.
+    /// The margins of each channel alone, with the others exact.
     pub channels: Vec<Channel>,
 }
 
@@ -276,8 +275,8 @@ pub struct ToleranceResult {
     /// Largest real part of the eigenvalues, 1/s, or largest modulus less 1, with the worst plant
     /// found.
     pub worst_instability: f64,
-    /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
-    /// stable. Parameters are followed to their limits, 1; entries to 16.
+    /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is stable. The search
+    /// ends at 1, the limits, for parameters, and at 16 for entries.
     #[schemars(with = "Option<f64>")]
     pub first_unstable: f64,
     /// A, B and C of the worst plant, and D if the plant has one.
@@ -292,7 +291,7 @@ pub struct ToleranceProof {
     pub fraction: f64,
     /// The largest multiple that was examined: `first_unstable` of the worst plant, or 16.
     pub most: f64,
-    /// The frequency that limits it, rad/s.
+    /// The frequency that limits `fraction`, rad/s.
     #[schemars(with = "Option<f64>")]
     pub frequency: f64,
     /// Number of independent deviations.

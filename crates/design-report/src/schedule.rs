@@ -19,22 +19,23 @@ pub struct ScheduleReport {
     pub rate_bound: Option<f64>,
     /// The points of the grid.
     pub points: Vec<SchedulePointReport>,
-    /// The proof of stability for one P, or the reason why there is none: plant and controller,
-    /// interpolated linearly, are stable for every value between the first and the last point, while
-    /// it changes in any way and arbitrarily fast.
+    /// One P, or the reason why there is none. P proves stability, with plant and controller interpolated linearly,
+    /// while the variable changes arbitrarily fast between the first and the last point.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<CommonCertificate>")]
     pub any_rate: Result<CommonCertificate, String>,
-    /// The same with P(variable), for a bounded rate; tried only if no common P was found.
+    /// A proof as `any_rate`, with P a function of the variable, for a bounded rate; tried only if no common P was
+    /// found.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<RateCertificate>")]
     pub bounded_rate: Result<RateCertificate, String>,
     /// Number of values between the first and the last point at which the eigenvalues of the
     /// interpolated loop were computed, for constant values of the variable.
     pub checked: usize,
-    /// The worst of them: largest modulus less 1; of a continuous controller the largest real part, 1/s.
+    /// The worst instability at these values: largest modulus less 1; of a continuous controller the largest real part,
+    /// 1/s.
     pub worst_instability: f64,
-    /// The value of the variable there.
+    /// The value of the variable at which `worst_instability` occurs.
     pub worst_at: f64,
 }
 
@@ -60,7 +61,7 @@ pub struct SchedulePointReport {
     pub gains: Vec<Matrix>,
     /// The loop of the plant and the controller of this point.
     pub closed: MemberReport,
-    /// If a measurement schedules: the instability of the loop with the feedback through the
-    /// interpolated operating points, which the design at the point does not know.
+    /// If the variable is a measurement: the instability of the loop with the feedback through the interpolated
+    /// operating points, which the design at the point neglects.
     pub coupled_instability: Option<f64>,
 }
