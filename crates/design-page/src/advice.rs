@@ -6,7 +6,7 @@ use super::number::number;
 use design_report::Report;
 use design_report::robustness::{LoopPoint, Robustness};
 
-/// A linear-quadratic design is worth a try if its peak of S is below this part of that of the design.
+/// A linear-quadratic design is worth a try if its peak of S is below this part of the peak of the design.
 const BETTER: f64 = 0.9;
 
 /// Returns what to change: a sentence if a check does not hold, then the computed remedies, each change once; without
@@ -49,7 +49,7 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
 /// How to lower the peaks of S above `limit`; `None` if there are none.
 fn lower_peaks(robustness: &Robustness, limit: f64) -> Option<Markup> {
     let high: Vec<_> = robustness.points.iter().filter(|point| point.judged > limit).collect();
-    // That peak is in the units of the plant file, as the judged one is where it is not lower than `s_peak`.
+    // The linear-quadratic peak is in the units of the plant file; so is `judged`, unless it is lower than `s_peak`.
     let linear_quadratic = |point: &LoopPoint| {
         let name = format!("peak of S at the {}", point.point);
         let compared = robustness.comparison.iter().find(|compared| compared.name == name)?;

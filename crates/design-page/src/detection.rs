@@ -55,7 +55,7 @@ fn decoupled(inputs: &[DecoupledInput]) -> String {
     inputs.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Says for which parameters of an FMU the means by model errors were computed; nothing without such parameters.
+/// Says for which parameters of an FMU the means by model errors were computed; empty if none vary.
 fn examined(section: &Detection) -> Markup {
     let Some(cases) = &section.parameter_cases else { return html! {} };
     html! {
@@ -85,7 +85,6 @@ fn faults(faults: &[DetectedFault]) -> Markup {
     )
 }
 
-/// A number, or a text if there is none.
 fn or(number: Option<f64>, missing: &str) -> Cell {
     number.map_or_else(|| missing.into(), Cell::Number)
 }

@@ -29,7 +29,7 @@ pub(super) fn details(estimation: &Estimation) -> Markup {
     }
 }
 
-/// Shows conditions; `number`: the head of their numbers.
+/// Shows conditions; `number`: the head of the column of their values.
 pub(super) fn checked(caption: &str, number: &str, checks: &[Check]) -> Markup {
     table_of(
         caption,

@@ -123,7 +123,7 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
             tolerance(member).and_then(|test| test.stable).map(|part| 100.0 * part).into()
         }),
         ("unstable from (tolerances)", |member| match tolerance(member) {
-            // The most that is tried.
+            // No larger multiple is tried.
             Some(test) if test.first_unstable.is_infinite() => "not up to 16".into(),
             test => test.map(|test| test.first_unstable).into(),
         }),
@@ -186,7 +186,6 @@ fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
     }
 }
 
-/// Shows P of plant and controller together.
 fn lyapunov(report: &Report, id: &str, name: &str, p: &[Vec<f64>]) -> Markup {
     square(id, [name, LYAPUNOV], &loop_names(report, p), p)
 }

@@ -43,7 +43,8 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 /// Returns the page of a design, a complete HTML document. Equal reports give equal bytes.
 ///
 /// `plant.eigenvalues` are eigenvalues of the continuous plant in 1/s, or with `plant.sample_time` in the z-plane; the
-/// eigenvalues of the loops are in the z-plane if the design is sampled. `identity` names the design in the head of the page.
+/// eigenvalues of the loops are in the z-plane if the design is sampled. `identity` names the design in the page's
+/// head.
 #[must_use]
 pub fn page(report: &Report, identity: &str) -> String {
     let title =

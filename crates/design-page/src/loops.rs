@@ -175,7 +175,7 @@ pub(super) fn conditioning<'a>(report: &'a Report) -> Markup {
     }
 }
 
-/// Shows the weights over frequency of these norms; nothing without any.
+/// Shows the weights over frequency of these norms; empty without weights.
 fn weights(report: &Report) -> Markup {
     let polynomial =
         |all: &[f64]| all.iter().map(|one| format!("{one:.5e}")).collect::<Vec<_>>().join(", ");
@@ -202,7 +202,7 @@ fn weights(report: &Report) -> Markup {
     html! { @if !rows.is_empty() { (table("Weights over frequency", heads, &rows)) } }
 }
 
-/// The gains and filters for which a lower bound holds, in the table.
+/// The gains or filters for which a lower bound holds, in words.
 fn bound_for(scope: LowerBoundFor) -> &'static str {
     match scope {
         LowerBoundFor::Filters => "all filters",
@@ -210,7 +210,7 @@ fn bound_for(scope: LowerBoundFor) -> &'static str {
     }
 }
 
-/// Shows the norms of gains that were designed by them, with their bounds; nothing without such gains.
+/// Shows the norms by which gains were designed, with their bounds; empty without such gains.
 fn norms<'a>(report: &'a Report) -> Markup {
     let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
     let norms = loops.into_iter().filter_map(|(name, system)| Some((name, system.norm.as_ref()?)));

@@ -65,7 +65,7 @@ pub(super) fn matrix(id: &str, matrix: &Matrix) -> Markup {
     }
 }
 
-/// Returns the text of the same matrices in three languages, with buttons to copy it.
+/// Returns the text of matrices in three languages, with buttons to copy it.
 pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
     let text = |write: fn(&Matrix) -> String| -> String {
         matrices.iter().map(|matrix| write(matrix)).collect()

@@ -30,7 +30,7 @@ pub(super) enum Mark {
     Size(f64),
 }
 
-/// A curve: its name, and its values at the places of its plot, as many as there are places.
+/// A curve: its name, and a value at each of the `places` of its plot.
 #[derive(Serialize)]
 #[serde(transparent)]
 pub(super) struct Line<'a> {
@@ -139,7 +139,7 @@ impl Plot<'_> {
     }
 }
 
-/// Whether an axis with decades can show a place: whether it is finite and above 0.
+/// Whether an axis with decades can show a place: one that is finite and above 0.
 fn is_shown(at: f64) -> bool {
     at > 0.0 && at.is_finite()
 }

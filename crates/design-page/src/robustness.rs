@@ -15,7 +15,7 @@ use design_report::{Matrix, Report};
 /// Largest number of entries in the table of the sensitivities.
 const SHOWN: usize = 12;
 
-/// Shows the peaks of S and the stability with the delays themselves; nothing for a plant without delays.
+/// Shows the peaks of S and the stability with exact delays; empty for a plant without delays.
 fn delays(robustness: &Robustness) -> Markup {
     let Some(delays) = &robustness.delays else { return Markup::default() };
     let [at_commands, at_measurements] = delays.s_peaks;
@@ -205,7 +205,7 @@ fn parameters(report: &Report, robustness: &Robustness) -> Markup {
     let size = |at: usize| all.iter().map(|entries| entries[at].1.abs()).fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
     order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
-    // With states of delays or filters, the matrices of the report have other entries.
+    // With states of delays or filters, the plant has other entries than the sensitivities.
     let states = robustness.sensitivity[0].matrices.first().map_or(0, |a| a.values.len());
     let values: Vec<f64> = ["A", "B", "C", "D"]
         .iter()
@@ -272,7 +272,7 @@ fn tolerances(report: &Report, tolerances: &ToleranceResult) -> Markup {
     }
 }
 
-/// The proof for the cases that were not tried; nothing if nothing varies.
+/// The proof for the cases that were not tried; empty if nothing varies.
 fn proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) -> Markup {
     html! {
         @if tested.is_examined() {

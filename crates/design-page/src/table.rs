@@ -69,8 +69,8 @@ impl Cell {
     }
 }
 
-/// Returns a table whose first column names its rows. Other columns without a value are left out; a table without rows
-/// is empty.
+/// Returns a table whose first column names its rows. Other columns without a value are left out; without rows the
+/// result is empty.
 pub(super) fn table<'a>(
     caption: &str,
     heads: impl IntoIterator<Item = &'a str>,

@@ -29,7 +29,6 @@ fn xml(html: &str) -> String {
     text.replace(" hidden ", " hidden=\"\" ")
 }
 
-/// Looks at the page of each design.
 fn with_pages(look: impl Fn(&Report, &Document<'_>)) {
     for report in [pendulum(), hostile(), bare()] {
         let text = xml(&page(&report));
@@ -240,7 +239,7 @@ fn the_verdict_names_the_failed_checks() {
     assert!(verdict(&sampled).contains("The feedback loop is unstable"));
 }
 
-/// The places at which a map shows the signs of a kind, and its frame.
+/// The places of all markers of this class in a map.
 fn signs(map: Node<'_, '_>, class: &str) -> Vec<(f64, f64)> {
     map.descendants()
         .filter(|node| node.attribute("class") == Some(class))

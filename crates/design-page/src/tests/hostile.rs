@@ -1,4 +1,4 @@
-//! A large sampled design with names that no page must trip over, and a bare one.
+//! A large sampled design whose names contain markup and quotes, and a bare one.
 
 use std::f64::consts::PI;
 
@@ -287,7 +287,7 @@ fn bare_plant() -> Plant {
     }
 }
 
-/// Margins without limits, and names that no page must trip over.
+/// Infinite margins, and names that contain markup and quotes.
 fn robustness(numbers: &mut Numbers) -> Robustness {
     let disk = || Disk {
         alpha: 2.5,
@@ -404,7 +404,7 @@ fn detection(numbers: &mut Numbers) -> Detection {
     }
 }
 
-/// A sampled design with everything in it.
+/// A sampled design with all sections.
 pub(super) fn hostile() -> Report {
     let mut numbers = Numbers(7);
     let rates = [[-4.0, 3.0], [-4.0, -3.0], [-60.0, 0.0], [-300.0, 200.0], [-300.0, -200.0]];
@@ -518,7 +518,7 @@ fn references() -> Vec<ReferenceStep> {
     }]
 }
 
-/// A scalar plant of which next to nothing is known.
+/// A scalar plant without optional data.
 pub(super) fn bare() -> Report {
     let system = |pole: f64| Loop {
         matrix: "a".to_owned(),
