@@ -27,7 +27,7 @@ pub struct ChannelWeight {
     pub signal: String,
     /// The weight over frequency.
     pub weight: Weight,
-    /// The largest ratio of the weight to the table that it approximates; `None` without a table.
+    /// The largest factor by which the weight deviates from its table; `None` without a table.
     pub deviation: Option<f64>,
 }
 
