@@ -15,7 +15,7 @@ use plant_file::faults::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
-/// Number of equal parts of a sample time: a fault is constant over each, and the states are read at its start.
+/// Number of equal parts of a sample time. A fault is constant over each part; the states are read at its start.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
 /// Number of outputs that each thread computes between two checks of the time limit.
@@ -29,8 +29,8 @@ pub(crate) struct Output {
     pub(crate) row: usize,
 }
 
-/// Returns the outputs of the loop: states, state estimation errors, fault estimation errors. Their rows are rows of
-/// [x; e; eps], which also has states of filters and delays, and rates of faults.
+/// Returns the outputs of the loop: the states x, and the errors e = x - x_hat and eps = f_hat - f of the estimates.
+/// The other rows of [x; e; eps] are states of filters and delays, and rates of faults.
 pub(crate) fn outputs(designed: &Solution) -> Vec<Output> {
     let (all, states) = (designed.plant.a.nrows(), designed.linear.plant_states());
     let of_state = |first: usize, prefix: &'static str| {
@@ -121,7 +121,7 @@ impl<'a> Loops<'a> {
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions: Vec<_> = self.outputs.iter().map(|output| output.row).collect();
         let mut peaks = vec![Err(Missing::Time); positions.len()];
-        // The errors are those of a smaller system.
+        // The errors do not depend on x: their system is smaller.
         let states = self.designed.linear.plant_states().len();
         let (of_states, of_errors) = peaks.split_at_mut(states);
         let (states, errors) = positions.split_at(states);

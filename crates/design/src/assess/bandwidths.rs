@@ -37,7 +37,7 @@ const CANDIDATES: [(f64, f64); 18] = [
 ];
 /// From this number of states on, only the first candidates are examined, without the tolerances.
 const LARGE: usize = 24;
-/// Number of candidates for such a plant.
+/// Number of candidates for a plant with at least [`LARGE`] states.
 const OF_LARGE: usize = 3;
 /// Number of candidates that are examined in parallel; fixed, so that the result is the same on every machine.
 const TOGETHER: usize = 3;
@@ -94,7 +94,7 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }
-        // What refuses the first candidates is the plant, not the bandwidth.
+        // If the first candidates are refused, the reason is the plant, not the bandwidth.
         if budget.is_over() || (best.is_none() && refusal.is_some()) {
             break;
         }
@@ -133,7 +133,7 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
         file.sampling.map_or(f64::INFINITY, |sampling| OBSERVER_PER_SAMPLE / sampling.period);
     let set = |request: &mut Request, rate: f64| {
         if request.is_open() {
-            // Two digits are enough, and what a plant file would state.
+            // Two digits, as a user would write.
             let rate = format!("{:.1e}", rate.min(most)).parse().ok();
             request.requirement = Requirement::Bandwidth(Bandwidth { rate, is_stated: false });
         }
@@ -175,7 +175,7 @@ fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     let median = sizes.get(sizes.len() / 2).copied().unwrap_or(WITHOUT_SPEED);
     let unstable = all.iter().map(|value| value.re).fold(0.0, f64::max);
     let of_samples = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
-    // A loop with a delay is hardly faster than one radian in the delay.
+    // A loop with a delay is hardly faster than 1 rad in the time of the delay.
     let most = of_samples.min(1.0 / plant.delays.longest());
     Ok(median.max(2.0 * unstable).min(most))
 }

@@ -10,7 +10,7 @@ use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
 use crate::solve::solution::Solution;
 use plant_file::estimation::Law;
 
-/// The design parameter alpha of (12); it cancels in delta.
+/// The design parameter alpha of (12) of Patton and Klinkhieo (2009); it cancels in delta.
 const ALPHA: f64 = 1.0;
 
 /// Largest number of observer states for which linear matrix inequalities are solved: their cost grows
@@ -27,7 +27,7 @@ pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget
     }
 }
 
-/// Returns the outcome of `solve`, or the reason of `budget` if its time is over before, or when `solve` fails.
+/// Returns the outcome of `solve`. If the time of `budget` is over before, or when `solve` fails, the error says so.
 fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     if budget.is_over() {
         return Err(budget.reason());

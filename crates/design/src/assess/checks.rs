@@ -49,8 +49,8 @@ pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     all
 }
 
-/// Returns the conditions for the existence of feedback and observer. A plant that does not satisfy them is refused
-/// before.
+/// Returns the conditions for the existence of feedback and observer. All hold, because other plants are refused
+/// earlier.
 fn existence(designed: &Solution) -> [Check; 3] {
     let Solution { controllability, distance, detectability, .. } = designed;
     // For a large system no lower bound is searched.

@@ -35,7 +35,7 @@ const NOTICEABLE: f64 = 0.02;
 /// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
 const LARGEST_DRIFT: f64 = 2.0;
 
-/// The detection with what the report says about it.
+/// The detection, for the design file and for the report.
 pub(crate) struct Detection {
     pub(crate) section: DetectionDesign,
     pub(crate) report: Report,
@@ -56,7 +56,7 @@ struct PlannedTest {
     kind: TestKind,
     /// The largest length of the mean of the residuals that errors of the model cause, in standard deviations.
     bias: f64,
-    /// By which part the largest of these means within the limits of parameters exceeds that at the corners; None
+    /// Relative excess of the largest of these means within the limits of parameters over that at the corners; None
     /// unless parameters of an FMU vary.
     interior_excess: Option<f64>,
     /// Whether the test reacts to each fault.
@@ -113,8 +113,8 @@ struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// With isolation each fault has a filter and a test, without there is one filter: by CUSUM it has a test for each
-    /// fault, by chi-square one test for all.
+    /// Plans one filter and test for each fault with isolation. Without isolation there is one filter, with a CUSUM
+    /// test for each fault or one chi-square test for all.
     fn parts(&self) -> Result<Vec<Part<'a>>, crate::Error> {
         let Self { file, request, problem, .. } = *self;
         let q = problem.faults.len();
@@ -172,7 +172,7 @@ impl<'a> Planner<'a> {
                 let direction = mean.normalize().transpose();
                 let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
                 let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
-                // A mean of up to the bias adds to no sum, so that there are no more false alarms.
+                // With this drift, a mean of up to the bias does not make false alarms more frequent.
                 test.drift += bias;
                 let kind = TestKind::Cusum(test);
                 Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
@@ -318,7 +318,6 @@ fn fault_report(
 ) -> Result<DetectedFault, control::Error> {
     let (input, period) = (problem.fault_at(fault), problem.period);
     let name = &problem.names[input];
-    // One test for each fault, or one for all.
     let tests: Vec<_> = tests(parts).collect();
     let (decoupling, test) = tests[if tests.len() == 1 { 0 } else { fault }];
     let means = &test.rows * decoupling.means(input)?;

@@ -57,7 +57,7 @@ pub(crate) fn errors(
 struct Errors<'a> {
     designed: &'a Solution,
     of_faults: StateSpace,
-    /// From f', per second.
+    /// The error dynamics from the rates f' of the faults, per second.
     of_rates: StateSpace,
     frequency: f64,
 }

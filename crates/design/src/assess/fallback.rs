@@ -1,4 +1,4 @@
-//! The loops of the fall-back, case by case: decay, margins, price, and what is left at rest.
+//! The loops of the fall-back, case by case: decay, margins, price (relative H2 norm), and equilibrium.
 
 use control::aso::Gains;
 use control::controller::controller;
@@ -75,7 +75,8 @@ struct Examination<'a> {
 }
 
 impl Examination<'_> {
-    /// Returns the case at a position; `failed`: its actuator, and the command at which that is stuck if it is gone.
+    /// Returns the case at a position; `failed`: the actuator of the case, and the command at which it is stuck if it
+    /// is gone.
     fn case(&self, at: usize, failed: Option<(usize, f64)>) -> Result<FallbackCase, crate::Error> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, extended, domain, .. } = designed;
@@ -134,8 +135,8 @@ impl Examination<'_> {
 
     /// Returns the equilibrium of the loop, and the actuator with its command if it is gone.
     ///
-    /// The input of the loop is the deviation of the actuator from its command at the operating point: its stuck
-    /// command less that, or the part of it that is lost.
+    /// The input of the loop is what the failure adds to the actuator's command at the operating point: the stuck
+    /// command less that command, or the lost part with a negative sign.
     fn rest(
         &self,
         whole: &DMatrix<f64>,

@@ -75,7 +75,7 @@ pub(crate) fn member(
     Ok(MemberReport { name, instability, margins: Some(margins) })
 }
 
-/// Returns one P for all loops, or the reason why there is none. `name`: of the loop at a position.
+/// Returns one P for all loops, or the reason why there is none. `name` returns the name of the loop at a position.
 pub(crate) fn common(
     loops: &[DMatrix<f64>],
     domain: Domain,
@@ -100,7 +100,7 @@ pub(crate) fn common(
     })
 }
 
-/// Returns a certificate for the report.
+/// Converts a certificate for the report.
 pub(crate) fn reported(certificate: &RegionCertificate) -> CommonCertificate {
     CommonCertificate { p: rows(&certificate.p), margin: certificate.margin }
 }

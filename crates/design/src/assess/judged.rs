@@ -40,8 +40,8 @@ impl Judged {
         !self.is_unstable && self.largest_peak() <= limits.amber
     }
 
-    /// Whether this loop is better than the other: its peaks are within the limit and those of the other are not; if
-    /// both or neither are, it alone is stable within the tolerances; if that is equal, too, its largest peak is lower.
+    /// Whether this loop is better than `other`, by the first criterion in which they differ: peaks of S within the
+    /// limit, stability within the tolerances, the lower largest peak.
     pub(crate) fn is_better(&self, other: &Self, limits: &RobustnessLimits) -> bool {
         let rank = |judged: &Self| (judged.largest_peak() > limits.amber, judged.is_unstable);
         match rank(self).cmp(&rank(other)) {

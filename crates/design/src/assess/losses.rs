@@ -79,7 +79,7 @@ pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
 }
 
 /// Returns the reason of the verdict by a loop: red if constant losses within the stated range make it unstable, amber
-/// if nothing is proven. With the compensation off, which may never happen, the first is amber and the second no
+/// if nothing is proven. With the compensation off, which may never happen, instability is amber and a missing proof no
 /// reason.
 fn reason(report: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
     let on = report.name == ON;
@@ -113,7 +113,7 @@ struct Variant {
     closed: DesignLoop,
 }
 
-/// Returns the controllers with compensation on and off; only on if integrals act and the estimates are held.
+/// Returns the controllers with compensation on and off.
 fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
     let Solution { plant, gains, .. } = designed;
     let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
@@ -131,7 +131,7 @@ fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
         meaning: "u = K_x x_hat + K_f f_hat, with the estimates f_hat that the observer computes",
         closed: designed.whole.clone(),
     };
-    // With integral action the estimates are not held while the integrals go on.
+    // No controller holds the estimates while integrals act: then there is no loop with compensation off.
     let held_integrals = gains.integral.is_some() && !designed.monitor;
     Ok(if held_integrals { vec![on] } else { vec![on, off] })
 }
@@ -310,8 +310,8 @@ impl Examination<'_> {
         Ok(peaks)
     }
 
-    /// Returns what acts on the plant with a known size: the lost part of each command of the operating point, and each
-    /// fault with a stated bound, without losses of effectiveness; one that enters a measurement only if the plant has
+    /// Returns the disturbances of known size: the lost part of each command at the operating point, and each fault
+    /// with a bound that is no loss of effectiveness. A fault that enters a measurement counts only if the plant has
     /// the filter.
     fn disturbances(&self) -> Vec<Disturbance> {
         let Solution { linear, extended, whole, .. } = self.designed;
@@ -324,7 +324,7 @@ impl Examination<'_> {
             });
         let models = linear.models.iter().zip(&extended.channels);
         let faults = linear.faults.iter().zip(models).filter_map(|(fault, (model, channel))| {
-            // On a measurement it acts through the filter, which with integral action is part of the controller.
+            // A fault on a measurement acts through the filter, which with integral action is part of the controller.
             let additive = match model.entry {
                 FaultEntry::LossOfEffectiveness(_) => false,
                 _ => !model.entry.is_measured() || plant.a.nrows() > linear.states.len(),
@@ -342,7 +342,7 @@ impl Examination<'_> {
 struct Disturbance {
     name: String,
     size: f64,
-    /// How it acts on the states of the plant.
+    /// The column through which it acts on the states of the plant.
     column: DVector<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Judges what the controller does without actuators.
+//! Judges the controllers for actuators that are gone.
 
 use crate::report::reconfiguration::{ReconfigurationReport, Reconfigured};
 use crate::report::robustness::Level;

@@ -37,7 +37,7 @@ pub(crate) fn reached(steps: &[ReferenceStep]) -> Option<Check> {
 /// Returns a warning if the commands of a step that the plant file states are beyond their limits.
 pub(crate) fn beyond_limits(step: &ReferenceStep) -> Option<String> {
     let [low, high] = step.largest_step;
-    // A step of the size that the message states, with five digits, is within the limits.
+    // The message rounds the limit to five digits: a step of this size is within the limits.
     let margin = 1e-4 * step.size.abs();
     if !step.stated || (low - margin..=high + margin).contains(&step.size) {
         return None;
@@ -58,7 +58,7 @@ pub(crate) fn beyond_limits(step: &ReferenceStep) -> Option<String> {
     ))
 }
 
-/// The loop from the references to what the responses show.
+/// The loop from the references to the signals that the responses show.
 struct ReferenceLoop<'a> {
     designed: &'a Solution,
     tracking: &'a Tracking,

@@ -1,4 +1,4 @@
-//! What changes the verdict: the same plant with slower or faster gains, designed and examined.
+//! Remedies for the verdict: requirements on slower or faster loops, designed and examined.
 
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -25,9 +25,9 @@ const LARGEST_ORDER: usize = 24;
 /// A change is worth it if it lowers the peak below this part of its present value.
 const LOWER: f64 = 0.95;
 
-/// Returns what changes the peaks of S above their limit and instability within the tolerances, one item for
-/// each of these reasons. For gains by linear matrix inequalities or by the shape of the loop, requirements that are
-/// not scaled, several or large plants, and without time, there is none.
+/// Returns a remedy for each peak of S above its limit, and for instability within the tolerances. There is none for
+/// gains by linear matrix inequalities or by the shape of the loop, for requirements that are not scaled, for several
+/// plants or a large one, and without time.
 pub(crate) fn remedies(
     file: &PlantFile<'_>,
     robustness: Option<&Robustness>,
@@ -62,7 +62,7 @@ pub(crate) fn remedies(
         peaks: robustness.points.iter().map(|point| point.judged).collect(),
         is_unstable: robustness.tolerance.is_unstable(),
     };
-    // A change for a peak must not cost the stability within the tolerances.
+    // A change that lowers a peak must keep the stability within the tolerances.
     let varies = limits.parameters.is_empty();
     let tried = variants
         .into_par_iter()
@@ -94,7 +94,7 @@ struct Present {
     is_unstable: bool,
 }
 
-/// Other requirements in the plant file.
+/// Changed requirements in the plant file.
 struct Variant {
     observer: Option<Scaled>,
     feedback: Option<Scaled>,
@@ -138,7 +138,7 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
 /// Returns the requirement of the loop `name` with eigenvalues or bandwidth times `factor`, or with another `weight`;
 /// None for other requirements.
 fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
-    // The line of the plant file has these digits.
+    // The remedy states the requirement with these digits.
     let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);
     let (requirement, line, words) = match requirement {
         Requirement::Eigenvalues(all) => {
@@ -221,9 +221,8 @@ impl Trial {
 
 impl Reason {
     /// Returns the smallest change that removes all reasons, else the smallest one that removes this reason, else for a
-    /// peak the change with the lowest one; without any, a sentence that says so. Changes that make something else
-    /// worse are left out. None if no change removes this reason and the time was over before all were tried, so that
-    /// the trials are not complete.
+    /// peak the change with the lowest peak, else a sentence that there is none. Changes that make something else worse
+    /// are left out. None if no change removes this reason and the time was over before all were tried.
     fn remedy(
         self,
         trials: &[Trial],

@@ -56,7 +56,7 @@ pub(crate) struct Assessment<'a> {
     /// The plants whose parameters vary; without them the entries of the matrices vary.
     pub(crate) parameters: Option<&'a ParameterFamily<'a>>,
     pub(crate) designed: &'a Designed,
-    /// What the controller is, in a sentence.
+    /// A description of the controller, in a sentence.
     pub(crate) description: String,
     pub(crate) detection: Option<Detection>,
     pub(crate) reconfiguration: Option<ReconfigurationReport>,
@@ -312,7 +312,7 @@ pub(crate) fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, E
         _ => None,
     };
     let DesignLoop { plant, controller } = &designed.whole;
-    // The losses of all inputs together may be too many combinations.
+    // One input at a time: all together may be too many combinations.
     let one = |input: usize| {
         Ok(Effectiveness {
             actuator: designed.linear.actuators[input].name.clone(),

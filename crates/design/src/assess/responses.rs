@@ -15,7 +15,7 @@ use plant_file::faults::Fault;
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.
 pub(crate) const SETTLED: f64 = 0.02;
-/// Parts of a sample time, between which points are shown besides the samples.
+/// Number of parts of a sample time, between which points are shown besides the samples.
 pub(crate) const PARTS: u32 = 5;
 /// Number of parts of the logarithmic time axis, for each of which a curve has at most four points; the second number
 /// is for loops from `LARGE` states on.
@@ -268,7 +268,7 @@ mod tests {
         assert_eq!((thin[0], thin[thin.len() - 1]), (all[0], all[49_999]));
         assert!(thin.contains(&(12_345.0, 9.0)));
         assert_eq!(thinned(&all[..1000], 250), all[..1000]);
-        // By index the decade to 10^4 would have a fifth of what is kept.
+        // Thinned by index, the decade to 10^4 would have a fifth of the points.
         let shown = thin.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
         assert!((150..=220).contains(&shown), "{shown}");
     }

@@ -260,7 +260,7 @@ fn sensitivity(designed: &Solution, slopes: &[[DMatrix<f64>; 4]]) -> Vec<PeakSen
     let plant = &linear.undelayed;
     let one = |((_, name), slopes): ((Point, &str), &[DMatrix<f64>; 4])| {
         let [to_a, to_b, to_c, to_d] = &linear.of_plant(slopes);
-        // One for the entries that are not structural.
+        // 1 for the entries that are not structural, 0 for the others.
         let [in_a, in_b, in_c, in_d] = Tolerances::unless_structural(plant, [1.0; 4]).of;
         let meaning = "entry times derivative of the peak of S";
         let times = |varied: DMatrix<f64>, values: &DMatrix<f64>, slopes: &DMatrix<f64>| {

@@ -92,7 +92,7 @@ fn bounded(
         return Ok(Err(format!("it was {}", budget.reason())));
     }
     let shortest = intervals.iter().map(|interval| interval.length).fold(f64::INFINITY, f64::min);
-    // The time in which the variable changes once: a sample, or a second.
+    // The time over which a change of the variable counts: a sample, or a second.
     let time = domain.step();
     let certificate = match scheduled.rate_bound {
         Some(rate) if domain != Domain::Continuous && rate * time > shortest => {

@@ -24,7 +24,7 @@ pub(crate) fn warning(file: &PlantFile<'_>, solution: &Solution) -> Result<Optio
     }
     let observer = decay(&solution.gains.error_dynamics(&solution.plant), solution.domain)?;
     let feedback = solution.slowest_rate()?;
-    // An unstable loop has other reasons.
+    // An unstable observer fails other checks.
     if observer <= 0.0 || observer >= SLOW * feedback {
         return Ok(None);
     }

@@ -168,7 +168,7 @@ mod tests {
         let columns = |disturbance: UnknownInput| {
             let mut file = table(&format!("{OFFSET}[[disturbances]]\ninput = \"d\""));
             let Some(Value::Array(all)) = file.get_mut("disturbances") else { panic!("a list") };
-            // The third state is that of a delay.
+            // The third state belongs to a delay.
             let is_stated = state_columns(all, &[unknown_input(&[0.0; 3], 1.0), disturbance], 2);
             is_stated.then_some(file)
         };

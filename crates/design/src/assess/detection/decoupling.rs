@@ -14,8 +14,8 @@ use plant_file::PlantFile;
 const SETTLED: f64 = 15.0;
 /// The most samples of a response that are computed.
 const MOST_SAMPLES: usize = 20_000;
-/// A constant fault leaves no trace if the steady mean of the residuals is at most this part of their largest mean, or,
-/// with other faults decoupled, of their steady mean without.
+/// A constant fault leaves no trace if the steady mean of the residuals is at most this part of their largest mean or,
+/// with other faults decoupled, of their steady mean before these were decoupled.
 const NO_TRACE: f64 = 1e-6;
 
 /// A filter of residuals.
@@ -73,9 +73,8 @@ impl<'a> Decoupling<'a> {
         self.problem.faults.clone().map(shift).collect()
     }
 
-    /// Returns the filter for `fault`: this one that also decouples each of `others` in turn, exactly or else as a random
-    /// walk, except those whose decoupling leaves no trace of `fault`. `shift`: the length of the steady mean of
-    /// `fault` in this filter.
+    /// Returns the filter for `fault`: like this one, but it also decouples each of `others` (exactly, else as a random
+    /// walk) unless that leaves no trace of `fault`. `shift`: the length of the steady mean of `fault` in this filter.
     pub(super) fn isolating(
         &self,
         fault: usize,
@@ -141,8 +140,8 @@ fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decou
 }
 
 impl Problem {
-    /// Returns the filter for all faults, which decouples each disturbance, exactly if possible, otherwise as a random
-    /// walk by its bound. An error names a disturbance that cannot be decoupled.
+    /// Returns the filter for all faults, which decouples each disturbance: exactly if possible, otherwise as a random
+    /// walk of the size of its bound. An error names a disturbance that cannot be decoupled.
     pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling<'_>, crate::Error> {
         let refuse = |error: Error| {
             let request = file.detection.as_ref();

@@ -27,9 +27,9 @@ type Case = Rc<(UncertainPlant, DVector<f64>)>;
 /// A bound of the means of residuals that errors of the model cause.
 #[derive(Clone, Copy)]
 pub(super) struct LargestMean {
-    /// As a length in standard deviations, times the factor of the plant file.
+    /// As a length in standard deviations, times the stated factor, [`ModelError::margin`].
     pub(super) mean: f64,
-    /// For parameters of an FMU: by which part the largest mean of the interior exceeds that of the corners.
+    /// For parameters of an FMU: relative excess of the largest mean in the interior over that at the corners.
     pub(super) interior_excess: Option<f64>,
 }
 
@@ -37,14 +37,14 @@ pub(super) struct LargestMean {
 pub(super) struct ModelErrors<'a> {
     file: &'a PlantFile<'a>,
     request: &'a ModelError,
-    /// The plant, and the members of its family, whose entries are wrong by their tolerances.
+    /// The plant and the members of its family, whose entries may deviate by their tolerances.
     plants: Vec<UncertainPlant>,
-    /// The FMU whose parameters are wrong; then the entries are exact.
+    /// The FMU whose parameters deviate, if there is one; the entries are then exact.
     parameters: Option<&'a ParameterFamily<'a>>,
-    /// The random cases of these parameters, as deviations from -1 to 1.
+    /// The random cases of the parameters, as deviations from -1 to 1.
     random: Vec<Vec<f64>>,
-    /// The plants of other parameters that were linearised, by the bits of their deviations: each test needs the same
-    /// ones.
+    /// The plants that were linearised, by the bits of the deviations of their parameters: all tests need the same
+    /// plants.
     cases: RefCell<HashMap<Vec<u64>, Case>>,
     /// The values of the measurements at the operating point.
     measured: DVector<f64>,
@@ -141,16 +141,15 @@ impl<'a> ModelErrors<'a> {
         Ok(case)
     }
 
-    /// Returns the FMU with other parameters, and the bounds of its inputs. At the operating point of the plant file it
-    /// is not at rest: a further input that is always 1 has the rates of its states and the changes of its measurements
-    /// there.
+    /// Returns the linearised FMU with other parameters, and the bounds of its inputs. It is not at rest at the
+    /// operating point of the plant file: an additional input, always 1, stands for the rates of its states and the
+    /// changes of its measurements there.
     fn with_parameters(
         &self,
         family: &ParameterFamily<'_>,
         deviations: &[f64],
     ) -> Result<(UncertainPlant, DVector<f64>), crate::Error> {
         let (plant, rates, measured) = family.at_operating_point(deviations)?;
-        // One more command: the rates and measurements at the operating point.
         let [rates, offsets] =
             [rates, measured - &self.measured].map(|column| DMatrix::from_columns(&[column]));
         let plant = with_delays(self.file, &plant, [&rates, &offsets])?;

@@ -54,7 +54,7 @@ impl TestKind {
     }
 
     /// Returns the delay after a step that moves the means of the residuals to `factor` times the columns of `means`,
-    /// one for each sample; the last one lasts. The delay is computed over `most` samples.
+    /// one for each sample; the last column stays. The delay is computed over `most` samples.
     fn delay(&self, means: &DMatrix<f64>, factor: f64, most: usize) -> Delay {
         let last = means.ncols() - 1;
         match self {
@@ -105,7 +105,7 @@ impl Prediction<'_> {
 
 /// Returns the test whose window, a power of two of samples, gives the least sum of mean delays of some faults.
 ///
-/// `samples`: between false alarms; a window is shorter than a quarter of them, or 1.
+/// `samples`: the number between false alarms; a window has less than a quarter of it, or one sample.
 pub(super) fn best_window(
     residuals: u32,
     samples: f64,

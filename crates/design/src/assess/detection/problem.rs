@@ -98,8 +98,8 @@ impl Problem {
         self.disturbances + fault
     }
 
-    /// Sets the stated process noise, or else the least one with which the filter without unknown inputs forgets as
-    /// fast as the loop. Refuses a wrong number of stated values, and a plant for which no noise gives a filter.
+    /// Sets the stated process noise, or else the least one with which the filter without unknown inputs is as fast as
+    /// the loop. Refuses a wrong number of stated values, and a plant for which no noise gives a filter.
     fn set_process_noise(
         &mut self,
         file: &PlantFile<'_>,
@@ -143,9 +143,9 @@ impl Problem {
         Ok(())
     }
 
-    /// Returns the least factor of `unit`, 0 or a power of 4, with which the filter without unknown inputs forgets as
-    /// fast as the loop; if it never does, the least factor with which it forgets about as fast as with any factor.
-    /// None if there is a filter for no factor.
+    /// Returns the least factor of `unit`, 0 or a power of 4, with which the filter without unknown inputs is as fast
+    /// as the loop; if it never is, the least factor with which it is nearly as fast as with any factor. None if no
+    /// factor gives a filter.
     fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
         let decay = |factor: f64| {
             let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };
@@ -160,7 +160,7 @@ impl Problem {
             }
             slower.push((factor, decay_rate));
         }
-        // The fastest filter is not always that with the most noise: a sampled one approaches the zeros of the sampled
+        // More noise does not always make a filter faster: in sampled time its eigenvalues approach the zeros of the
         // plant.
         let fastest = slower.iter().map(|(_, decay_rate)| *decay_rate).fold(0.0, f64::max);
         let (factor, _) =
@@ -172,7 +172,7 @@ impl Problem {
     /// they vary
     ///
     /// 1. each fault that acts on the states by its size;
-    /// 2. also each command by one: without, there may be no fault on the states, or a mode that does not decay gets no
+    /// 2. also each command by one, as there may be no fault on the states, or a mode that does not decay gets no
     ///    noise;
     /// 3. also all states by the mean of these.
     fn unit_process_noises(&self) -> [(&'static str, DMatrix<f64>); 3] {

@@ -1,4 +1,4 @@
-//! The loop with its delays themselves.
+//! The loop with exact delays.
 
 use control::response::frequency_grid;
 use control::robustness::{Loop, Point};
@@ -10,11 +10,11 @@ use crate::solve::solution::Solution;
 
 /// Frequencies in each decade.
 const PER_DECADE: u32 = 200;
-/// A peak of S that is larger by this factor with the delays themselves is a reason of the verdict.
+/// A peak of S that is larger by this factor with exact delays is a reason of the verdict.
 const LARGER: f64 = 1.05;
 
-/// Compares `closed`, the stable loop with delays of [`JUDGED`] states each, with the loop with the delays themselves,
-/// at a grid of frequencies and at the peaks of S in `points`; `None` without delays.
+/// Compares `closed`, the stable loop with delays of [`JUDGED`] states each, with the loop with exact delays, at a grid
+/// of frequencies and at the peaks of S in `points`; `None` without delays.
 pub(super) fn exact(
     designed: &Solution,
     closed: &Loop,
@@ -40,7 +40,7 @@ pub(super) fn exact(
     }))
 }
 
-/// Returns the reasons of the verdict by the delays themselves; none without delays.
+/// Returns the reasons of the verdict by exact delays; none without delays.
 pub(crate) fn reasons(robustness: &Robustness) -> Vec<(Level, String)> {
     let Some(delays) = &robustness.delays else { return Vec::new() };
     let order = delays.judged_order;

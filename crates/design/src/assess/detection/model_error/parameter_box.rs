@@ -6,13 +6,13 @@ use std::cell::RefCell;
 const ALL_CORNERS: usize = 6;
 /// With more parameters, each in turn goes to its worse limit, in at most this number of rounds.
 const ROUNDS: usize = 10;
-/// The steps of the search about the largest value, as parts of the distance from the centre to a limit.
+/// The steps of the search around the largest value, as parts of the distance from the centre to a limit.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
 
 /// The largest values that were found in the box of deviations -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LargestValue {
-    /// At the points that were tried before those of the interior: corners, centre and centres of faces.
+    /// At the corners, the centre and the centres of faces.
     pub(super) corners: f64,
     /// At all points that were tried.
     pub(super) everywhere: f64,
