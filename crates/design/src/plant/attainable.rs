@@ -143,8 +143,8 @@ fn forced(zero: Complex<f64>, poles: &[Complex<f64>]) -> f64 {
     poles.iter().map(|pole| (zero + pole.conj()).norm() / (zero - pole).norm()).product()
 }
 
-/// Returns the peak of S that a real zero forces if |S| is at most [`AT_BANDWIDTH`] up to `speed`; `least`: see
-/// [`forced`].
+/// Returns the peak of S that a real zero forces if |S| is at most [`AT_BANDWIDTH`] up to `speed`; `least`: the result
+/// of [`forced`].
 fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
     let pi = std::f64::consts::PI;
     let t = pi / (pi - 2.0 * (speed / zero.re).atan());

@@ -17,8 +17,8 @@ use plant_file::signals::Signal;
 /// rad in the delay.
 pub(crate) const JUDGED: usize = 10;
 
-/// Smallest delay that is allowed, relative to the plant's fastest time constant, and the inverse of the largest one:
-/// beside others rounding errors hide the delay, or the plant.
+/// Smallest ratio of a delay to the plant's fastest time constant that is allowed, and inverse of the largest one:
+/// beyond, rounding errors hide the delay or the plant.
 const PART: f64 = 1e-9;
 
 /// Refuses delays that are much too short or too long beside the fastest time constant of the plant.
@@ -97,7 +97,7 @@ pub(crate) fn with_delays(
     filtered.map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
 }
 
-/// Places the tolerances of a plant without its delays in the plant with approximations of `order`.
+/// Converts the tolerances of a plant without its delays to those of the plant with delays of `order` states each.
 pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> Tolerances {
     if !delays.any() {
         return tolerances;

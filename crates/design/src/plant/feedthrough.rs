@@ -1,7 +1,7 @@
 //! Direct feedthrough, y = C x + D u: what it needs, and what is not possible with it.
 //!
-//! The controller knows its commands and takes D u off the measurements. What else enters the measurements with
-//! the commands, a fault of an actuator, must pass the measurement filter, which is why there must be one.
+//! The controller knows its commands and takes D u off the measurements. A fault of an actuator enters the measurements
+//! with the command, and must pass a measurement filter, which such a plant therefore needs.
 
 use control::faults::FaultEntry;
 use files::PlaceError;

@@ -4,8 +4,8 @@ use control::Domain;
 use control::rank::Mode;
 use nalgebra::Complex;
 
-/// Whether a rate p, real or one of a complex pair, has the eigenvalue e^(p T) of a sampled mode: none has 0 or a
-/// negative number.
+/// Whether the eigenvalue of a sampled mode is e^(p T) of a rate p, real or one of a complex pair: 0 and negative
+/// numbers are not.
 pub(crate) fn has_rate(mode: &Mode) -> bool {
     mode.eigenvalue.re > 0.0 || mode.eigenvalue.im != 0.0
 }
@@ -43,7 +43,7 @@ pub(crate) fn shown(value: Complex<f64>) -> String {
 
 fn digits(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    // No sign for zero.
+    // -0 becomes 0.
     let rounded = rounded + 0.0;
     match rounded.abs() {
         size if size == 0.0 || (1e-4..1e6).contains(&size) => rounded.to_string(),

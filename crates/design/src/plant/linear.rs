@@ -24,7 +24,8 @@ use plant_file::signals::{Signal, is_one_unit, is_one_unit_of_differences};
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;
 
-/// Part of the largest entry of a row of C below which an entry of D or G counts as zero, in units of typical sizes.
+/// Part of the largest entry of a row of C below which an entry of D or G (from faults to measurements) counts as zero,
+/// in units of typical sizes.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Part of the largest entry of a row above which the error of a linearisation is more than rounding.
@@ -293,7 +294,7 @@ fn linearised(
     })
 }
 
-/// Checks that the units that the file states for signals of the FMU are those of the FMU, in which the matrices are.
+/// Checks that the units that the file states for signals of the FMU are those of the FMU, which the matrices have.
 fn check_units(
     file: &PlantFile<'_>,
     signals: &[Signal],

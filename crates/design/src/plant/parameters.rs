@@ -111,8 +111,7 @@ impl<'a> ParameterFamily<'a> {
 }
 
 impl FmuParameter {
-    /// Returns the value at a deviation from -1, the lower limit, to 1, the upper one; it is linear on either side of
-    /// 0.
+    /// Returns the value at a deviation between -1, the lower limit, and 1, the upper one; linear on either side of 0.
     fn value(&self, deviation: f64) -> f64 {
         let [low, high] = self.limits;
         let end = if deviation < 0.0 { low } else { high };
@@ -192,7 +191,7 @@ impl PlantFamily for ParameterFamily<'_> {
         Ok(delays::of(self.file).approximated(&undelayed, JUDGED)?)
     }
 
-    /// `entries`: those of the plant with its delays, as [`Self::plant`] has them.
+    /// `entries`: derivatives with respect to the entries of [`Self::plant`].
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
         let n = self.directions.first().map_or(0, |[a, ..]| a.nrows());
         let entries = &delays::of(self.file).of_plant(n, JUDGED, entries);

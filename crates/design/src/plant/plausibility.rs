@@ -10,7 +10,7 @@ use control::faults::ExtendedPlant;
 use plant_file::signals::{joined, signal_names};
 use plant_file::{FAULTS, PlantFile};
 
-/// A column, scaled to length one, counts as a combination of others if they leave at most this length of it.
+/// A column of length one counts as a combination of others if its part orthogonal to them has at most this length.
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;

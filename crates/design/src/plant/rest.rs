@@ -42,8 +42,8 @@ fn number(signal: &Signal, value: f64) -> Number {
     Number { name: signal.name.clone(), unit: signal.unit.clone(), value }
 }
 
-/// Returns the commands at rest: the operating point plus `deviations`; those of actuators that are gone
-/// are where they are stuck.
+/// Returns the commands at rest: the operating point plus `deviations`; an actuator that is gone has the command at
+/// which it is stuck.
 pub(crate) fn commands(
     actuators: &[Signal],
     deviations: &DVector<f64>,
