@@ -1,4 +1,4 @@
-//! Solves for the controller: the gains of one plant, of a family, of a schedule, and without actuators.
+//! Solves for the controller: the gains for one plant, a family, a schedule, and actuators that are gone.
 
 pub(crate) mod bandwidth;
 pub(crate) mod designed;

@@ -119,7 +119,7 @@ pub(crate) fn above_or_on_the_real_axis(mode: &Mode) -> bool {
 }
 
 /// Returns what follows from a mode that no gain moves, as the end of a sentence; empty for a mode that is stable, but
-/// not clearly.
+/// hardly.
 pub(crate) fn consequence(stable: bool, mode: &Mode, domain: Domain) -> &'static str {
     match stable {
         true => "; it is stable and keeps its eigenvalue",

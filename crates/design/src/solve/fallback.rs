@@ -249,8 +249,8 @@ impl Cases<'_> {
         Ok(best.unwrap_or_else(|| Err(String::new())))
     }
 
-    /// Returns the fall-back with a state feedback if the loops with the observer decay at the required rate, else why
-    /// not; with the compensation of the estimated faults if the loops decay at this rate with it, too.
+    /// Returns the fall-back with the state feedback `gain` if the loops with the observer decay at the required rate,
+    /// else why not. It compensates the estimated faults if the loops also decay at this rate with the compensation.
     fn verified(
         &self,
         gain: &DMatrix<f64>,

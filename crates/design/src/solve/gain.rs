@@ -75,7 +75,7 @@ pub(crate) struct FeedbackProblem<'a> {
     pub(crate) f_a: &'a DMatrix<f64>,
 }
 
-/// Returns the gain of a method without a choice, without required eigenvalues.
+/// Returns a gain of a method that has neither a choice of gains nor required eigenvalues.
 pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
     GainResult { gain, method, ..GainResult::default() }
 }
@@ -124,7 +124,7 @@ impl GainChoice {
 }
 
 impl GainResult {
-    /// Replaces the gain by `map` of it; the gains in `choice` stay.
+    /// Applies `map` to the gain; the gains in `choice` stay.
     pub(crate) fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self { gain: map(&self.gain), ..self }
     }

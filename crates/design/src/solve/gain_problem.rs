@@ -46,8 +46,8 @@ impl GainProblem<'_> {
         common: Option<GainResult>,
     ) -> Result<(GainResult, GainResult), PlaceError> {
         let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
-        // No command and no state of the plant depends on the filters of controllers of low order before those are in
-        // the loop.
+        // No command and no state of the plant depends on the filters before the controllers of low order are in the
+        // loop.
         let filters = linear.filter_states(file);
         let (first, count) = (filters.start, filters.len());
         let square =
@@ -81,7 +81,7 @@ impl GainProblem<'_> {
             filter: filter.as_deref(),
             estimator: file.estimator(),
         };
-        // Both run in other threads, which have the same time.
+        // Both run in other threads, with the same time limit.
         let ending = lmi::ending();
         let feedback = || lmi::until(ending.clone(), feedback);
         let observer = || observer(&of_observer, &observer_problem, domain);
@@ -105,7 +105,8 @@ impl GainProblem<'_> {
     }
 
     /// Returns the gains of feedback and observer: tuned to the loop shape of the plant file, with a warning if they do
-    /// not reach it; without a loop shape, the pair with the lowest peaks of S, or of a schedule the first pair.
+    /// not reach it; without a loop shape, the pair with the lowest peaks of S, or the first pair of a design with a
+    /// schedule.
     ///
     /// `common`: the feedback of a family, not used with a loop shape. `filter`: the coefficients of the measurement
     /// filter. `gains`: computes the gains of the controller from those of feedback and observer.

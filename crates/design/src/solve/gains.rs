@@ -151,7 +151,7 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
     for mode in fixed {
         let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
         let near = |one: &Complex<f64>| match sampling {
-            // e^(p T) is 0 if it underflows; no other p has the mode 0.
+            // Only a p whose e^(p T) underflows to 0 has the mode 0.
             Some(period) if !stated.is_finite() => (one * period).exp().norm(),
             _ => (one - stated).norm(),
         };

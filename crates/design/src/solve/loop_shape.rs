@@ -22,13 +22,13 @@ use plant_file::signals::same_unit;
 
 /// Smallest |S| that is asked for at low frequencies, and smallest |T| at high ones, relative to its peak.
 const FLOOR: f64 = 0.01;
-/// Number of starts that are tuned: those with the lowest gamma.
+/// Number of starts that are tuned: those with the lowest gamma, the largest weighted gain over all terms.
 const TUNED: usize = 4;
 /// Smallest decay rate of the tuned loop, relative to that of its start.
 const DECAY: f64 = 0.1;
-/// The same with integral action beside a feedforward: no term shows how slowly a set point is followed.
+/// [`DECAY`] with integral action beside a feedforward: no term shows how slowly a set point is followed.
 const DECAY_OF_INTEGRALS: f64 = 0.9;
-/// The same for the estimation errors with integral action: no term shows how slowly the observer estimates a fault
+/// [`DECAY`] of the estimation errors with integral action: no term shows how slowly the observer estimates a fault
 /// that the integrals compensate.
 const DECAY_OF_ESTIMATES: f64 = 0.5;
 /// Smallest size of an entry of a gain, relative to the average of its row and its column.
@@ -161,7 +161,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
     fn help(&self, term: &Term, frequency: f64) -> &'static str {
         match term.transfer {
             Transfer::Effort => "a higher `effort`",
-            // No other entry is in a constant weight.
+            // A constant weight depends on `peak` alone.
             _ if term.weight.as_constant().is_some() => "a higher `peak`",
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
             Transfer::Complementary(_) if frequency > self.shape.roll_off => "a higher `roll_off`",

@@ -65,9 +65,9 @@ impl ObserverProblem<'_> {
     /// x' = (A - L C) x + (B - L D_y) [rates; noise],  z = W E x
     /// ```
     ///
-    /// Without a measurement filter the noise enters through `D_y`, with one through the filter's
-    /// states. A current estimator corrects with the newest measurement: `D_y` then has `C_0` B, too.
-    /// In sampled time a rate acts for one period.
+    /// W is the weights, E selects the states of the fault models. Without a measurement filter the noise enters
+    /// through `D_y`, with one through the filter's states. A current estimator corrects with the newest measurement:
+    /// `D_y` then has `C_0` B, too. In sampled time a rate acts for one period.
     fn performance(&self, required: NormRequirement<'_>) -> Performance {
         let (order, p, q) = (self.a_0.nrows(), self.c_0.nrows(), self.faults);
         let noises = required.channel.noise.len();
@@ -154,12 +154,13 @@ impl ObserverProblem<'_> {
             }
         }
         let Some(gain) = filter.gain(RELAXED * high)? else { return Ok(None) };
-        // Rounding errors of the equation are errors of the norm: then inequalities are the better way.
+        // Rounding errors of the equation raise the norm; linear matrix inequalities are then more accurate.
         Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
     }
 
-    /// Computes a norm below which no gain is: with noise that of filters of any order; without noise the larger one of
-    /// that and of the bound for gains with all eigenvalues in the disc of the region. None if no bound is known.
+    /// Computes a lower bound of the norm for all gains: with noise that of filters of any order; without noise the
+    /// larger one of that and of the bound for gains with all eigenvalues in the disc of the region. None if no bound
+    /// is known.
     fn lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<LowerBound>, Error> {
         if !required.channel.noise.is_empty() {
             return Ok(self.noisy_lower_bound(required)?.map(LowerBound::for_filters));
@@ -184,8 +185,8 @@ impl ObserverProblem<'_> {
         })
     }
 
-    /// Computes a norm below which no filter of any order is, for the unfiltered measurements with noise; None above
-    /// [`LARGEST_ORDER`] states.
+    /// Computes a lower bound of the norm for filters of any order, for the unfiltered measurements with noise; None
+    /// above [`LARGEST_ORDER`] states.
     ///
     /// With a measurement filter the newest measurement is that of the sample before, as for a prediction estimator.
     fn noisy_lower_bound(&self, required: NormRequirement<'_>) -> Result<Option<f64>, Error> {
@@ -301,8 +302,8 @@ impl FeedbackProblem<'_> {
         Ok(Some(ChannelWeights { input, output }))
     }
 
-    /// Computes a norm below which no state feedback is, even if it knows the states of the weights; None if none is
-    /// known, and above [`LARGEST_ORDER`] states.
+    /// Computes a lower bound of the norm for all state feedbacks, also for those that know the states of the weights;
+    /// None if none is known, and above [`LARGEST_ORDER`] states.
     fn lower_bound(
         &self,
         performance: &Performance,

@@ -1,4 +1,4 @@
-//! Designs the controllers without actuators that are gone.
+//! Designs the controllers for actuators that are gone.
 
 use control::allocation::{Actuators, allocate, equilibrium};
 use control::aso::Gains;
@@ -47,7 +47,7 @@ pub(crate) struct Reconfigurations {
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
-    /// None if the controller uses the fall-back without this actuator.
+    /// None if the fall-back is in force while this actuator is gone.
     pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,
@@ -62,7 +62,7 @@ pub(crate) struct Combination {
     pub(crate) gains: ReconfiguredGains,
 }
 
-/// The gains without actuators.
+/// The gains while actuators are gone.
 #[expect(clippy::struct_field_names, reason = "the names of the design file")]
 pub(crate) struct ReconfiguredGains {
     pub(crate) k_x: DMatrix<f64>,
@@ -72,8 +72,8 @@ pub(crate) struct ReconfiguredGains {
     pub(crate) k_s: DMatrix<f64>,
 }
 
-/// Designs the controllers without each of the requested actuators, and without several of them; no report if the file
-/// asks for none. Where there is no controller, the report has the reason and what the fall-back does.
+/// Designs the controllers for each of the requested actuators that is gone, and for several of them; no report if the
+/// file asks for none. Where there is no controller, the report has the reason and what the fall-back does.
 pub(crate) fn reconfigurations(
     file: &PlantFile<'_>,
     designed: &Solution,
@@ -234,7 +234,7 @@ impl Without<'_> {
         Loop::new(commanded(reduced, *domain), controller)
     }
 
-    /// Returns how the loop with the fall-back behaves in this case; the observer knows that the actuators are gone.
+    /// Examines the loop with the fall-back in this case; the observer knows that the actuators are gone.
     fn served(&self, fallback: &Fallback) -> Result<ServedByFallback, Error> {
         let none = DMatrix::zeros(fallback.k_x.nrows(), self.designed.gains.k_f.ncols());
         let whole = self.known_loop(&fallback.k_x, fallback.k_f.as_ref().unwrap_or(&none))?;
@@ -332,8 +332,9 @@ impl Without<'_> {
 
     /// Returns K_f, K_s and the equilibrium that they lead to.
     ///
-    /// The faults of an actuator that is gone are the deviation of its effect from the assumed command. Both act
-    /// through its column of B, so that the other actuators answer them by the same commands.
+    /// The estimated faults of an actuator that is gone are the deviation of its effect from the assumed command. Fault
+    /// and stuck command act through the same column of B, so that the other actuators answer both by the same
+    /// commands.
     fn static_commands(
         &self,
         k_x: &DMatrix<f64>,

@@ -21,10 +21,10 @@ use plant_file::signals::Signal;
 use plant_file::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: that of `B_p` K L `C_p` with a
-/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; written with degree 4 its
-/// coefficients are nearer to it.
+/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; the Bernstein
+/// coefficients of degree 4 are nearer to its values.
 const DEGREE: u32 = 4;
-/// The same for a current estimator with a direct term: B `K_f` `P_f` C L C.
+/// [`DEGREE`] for a current estimator with a direct term: B `K_f` `P_f` C L C.
 const DEGREE_OF_DIRECT_TERM: u32 = 6;
 
 /// The designs of a scheduled controller.

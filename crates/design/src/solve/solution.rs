@@ -199,8 +199,8 @@ fn feedback_of_family(
     }
 }
 
-/// Returns the instability of plant and controller; with delays the larger one of the loops with the plants of the
-/// design and of the judgement, which approximates delays better.
+/// Returns the instability of plant and controller; with delays the larger one for two plants: that of the design, and
+/// that of the judgement, which approximates delays better.
 fn instability_of(model: LoopModel<'_>, gains: &Gains, whole: &DesignLoop) -> Result<f64, Error> {
     let LoopModel { linear, plant, domain, .. } = model;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;

@@ -28,7 +28,7 @@ pub(crate) const REACHED: f64 = 1e-9;
 pub(crate) struct Tracking {
     /// With operating points and units.
     pub(crate) signals: Vec<Signal>,
-    /// The size of the step of each that the report shows, if stated.
+    /// The size of the step of each reference that the report shows, if stated.
     pub(crate) steps: Vec<Option<f64>>,
     /// H, t x p.
     pub(crate) h: DMatrix<f64>,

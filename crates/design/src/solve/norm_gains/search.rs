@@ -12,7 +12,7 @@ use crate::solve::norm_gains::NormRequirement;
 use plant_file::channel::{Channel, ChannelWeight};
 use plant_file::requirements::Region;
 
-/// Relative width of a norm.
+/// Relative accuracy of a norm.
 pub(crate) const WIDTH: f64 = 1e-4;
 /// Largest number of states for which bounds are proven and the norm without the region is computed.
 pub(crate) const LARGEST_ORDER: usize = 30;
@@ -34,9 +34,9 @@ pub(crate) struct Search<'a> {
     /// The performance without weights and noise.
     pub(crate) unweighted: Performance,
     pub(crate) required: NormRequirement<'a>,
-    /// The gain of a filter by a Riccati equation, if there is one.
+    /// The gain by the Riccati equation of the filter, if there is one.
     pub(crate) filter: Option<DMatrix<f64>>,
-    /// A norm below which no gain is.
+    /// A lower bound of the norm for all gains.
     pub(crate) lower_bound: Option<LowerBound>,
 }
 
