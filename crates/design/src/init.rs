@@ -27,7 +27,7 @@ pub struct NewPlantFile {
     pub text: String,
     /// Why no controller was found for the plant, if there is none.
     pub refusal: Option<String>,
-    /// What may make the plant useless.
+    /// Reasons for which the plant may be useless.
     pub warnings: Vec<String>,
 }
 
@@ -116,7 +116,7 @@ fn attempts(draft: &Draft) -> Vec<Settings> {
     let all = draft.actuators.len();
     let one = |faulty: Vec<usize>, filter| Settings { faulty, filter, bandwidths: None };
     let sets = (1..=all).rev().flat_map(|count| {
-        // The first actuators; one alone may be any.
+        // Sets of several actuators begin at the first one; a single actuator may be any.
         let starts = if count == 1 { 0..all } else { 0..1 };
         starts.map(move |start| (start..start + count).collect::<Vec<_>>())
     });

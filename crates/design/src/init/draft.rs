@@ -13,13 +13,13 @@ pub(super) struct Draft {
     pub(super) model: Model,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
-    /// Names of outputs that are no measurements, because they contain a command.
+    /// Names of outputs that are not used as measurements, because a command enters them directly.
     pub(super) left_out: Vec<String>,
     pub(super) has_feedthrough: bool,
     pub(super) identification: Identification,
 }
 
-/// What an identification found out about its plant; of other plants only warnings.
+/// The results of an identification; for other plants only `warnings`.
 #[derive(Default)]
 pub(super) struct Identification {
     /// Time, s, between the samples of the log.

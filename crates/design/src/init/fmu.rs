@@ -14,7 +14,7 @@ use plant_file::signals::Signal;
 
 /// Reads the continuous inputs and outputs of the FMU; `out` is the plant file that will name it.
 ///
-/// An output that contains a command is no measurement, unless all do.
+/// An output that a command enters directly is no measurement, unless this holds for all outputs.
 pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
     let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
     let fmu = Fmu::open_any(path).map_err(|error| invalid(files::sentence(&error)))?;
@@ -36,7 +36,7 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
         let text = variable.and_then(|variable| variable.description.clone());
         Signal { description: text.unwrap_or_default(), ..Signal::named(signal.name.clone()) }
     };
-    // An output that contains a command, a force for example, is rarely what a sensor measures.
+    // A sensor rarely measures an output that a command enters directly, such as a force.
     let [d, _] = direct_terms(&linear);
     let contains = |at: &usize| d.row(*at).amax() > 0.0;
     let (with_command, free): (Vec<_>, Vec<_>) = (0..linear.outputs.len()).partition(contains);

@@ -139,7 +139,7 @@ pub(super) fn named(cell: &str) -> Signal {
 mod tests {
     use super::*;
 
-    /// Only .csv files are read as logs; this one has the column.
+    /// Only .csv files are read as logs; this one has a column of the time.
     #[test]
     fn a_log_in_a_file_of_tables_is_told_the_ending_of_logs() {
         let refused = table("time\tu\ty\n0\t1\t2\n", "log.tsv").err().unwrap();

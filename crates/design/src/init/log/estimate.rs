@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use crate::init::log::fit::{SHORT, estimation, relative_errors};
 use crate::init::log::read::Log;
 
-/// Numbers of earlier samples that predict the next one: those that are tried.
+/// The numbers of earlier samples, from which the next one is predicted, that are tried.
 const PASTS: [usize; 5] = [5, 10, 20, 40, 80];
 /// The largest number of columns of the compressed samples, which bounds the computing time; the first of [`PASTS`] may
 /// have more.
@@ -107,7 +107,7 @@ fn in_states(plant: &StateSpace, states: &MeasuredStates) -> StateSpace {
     let (p, n) = plant.c.shape();
     let mut c = DMatrix::zeros(p, n);
     c.fill_with_identity();
-    // Exactly, without rounding errors: A has the rate of a measurement as its derivative.
+    // These rows are exact: the derivative of a measurement is the state that is its rate.
     for (at, rate) in states.rates.iter().enumerate() {
         a.row_mut(*rate).fill(0.0);
         a[(*rate, p + at)] = 1.0;
@@ -140,7 +140,7 @@ fn windows(logs: &[Log], past: usize) -> Result<Windows, control::Error> {
     Windows::joined(&parts.iter().collect::<Vec<_>>())
 }
 
-/// Divides these windows into about [`BLOCKS`] blocks, at least one for each log that has a window.
+/// Divides the windows of [`windows`] into about [`BLOCKS`] blocks, at least one for each log that has a window.
 fn blocks(logs: &[Log], past: usize) -> Result<Vec<Windows>, control::Error> {
     let all: usize = logs.iter().map(|log| estimation(log).len()).sum();
     let mut blocks = Vec::new();

@@ -69,7 +69,7 @@ fn constant_signal<'a>(
     })
 }
 
-/// Returns warnings of what may make the plant useless; `order`: the order that the user states.
+/// Returns warnings of a plant that may be useless; `order`: the order that the user states.
 pub(super) fn warnings(
     logs: &[Log],
     order: Option<usize>,
@@ -112,8 +112,8 @@ pub(super) fn warnings(
     warnings
 }
 
-/// Returns a warning if no command changes in the samples that choose the order, unless it is stated, and judge the
-/// estimate.
+/// Returns a warning if no command changes in the last quarter of the logs, which judges the estimate and, unless it is
+/// stated, selects the order.
 fn rest(logs: &[Log], order: Option<usize>) -> Option<String> {
     let is_constant = |log: &Log| {
         let commands = log.record.inputs.columns_range(validation(log));
