@@ -45,7 +45,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
         let mut result = None;
         if reason.is_none() {
             match design_by(&file, &law) {
-                // The law may exist for the plant of the file and not at another point.
+                // The law may exist for the plant of the file, but not at another point of the schedule.
                 Err(error) if file.schedule.is_some() => reason = Some(files::sentence(&error)),
                 designed => {
                     let (designed, steps) = (designed?, Steps::new(&|_| {}));

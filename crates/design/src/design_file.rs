@@ -111,7 +111,7 @@ impl Designed {
     }
 }
 
-/// Returns a signal as the design file has it.
+/// Converts a signal to that of the design file.
 pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
     Signal {
         name: signal.name.clone(),
@@ -122,7 +122,7 @@ pub(crate) fn as_stated(signal: &PlantSignal) -> Signal {
 }
 
 /// Returns `transfer` of the design file for a time constant in s: the rate in 1/s; in a sampled controller the part of
-/// u_t that a sample removes.
+/// the transition u_t that each sample removes.
 fn decay(time: f64, sample_time: Option<f64>) -> f64 {
     sample_time.map_or(1.0 / time, |period| -(-period / time).exp_m1())
 }

@@ -76,9 +76,9 @@ pub(crate) fn kalman_design(
     };
     let n = linear.states.len();
     let (of_observer, q) = (extended.plant.a.nrows(), extended.plant.f_a.ncols());
-    // Without the filter of the measurements.
+    // Without the states of the measurement filter.
     let positions: Vec<usize> = (0..n).chain(of_observer..of_observer + q).collect();
-    // The dynamics of the observer's error have the faults with the other sign.
+    // The faults have the opposite sign in the error dynamics of the observer.
     let sign = |at: usize| if at < n { 1.0 } else { -1.0 };
     let part = |m: &DMatrix<f64>| {
         let block = m.select_rows(&positions).select_columns(&positions);

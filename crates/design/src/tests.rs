@@ -328,7 +328,7 @@ fn requirements_that_are_not_stated_are_open() {
     assert_eq!(read(&stated, |file| file.feedback.requirement.clone()).unwrap(), bandwidth);
 }
 
-/// Its design file would be refused: the controller has one bit of 64 for each actuator.
+/// The controller has one bit of 64 for each actuator.
 #[test]
 fn a_plant_with_more_than_64_actuators_is_refused() {
     let text = |count: usize| {
@@ -376,7 +376,7 @@ fn each_error_states_position_expectation_and_finding() {
     }
 }
 
-/// They are the names of variables that the FMU of this design does not have.
+/// These are names of variables that the FMU of this design does not have.
 #[test]
 fn names_like_those_of_the_controller_fmu_are_accepted() {
     for name in
@@ -450,7 +450,7 @@ observer.region = { decay = 20 }
     .unwrap();
     assert_eq!(path, Path::new("Plant.fmu"));
     assert_eq!(point, [("phi".to_owned(), 0.5), ("tau.c".to_owned(), 0.0)]);
-    // It has no F_a.
+    // The file has no F_a.
     let without = text.replace("faults = [{ name = \"f\", input = \"tau_f\" }]", "");
     let refused = read(&without, |_| ()).unwrap_err();
     let expected = "no fault is stated: expected `actuator_faults = \"all\"` or [[faults]]";
@@ -752,7 +752,8 @@ fn the_entries_of_a_member_of_a_family_vary_and_not_those_of_the_plant_of_the_fi
     assert_eq!(read(&text, varying).unwrap(), [2, 3]);
 }
 
-/// The proof ends before the case found, which is in one direction only; without time, or without an entry that varies, it says so.
+/// The proven fraction is below that of the worst case found, which is in one direction only; without time, or without
+/// an entry that varies, the proof says so.
 #[test]
 fn a_fraction_of_the_tolerances_is_proven() {
     let proof = |text: &str, time: Duration| {
